@@ -1,0 +1,151 @@
+//! `playbot bench`: speed, as steps per second of the whole and microseconds of its parts.
+
+use std::time::Instant;
+
+use bevy_playbot::{
+    game::{Game, build_world},
+    learner::DeviceKind,
+    prelude::*,
+    train::{
+        Algorithm, Trainer,
+        worlds::{default_threads, on_threads},
+    },
+};
+use serde_json::{Value, json};
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment,
+};
+use crate::registry;
+
+/// Measures speed. Numbers are for this machine and this moment; nothing is tested.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot bench --json
+  playbot bench --case sim/coinrun/vector --threads 1")]
+pub struct Args {
+    /// Only cases whose name contains this.
+    #[arg(long, default_value = "")]
+    case: String,
+    /// Arenas.
+    #[arg(long, default_value_t = 64)]
+    arenas: u32,
+    /// Threads; each has a World of its own.
+    #[arg(long, default_value_t = default_threads())]
+    threads: usize,
+    /// Seconds to measure each case for, at least.
+    #[arg(long, default_value_t = 5.0)]
+    seconds: f64,
+    /// One line of JSON per case.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args) -> Result<Outcome, CliError> {
+    if args.arenas == 0 || args.threads == 0 || !args.arenas.is_multiple_of(args.threads as u32) {
+        return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
+    }
+    let game = registry::game("coinrun")?;
+    let cases: [(&str, fn(&dyn Game, &Args) -> Result<Measure, CliError>); 2] =
+        [("sim/coinrun/vector", simulate), ("train/coinrun/vector", train)];
+    let wanted: Vec<_> = cases.iter().filter(|(name, _)| name.contains(&args.case)).collect();
+    if wanted.is_empty() {
+        return Err(CliError::Usage(format!(
+            "no case is called `{}`; cases: {}",
+            args.case,
+            cases.map(|(name, _)| name).join(", ")
+        )));
+    }
+    for (name, measure) in wanted {
+        let measured = measure(game, &args)?;
+        if args.json {
+            print_line(measured.to_json(name, &args))?;
+        } else {
+            print_line(format!(
+                "{name}: {:.0} steps/s with {} arenas on {} threads; peak memory {:.0} MiB; {}",
+                measured.steps_per_s, args.arenas, args.threads, peak_rss_mib(), measured.parts
+            ))?;
+        }
+    }
+    Ok(Outcome::Pass)
+}
+
+struct Measure {
+    steps_per_s: f64,
+    /// Microseconds per step of the parts, over all threads together.
+    parts: Value,
+}
+
+impl Measure {
+    fn to_json(&self, case: &str, args: &Args) -> Value {
+        json!({
+            "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
+            "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts,
+        })
+    }
+}
+
+/// Random actions on hard levels, observations filled every tick.
+fn simulate(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
+    let threads = args.threads as u32;
+    let share = args.arenas / threads;
+    let mut worlds: Vec<_> = (0..threads)
+        .map(|index| {
+            let (mut world, agents) = build_world(game, "hard", 1, index * share, share);
+            for agent in agents {
+                let queue = LevelQueue::Uniform { first: 0, last: 63 };
+                world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
+            }
+            world
+        })
+        .collect();
+    const TICKS: u64 = 500;
+    let (start, mut ticks) = (Instant::now(), 0);
+    while start.elapsed().as_secs_f64() < args.seconds {
+        for done in on_threads(&mut worlds, args.threads, |world| world.ticks(TICKS)) {
+            done?;
+        }
+        ticks += TICKS;
+    }
+    let steps = (ticks * u64::from(args.arenas)) as f64;
+    let steps_per_s = steps / start.elapsed().as_secs_f64();
+    let simulate_and_observe = 1e6 * args.threads as f64 / steps_per_s;
+    Ok(Measure { steps_per_s, parts: json!({ "simulate_observe": simulate_and_observe }) })
+}
+
+/// PPO on state vectors with 256 steps a rollout, 3 epochs, 8 minibatches.
+fn train(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
+    let mut experiment = experiment::load(None)?;
+    experiment.arenas = args.arenas;
+    experiment.worlds = args.threads as u32;
+    experiment.ppo.num_steps = 256;
+    experiment.ppo.epochs = 3;
+    experiment.ppo.minibatches = 8;
+    let mut trainer =
+        Trainer::new(game, &experiment, Algorithm::Ppo, None, DeviceKind::default(), args.threads)?;
+    trainer.update()?;
+    let (start, before) = (Instant::now(), trainer.steps());
+    let (mut collect, mut learn) = (0.0, 0.0);
+    while start.elapsed().as_secs_f64() < args.seconds {
+        let timing = trainer.update()?.timing;
+        collect += timing.collect_s;
+        learn += timing.learn_s;
+    }
+    let steps = (trainer.steps() - before) as f64;
+    Ok(Measure {
+        steps_per_s: steps / start.elapsed().as_secs_f64(),
+        parts: json!({
+            "simulate_observe_infer": 1e6 * collect * args.threads as f64 / steps,
+            "learn": 1e6 * learn * args.threads as f64 / steps,
+        }),
+    })
+}
+
+/// Largest resident memory of this process so far, MiB; 0 where the system does not say.
+fn peak_rss_mib() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|rest| rest.split_whitespace().next()?.parse::<f64>().ok());
+    (kib.unwrap_or(0.0) / 1024.0).round()
+}

@@ -1,0 +1,155 @@
+//! `playbot eval`.
+
+use std::path::PathBuf;
+
+use bevy_playbot::{
+    eval::Player,
+    game::{Game, check_mode},
+    learner::{DeviceKind, PpoLearner, SkillModel},
+    policy::ActionDraw,
+    report::to_text_table,
+    skill_prior::SkillPrior,
+    split::LevelSplit,
+    train::{Experiment, run_dir::RunDir, worlds::default_threads},
+};
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment, methods,
+};
+use crate::registry;
+
+/// Measures trained runs, behaviour cloning and bots on the held-out levels, every level equally often.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot eval --run runs/first
+  playbot eval --bot right-jump --bot random --levels hard:0..63 --json
+  playbot eval --skills skills.safetensors
+  playbot eval --run runs/first --bot search --levels hard:64..127 --levels easy:500..599")]
+pub struct Args {
+    /// Folder of a run; may be given several times.
+    #[arg(long)]
+    run: Vec<PathBuf>,
+    /// Skill model: measures behaviour cloning, the decoder under the prior.
+    #[arg(long)]
+    skills: Vec<PathBuf>,
+    /// Bot of the game, such as random, right-jump or search; may be given several times.
+    #[arg(long)]
+    bot: Vec<String>,
+    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named.
+    #[arg(long)]
+    levels: Vec<LevelSplit>,
+    /// Episodes on each level, instead of the experiment's.
+    #[arg(long)]
+    episodes_per_level: Option<u32>,
+    /// Take the most probable action instead of drawing one.
+    #[arg(long)]
+    greedy: bool,
+    /// Experiment file; the run's own, or the built-in CoinRun experiment if there is no run.
+    #[arg(long)]
+    experiment: Option<PathBuf>,
+    /// Seed of the players' draws, instead of the experiment's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Threads; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads())]
+    threads: usize,
+    /// Where to compute: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+    /// One line of JSON per player and range of levels.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args) -> Result<Outcome, CliError> {
+    if args.run.is_empty() && args.skills.is_empty() && args.bot.is_empty() {
+        return Err(CliError::Usage(
+            "nobody to measure: name a --run, a --skills file or a --bot (see `playbot eval --help`)".to_owned(),
+        ));
+    }
+    let mut experiment = read_experiment(&args)?;
+    experiment.seed = args.seed.unwrap_or(experiment.seed);
+    let game = registry::game(&experiment.game)?;
+    let players = players(game, &experiment, &args)?;
+    let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
+    let episodes = args.episodes_per_level.unwrap_or(experiment.eval.episodes_per_level);
+    if episodes == 0 {
+        return Err(CliError::Usage("--episodes-per-level is 0: a verdict needs at least one episode".to_owned()));
+    }
+    let mut rows = Vec::new();
+    for split in &splits {
+        check_mode(game, &split.mode)?;
+        for (name, player) in &players {
+            let plan = methods::plan(&experiment, split, episodes, args.threads);
+            let measured = methods::measure(game, name, player, &plan)?;
+            if args.json {
+                methods::print_json(&measured.summary)?;
+            }
+            rows.push(measured.into_row());
+        }
+    }
+    if !args.json {
+        print_line(to_text_table(&rows))?;
+    }
+    Ok(Outcome::Pass)
+}
+
+fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
+    match (&args.experiment, args.run.first()) {
+        (None, Some(run)) => Ok(RunDir::open(run)?.1),
+        (path, _) => Ok(experiment::load(path.as_deref())?),
+    }
+}
+
+fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<(String, Player)>, CliError> {
+    let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    let mut players = Vec::new();
+    for path in &args.run {
+        let (run, own, info) = RunDir::open(path)?;
+        let learner = PpoLearner::load(&run.learner_file(), args.device)?;
+        let prior = learner.prior().map(|prior| SkillPrior {
+            prior,
+            horizon: own.score.horizon as u32,
+            draw: own.score.skill_draw,
+        });
+        players.push((info.algorithm.name().to_owned(), Player::Policy { policy: learner.policy(), prior, draw }));
+    }
+    for path in &args.skills {
+        let model = SkillModel::load(path, args.device)?;
+        players.push(("bc".to_owned(), cloning(&model, experiment, draw)));
+    }
+    for name in &args.bot {
+        players.push((name.clone(), methods::bot(game, name)?));
+    }
+    for (name, player) in &players {
+        if let Player::Policy { policy, .. } = player {
+            check_fit(game, name, policy.obs_dim(), policy.action_space())?;
+        }
+    }
+    Ok(players)
+}
+
+/// Behaviour cloning: the decoder under the prior, without any reinforcement learning.
+pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
+    let (horizon, skill_draw) = (experiment.score.horizon as u32, experiment.score.skill_draw);
+    let prior = SkillPrior { prior: model.prior(), horizon, draw: skill_draw };
+    Player::Policy { policy: model.policy(), prior: Some(prior), draw }
+}
+
+fn check_fit(
+    game: &dyn Game,
+    name: &str,
+    obs_dim: usize,
+    actions: bevy_playbot::action::ActionSpace,
+) -> Result<(), CliError> {
+    let (game_obs, game_actions) = (game.observation().len(), game.actions());
+    if (obs_dim, actions) == (game_obs, game_actions) {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "the policy {name} was made for {obs_dim} observation values and {actions:?}, but `{}` has {game_obs} and \
+         {game_actions:?}: use one that was trained for this game and this version",
+        game.name()
+    )))
+}

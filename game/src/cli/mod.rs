@@ -1,0 +1,118 @@
+//! The command line. One file per verb; data goes to standard output, everything else to standard error.
+#![allow(clippy::print_stdout, reason = "a command line prints")]
+
+mod bench;
+mod demo;
+mod error;
+mod eval;
+mod experiment;
+mod interrupt;
+mod learn_skills;
+mod level;
+mod methods;
+mod progress;
+mod quickstart;
+mod record;
+mod trace;
+mod train;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use error::{CliError, Outcome};
+
+/// Playtesting bots that learn from demonstrations.
+#[derive(Parser)]
+#[command(name = "playbot", version, after_help = EXAMPLES)]
+struct Cli {
+    /// What to do; `quickstart` if nothing is given.
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    /// Print what happens inside; twice for more.
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  playbot                                          learn, train and test on CoinRun in a few minutes
+  playbot level coinrun --mode hard --seed 7       show a level
+  playbot record coinrun --levels easy:0..9 --out my.demo
+  playbot demo verify demos/coinrun
+  playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
+  playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
+  playbot eval --run runs/first --json
+
+Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
+    Quickstart(quickstart::Args),
+    /// Record the game's demonstrator.
+    Record(record::Args),
+    /// Look at, check and repair recordings.
+    Demo(demo::Args),
+    /// Learn the skill model from recordings.
+    LearnSkills(learn_skills::Args),
+    /// Train a policy.
+    Train(train::Args),
+    /// Measure policies and baselines, every level equally often.
+    Eval(eval::Args),
+    /// Show a level.
+    Level(level::Args),
+    /// Play given actions and print the state after each.
+    Trace(trace::Args),
+    /// Measure speed.
+    Bench(bench::Args),
+}
+
+/// Runs the command line on the process's arguments.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Asking for help is no mistake; anything else is a wrong usage, which is 3 here.
+            let code = if error.use_stderr() { 3 } else { 0 };
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    init_tracing(cli.verbose);
+    let verb = cli.verb.unwrap_or_else(|| Verb::Quickstart(quickstart::Args::default()));
+    match std::panic::catch_unwind(|| run(verb)) {
+        Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
+        Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
+        Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+        Err(_) => {
+            eprintln!("error: the program failed, which is a bug in it; please report the lines above");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(verb: Verb) -> Result<Outcome, CliError> {
+    match verb {
+        Verb::Quickstart(args) => quickstart::run(args),
+        Verb::Record(args) => record::run(args),
+        Verb::Demo(args) => demo::run(args),
+        Verb::LearnSkills(args) => learn_skills::run(args),
+        Verb::Train(args) => train::run(args),
+        Verb::Eval(args) => eval::run(args),
+        Verb::Level(args) => level::run(args),
+        Verb::Trace(args) => trace::run(args),
+        Verb::Bench(args) => bench::run(args),
+    }
+}
+
+fn init_tracing(verbose: u8) {
+    let level = ["warn", "info", "debug"][usize::from(verbose.min(2))];
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+}

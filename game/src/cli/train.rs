@@ -1,0 +1,152 @@
+//! `playbot train`.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::{
+    learner::{DeviceKind, SkillModel},
+    train::{
+        Algorithm, Experiment, Trainer, UpdateReport,
+        run_dir::{RunDir, RunError, RunInfo},
+        worlds::default_threads,
+    },
+};
+
+use super::{
+    error::{CliError, Outcome},
+    experiment, interrupt, progress,
+};
+use crate::registry;
+
+/// Trains a policy, headless, over the experiment's training levels.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot train --skills skills.safetensors --run runs/first
+  playbot train --algorithm ppo --run runs/baseline --steps 200000
+  playbot train --run runs/first --resume")]
+pub struct Args {
+    /// Experiment file; the built-in CoinRun experiment if none is named.
+    #[arg(long, conflicts_with = "resume")]
+    experiment: Option<PathBuf>,
+    /// score-ppo or ppo.
+    #[arg(long, default_value = "score-ppo", conflicts_with = "resume")]
+    algorithm: Algorithm,
+    /// Skill model, as written by `playbot learn-skills`.
+    #[arg(long, conflicts_with = "resume")]
+    skills: Option<PathBuf>,
+    /// Folder of the run.
+    #[arg(long)]
+    run: PathBuf,
+    /// Go on from the last checkpoint of the run.
+    #[arg(long)]
+    resume: bool,
+    /// Delete the folder of the run first if it exists.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// Environment steps, instead of the experiment's.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Seed, instead of the experiment's.
+    #[arg(long, conflicts_with = "resume")]
+    seed: Option<u64>,
+    /// Threads; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads())]
+    threads: usize,
+    /// Save a checkpoint every so many updates.
+    #[arg(long, default_value_t = 10)]
+    checkpoint_every: u64,
+    /// Where to compute: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+}
+
+pub fn run(args: Args) -> Result<Outcome, CliError> {
+    let (run, mut trainer) = if args.resume { resume(&args)? } else { start(&args)? };
+    let finished = drive(&run, &mut trainer, args.checkpoint_every, "train", |_| {})?;
+    if finished {
+        eprintln!("done: test it with `playbot eval --run {}`", args.run.display());
+    } else {
+        eprintln!("stopped and saved: go on with `playbot train --run {} --resume`", args.run.display());
+    }
+    Ok(Outcome::Pass)
+}
+
+fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
+    let mut experiment = experiment::load(args.experiment.as_deref())?;
+    experiment.steps = args.steps.unwrap_or(experiment.steps);
+    experiment.seed = args.seed.unwrap_or(experiment.seed);
+    let game = registry::game(&experiment.game)?;
+    let skills = match &args.skills {
+        Some(path) => Some(SkillModel::load(path, args.device)?),
+        None => None,
+    };
+    let trainer = Trainer::new(game, &experiment, args.algorithm, skills.as_ref(), args.device, args.threads)?;
+    let run = create_run(&args.run, &experiment, args.algorithm, args.force)?;
+    Ok((run, trainer))
+}
+
+fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
+    let (run, mut experiment, info) = RunDir::open(&args.run)?;
+    experiment.steps = args.steps.unwrap_or(experiment.steps);
+    let game = registry::game(&experiment.game)?;
+    let trainer = run.resume(game, &experiment, &info, args.device, args.threads)?;
+    eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
+    Ok((run, trainer))
+}
+
+/// Makes the folder of a run.
+///
+/// # Errors
+///
+/// It exists and `force` is off, or it cannot be written.
+pub fn create_run(
+    path: &Path,
+    experiment: &Experiment,
+    algorithm: Algorithm,
+    force: bool,
+) -> Result<RunDir, RunError> {
+    let info = RunInfo {
+        algorithm,
+        seed: experiment.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        revision: option_env!("PLAYBOT_REVISION").unwrap_or("unknown").to_owned(),
+    };
+    RunDir::create(path, experiment, &info, force)
+}
+
+/// Trains to the end of the experiment or to Ctrl-C, with progress bar, log and checkpoints. Returns whether the end
+/// was reached.
+///
+/// # Errors
+///
+/// Training or saving fails; the last checkpoint is kept.
+pub fn drive(
+    run: &RunDir,
+    trainer: &mut Trainer,
+    checkpoint_every: u64,
+    title: &str,
+    mut after_update: impl FnMut(&UpdateReport),
+) -> Result<bool, CliError> {
+    interrupt::listen();
+    let per_update = trainer.experiment().steps_per_update();
+    let bar = progress::bar(title, trainer.experiment().steps, "steps");
+    while !trainer.is_done() && !interrupt::asked() {
+        bar.set_position(trainer.steps());
+        let report = trainer.update()?;
+        run.log(&report, per_update)?;
+        bar.set_position(report.step);
+        bar.set_message(message(&report, per_update));
+        after_update(&report);
+        if report.update.is_multiple_of(checkpoint_every.max(1)) {
+            run.save(trainer)?;
+        }
+    }
+    run.save(trainer)?;
+    bar.finish_and_clear();
+    Ok(trainer.is_done())
+}
+
+fn message(report: &UpdateReport, steps_per_update: u64) -> String {
+    let sps = steps_per_update as f64 / (report.timing.collect_s + report.timing.learn_s);
+    let current = report.episodic_return.map_or("-".to_owned(), |value| format!("{value:.2}"));
+    format!("{sps:.0} steps/s, return {current}")
+}

@@ -1,0 +1,75 @@
+//! The planning bot as an agent of the game.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use bevy_playbot::{bot::uniform, fault::Faults, policy::AgentStreams, prelude::*};
+use rand::RngExt;
+
+use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator};
+
+/// Plays by planning ahead with the exact rules.
+///
+/// It plans in a copy of its level, which it steps along with the game; the state hashes of the two are compared each
+/// tick, so a game that adds to CoinRun's rules is told that this bot does not know them.
+#[derive(Component)]
+pub struct DemonstratorBot {
+    noise: f64,
+    planner: Demonstrator,
+    sim: Option<Sim>,
+}
+
+impl DemonstratorBot {
+    /// A bot whose actions are replaced by uniformly random ones with probability `noise`.
+    pub fn new(noise: f64) -> Self {
+        Self { noise, planner: Demonstrator::default(), sim: None }
+    }
+}
+
+pub(super) fn start_episode(
+    event: On<StartEpisode>,
+    mode: Res<CoinRunMode>,
+    mut bots: Query<&mut DemonstratorBot>,
+) {
+    // Levels that do not exist are reported where the arena is built.
+    if let (Ok(mut bot), Ok(seed)) = (bots.get_mut(event.entity), u32::try_from(event.level)) {
+        bot.sim = Some(Sim::new(Arc::new(generate(mode.0, seed))));
+        bot.planner = Demonstrator::default();
+    }
+}
+
+pub(super) fn decide(
+    mut bots: Query<(
+        &Agent,
+        &Control,
+        &Episode,
+        &StateHash,
+        &mut DemonstratorBot,
+        &mut AgentStreams,
+        &mut Action,
+    )>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, control, episode, hash, mut bot, mut streams, mut action) in &mut bots {
+        if *control != Control::Bot || !episode.is_running() {
+            continue;
+        }
+        let DemonstratorBot { noise, planner, sim } = &mut *bot;
+        let Some(sim) = sim else { continue };
+        if episode.tick > 0 && sim.state_hash() != hash.0 {
+            faults.report(format!(
+                "agent {}, level {}, tick {}: the planner's copy of the level is in another state than the game; it \
+                 knows the rules of CoinRun only",
+                agent.index, episode.level, episode.tick
+            ));
+            continue;
+        }
+        let planned = planner.act(sim);
+        action.0 = if *noise > 0.0 && streams.action.random_bool(*noise) {
+            uniform(&agent.actions, &mut streams.action)
+        } else {
+            ActionValue::Discrete(planned.into())
+        };
+        sim.step(action.discrete().and_then(|index| u8::try_from(index).ok()).unwrap_or(planned));
+    }
+}

@@ -1,0 +1,87 @@
+//! CoinRun for the trainer, the evaluation and the replay.
+
+use std::sync::{Arc, LazyLock};
+
+use bevy::prelude::*;
+use bevy_playbot::prelude::*;
+
+use super::{
+    components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
+    demonstrator_bot::DemonstratorBot,
+    plugin::CoinRunPlugin,
+    rules::ACTIONS,
+    view,
+};
+
+/// CoinRun under its name `coinrun`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CoinRun;
+
+/// The action "right and jump", which a player without eyes does best to hold.
+const RIGHT_JUMP: u32 = 8;
+
+static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: view::names() }));
+
+/// Makes an arena with an idle agent, and returns the agent.
+pub fn spawn_agent(world: &mut World, index: u32) -> Entity {
+    let arena = world.spawn(Tiles::default()).id();
+    world
+        .spawn((
+            Agent::new(index, ActionSpace::Discrete(usize::from(ACTIONS))),
+            VectorSensor::from_space(SPACE.clone()),
+            PlayerBody::default(),
+            PlaysIn(arena),
+            LastOutcome::default(),
+        ))
+        .id()
+}
+
+impl Game for CoinRun {
+    fn name(&self) -> &'static str {
+        "coinrun"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &["easy", "hard"]
+    }
+
+    fn tick_hz(&self) -> f64 {
+        15.0
+    }
+
+    fn actions(&self) -> ActionSpace {
+        ActionSpace::Discrete(usize::from(ACTIONS))
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        (**SPACE).clone()
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        let mode = mode.parse().expect("callers check the mode against `modes`");
+        app.add_plugins(CoinRunPlugin { mode, physics: false });
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        spawn_agent(world, index)
+    }
+
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        vec![
+            ("right-jump", BlindBot::Constant(ActionValue::Discrete(RIGHT_JUMP))),
+            ("random", BlindBot::Uniform),
+        ]
+    }
+
+    fn demonstrator(&self) -> Option<&'static str> {
+        Some("search")
+    }
+
+    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+}

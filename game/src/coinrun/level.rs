@@ -1,0 +1,232 @@
+//! A level: tiles, where the bodies start, and the few random numbers that play needs later.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::near::NearBodies;
+use super::rules::Body;
+use super::tile::TileGrid;
+
+/// Difficulty of the level generator.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// No walking enemies outside pits, one set of pictures.
+    Easy,
+    /// Everything.
+    Hard,
+}
+
+impl Mode {
+    /// The name of this mode, as `FromStr` reads it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Mode::Easy => "easy",
+            Mode::Hard => "hard",
+        }
+    }
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The error of reading a [`Mode`].
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("unknown CoinRun mode `{0}`: the modes are `easy` and `hard`")]
+pub struct UnknownMode(pub String);
+
+impl FromStr for Mode {
+    type Err = UnknownMode;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        [Mode::Easy, Mode::Hard]
+            .into_iter()
+            .find(|mode| mode.name() == name)
+            .ok_or_else(|| UnknownMode(name.to_owned()))
+    }
+}
+
+/// A body that a level starts with. Cells are tile coordinates; the body's centre is the middle of
+/// its cell.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Spawn {
+    /// A saw. It never moves.
+    Saw([i32; 2]),
+    /// A patrolling enemy.
+    Enemy {
+        /// Start cell.
+        cell: [i32; 2],
+        /// Start direction: 1 right, -1 left.
+        dir: i8,
+        /// Picture, 0 to 8.
+        sprite: u8,
+    },
+    /// A crate. It never moves.
+    Crate {
+        /// Cell.
+        cell: [i32; 2],
+        /// Picture, 0 to 3.
+        sprite: u8,
+    },
+}
+
+/// The parts from which a [`Level`] is put together.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LevelParts {
+    /// Mode of the generator.
+    pub mode: Mode,
+    /// Seed of the generator.
+    pub seed: u32,
+    /// The tiles.
+    pub tiles: TileGrid,
+    /// Cell of the coin.
+    pub coin: [i32; 2],
+    /// Bodies in creation order.
+    pub spawns: Vec<Spawn>,
+    /// Background picture, 0 to 61 (0 in easy mode).
+    pub background: u8,
+    /// Horizontal offset of the background, in `[0, 1]` of its spare width.
+    pub background_offset: f32,
+    /// Player colour, 0 to 4 (0 in easy mode).
+    pub agent_theme: u8,
+    /// Ground theme, 0 to 5 (0 in easy mode).
+    pub ground_theme: u8,
+    /// Bit `k` (bit `k % 64` of word `k / 64`) is set when step `k` moves along x first if both
+    /// speeds are equal.
+    pub tie_breaks: [u64; 16],
+}
+
+/// A complete level. Change its parts and build a new one rather than editing one in place: the
+/// lists of near bodies are computed once.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Level {
+    parts: LevelParts,
+    saws: NearBodies,
+    crates: NearBodies,
+}
+
+impl std::ops::Deref for Level {
+    type Target = LevelParts;
+
+    fn deref(&self) -> &LevelParts {
+        &self.parts
+    }
+}
+
+impl Level {
+    /// Completes a level from its parts.
+    pub fn new(parts: LevelParts) -> Self {
+        let saws: Vec<Body> = parts.spawns.iter().filter_map(Spawn::saw).collect();
+        let crates: Vec<Body> = parts.spawns.iter().filter_map(Spawn::solid_crate).collect();
+        Self { parts, saws: NearBodies::new(&saws), crates: NearBodies::new(&crates) }
+    }
+
+    /// The parts, to build a changed level from.
+    pub fn parts(&self) -> &LevelParts {
+        &self.parts
+    }
+
+    /// The enemies at the start, in creation order.
+    pub fn enemies(&self) -> Vec<Body> {
+        self.spawns.iter().filter_map(Spawn::enemy).collect()
+    }
+
+    /// Crates that a body centred at `x` (tiles) can touch in one step, in creation order.
+    #[inline]
+    pub fn crates_near(&self, x: f32) -> &[Body] {
+        self.crates.near(x)
+    }
+
+    /// Saws that a body centred at `x` (tiles) can touch in one step, in creation order.
+    #[inline]
+    pub fn saws_near(&self, x: f32) -> &[Body] {
+        self.saws.near(x)
+    }
+
+    /// Whether x moves first in step `step` (from 0) when both speeds are equal.
+    #[inline]
+    pub fn x_wins_tie(&self, step: u32) -> bool {
+        let step = step as usize % 1024;
+        self.tie_breaks[step / 64] >> (step % 64) & 1 == 1
+    }
+
+    /// The level as the JSON objects of the reference data have it.
+    pub fn to_golden_json(&self) -> GoldenLevel {
+        let mut golden = GoldenLevel {
+            mode: self.mode,
+            seed: self.seed,
+            coin: self.coin,
+            background: self.background,
+            agent_theme: self.agent_theme,
+            ground_theme: self.ground_theme,
+            saws: Vec::new(),
+            crates: Vec::new(),
+            enemies: Vec::new(),
+            crate_sprites: Vec::new(),
+            enemy_sprites: Vec::new(),
+            rows: self.tiles.rows(),
+        };
+        for spawn in &self.spawns {
+            match *spawn {
+                Spawn::Saw(cell) => golden.saws.push(cell),
+                Spawn::Enemy { cell, dir, sprite } => {
+                    golden.enemies.push([cell[0], cell[1], i32::from(dir)]);
+                    golden.enemy_sprites.push(sprite);
+                }
+                Spawn::Crate { cell, sprite } => {
+                    golden.crates.push(cell);
+                    golden.crate_sprites.push(sprite);
+                }
+            }
+        }
+        golden
+    }
+}
+
+/// A level in the shape of the reference data. Cells are `[x, y]`; lists are in creation order.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct GoldenLevel {
+    /// Mode of the generator.
+    pub mode: Mode,
+    /// Seed of the generator.
+    pub seed: u32,
+    /// Cell of the coin.
+    pub coin: [i32; 2],
+    /// Background picture.
+    pub background: u8,
+    /// Player colour.
+    pub agent_theme: u8,
+    /// Ground theme.
+    pub ground_theme: u8,
+    /// Cells of the saws.
+    pub saws: Vec<[i32; 2]>,
+    /// Cells of the crates.
+    pub crates: Vec<[i32; 2]>,
+    /// Cell and direction (1 right, -1 left) of each enemy.
+    pub enemies: Vec<[i32; 3]>,
+    /// Pictures of the crates.
+    pub crate_sprites: Vec<u8>,
+    /// Pictures of the enemies.
+    pub enemy_sprites: Vec<u8>,
+    /// 64 strings of 64 letters; the first is the bottom row.
+    pub rows: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modes_read_back_and_errors_list_them() {
+        assert_eq!("easy".parse(), Ok(Mode::Easy));
+        assert_eq!(Mode::Hard.to_string().parse(), Ok(Mode::Hard));
+        let error = "extreme".parse::<Mode>().expect_err("not a mode");
+        assert!(error.to_string().contains("`easy` and `hard`"));
+        assert_eq!(serde_json::to_string(&Mode::Easy).ok().as_deref(), Some("\"easy\""));
+    }
+}

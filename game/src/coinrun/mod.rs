@@ -1,0 +1,34 @@
+//! CoinRun: run, jump, avoid saws, enemies and lava, reach the coin.
+//!
+//! The rules and the level generator reproduce Procgen's CoinRun exactly and do not depend on an
+//! engine. [`generate`] makes a [`Level`] from a mode and a seed, [`Sim`] plays it, and the
+//! functions in [`rules`] are the single steps of play for those who keep the state elsewhere.
+
+pub mod arena;
+pub mod components;
+mod demonstrator_bot;
+pub mod game;
+pub mod generator;
+pub mod level;
+pub mod level_queue;
+pub mod near;
+pub mod physics;
+pub mod picture;
+pub mod planner;
+mod play;
+pub mod plugin;
+pub mod rules;
+pub mod sim;
+pub mod tile;
+pub mod view;
+
+pub use demonstrator_bot::DemonstratorBot;
+pub use game::CoinRun;
+pub use generator::generate;
+pub use plugin::{CoinRunPlugin, CoinRunSystems};
+pub use level::{GoldenLevel, Level, LevelParts, Mode, Spawn};
+pub use level_queue::{LevelQueue, LevelQueueState, LevelSet};
+pub use planner::{Demonstrator, Plan, PlannerConfig, plan};
+pub use rules::{Body, Outcome, PlayerState, PlayerStep};
+pub use sim::{Sim, StepResult};
+pub use tile::{SIZE, Tile, TileGrid};

@@ -1,0 +1,43 @@
+//! CoinRun as a Bevy plugin.
+
+use bevy::prelude::*;
+use bevy_playbot::prelude::*;
+
+use super::{
+    Mode, arena,
+    components::CoinRunMode,
+    demonstrator_bot, physics::CoinRunPhysicsPlugin, play,
+};
+
+/// The tick of CoinRun, in `FixedUpdate`. Add what your game adds before or after it.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CoinRunSystems;
+
+/// Adds the rules of CoinRun. Agents are made by [`spawn_agent`](super::game::spawn_agent).
+#[derive(Clone, Copy, Debug)]
+pub struct CoinRunPlugin {
+    /// Difficulty of the generated levels.
+    pub mode: Mode,
+    /// Whether bodies get rapier colliders; see [`CoinRunPhysicsPlugin`].
+    pub physics: bool,
+}
+
+impl Default for CoinRunPlugin {
+    fn default() -> Self {
+        Self { mode: Mode::Hard, physics: true }
+    }
+}
+
+impl Plugin for CoinRunPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(CoinRunMode(self.mode))
+            .add_observer(arena::start_episode)
+            .add_observer(demonstrator_bot::start_episode)
+            .add_systems(ObserveSchedule, play::observe)
+            .add_systems(FixedPreUpdate, demonstrator_bot::decide.in_set(PlaybotSystems::Decide))
+            .add_systems(FixedUpdate, play::play.in_set(CoinRunSystems));
+        if self.physics {
+            app.add_plugins(CoinRunPhysicsPlugin);
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The rectangle that everything that moves, hurts or carries consists of.
+
+use super::constants::{BLOCK_HALF, ENEMY_SPEED, PLAYER_HALF_HEIGHT, PLAYER_HALF_WIDTH, START_CELL};
+use crate::coinrun::level::Spawn;
+
+/// An axis-aligned rectangle with a velocity.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Body {
+    /// Centre, tiles from the left.
+    pub x: f32,
+    /// Centre, tiles from the bottom.
+    pub y: f32,
+    /// Horizontal velocity, tiles per step.
+    pub vx: f32,
+    /// Vertical velocity, tiles per step.
+    pub vy: f32,
+    /// Half width, tiles.
+    pub rx: f32,
+    /// Half height, tiles.
+    pub ry: f32,
+}
+
+impl Body {
+    /// The player at the start of every level.
+    pub fn player() -> Self {
+        Self {
+            x: START_CELL[0] as f32 + PLAYER_HALF_WIDTH,
+            y: START_CELL[1] as f32 + PLAYER_HALF_HEIGHT,
+            vx: 0.0,
+            vy: 0.0,
+            rx: PLAYER_HALF_WIDTH,
+            ry: PLAYER_HALF_HEIGHT,
+        }
+    }
+
+    /// A saw or a crate: a resting square that fills `cell`.
+    pub fn block(cell: [i32; 2]) -> Self {
+        Self { x: cell[0] as f32 + 0.5, y: cell[1] as f32 + 0.5, vx: 0.0, vy: 0.0, rx: BLOCK_HALF, ry: BLOCK_HALF }
+    }
+
+    /// An enemy that starts in `cell` and walks to the right (`dir` 1) or to the left (-1).
+    pub fn enemy(cell: [i32; 2], dir: i8) -> Self {
+        Self { vx: ENEMY_SPEED * f32::from(dir), ..Self::block(cell) }
+    }
+
+    /// Whether the two rectangles overlap when the sum of their half sizes is changed by `margin`.
+    #[inline]
+    pub fn overlaps(&self, other: &Body, margin: f32) -> bool {
+        let reach_x = (self.rx + other.rx) + margin;
+        let reach_y = (self.ry + other.ry) + margin;
+        (self.x - other.x).abs() < reach_x && (self.y - other.y).abs() < reach_y
+    }
+}
+
+impl Spawn {
+    pub(in crate::coinrun) fn saw(&self) -> Option<Body> {
+        match *self {
+            Spawn::Saw(cell) => Some(Body::block(cell)),
+            _ => None,
+        }
+    }
+
+    pub(in crate::coinrun) fn enemy(&self) -> Option<Body> {
+        match *self {
+            Spawn::Enemy { cell, dir, .. } => Some(Body::enemy(cell, dir)),
+            _ => None,
+        }
+    }
+
+    pub(in crate::coinrun) fn solid_crate(&self) -> Option<Body> {
+        match *self {
+            Spawn::Crate { cell, .. } => Some(Body::block(cell)),
+            _ => None,
+        }
+    }
+}

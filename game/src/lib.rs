@@ -1,0 +1,9 @@
+//! The games of `bevy_playbot` and its command line.
+//!
+//! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
+//! - [`registry`]: games by name.
+//! - [`cli`]: the program `playbot`.
+
+pub mod cli;
+pub mod coinrun;
+pub mod registry;

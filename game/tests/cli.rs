@@ -1,0 +1,165 @@
+//! The program as its users call it.
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+fn playbot(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("not killed")
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn lines(output: &Output) -> Vec<Value> {
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+}
+
+#[test]
+fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (args, words) in [
+        (&["level", "coinrunn"][..], "did you mean `coinrun`?"),
+        (&["level", "coinrun", "--mode", "hrad"], "did you mean `hard`?"),
+        (&["trace", "coinrun", "--mode", "medium", "--actions", "7"], "valid: easy, hard"),
+        (&["eval", "--bot", "serch"], "did you mean `search`?"),
+        (&["eval"], "nobody to measure"),
+        (&["eval", "--bot", "random", "--levels", "hard"], "mode:first..last"),
+        (&["bench", "--case", "nonsense"], "sim/coinrun/vector"),
+        (&["train", "--run", "r", "--algorithm", "pp"], "did you mean `ppo`?"),
+        (&["fly"], "unrecognized subcommand"),
+    ] {
+        let output = playbot(folder.path(), args);
+        assert_eq!(code(&output), 3, "{args:?}: {}", errors(&output));
+        assert!(errors(&output).contains(words), "{args:?}: {}", errors(&output));
+    }
+}
+
+#[test]
+fn an_unknown_key_names_file_line_and_neighbour() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = folder.path().join("bad.ron");
+    let text = "(\n    game: \"coinrun\",\n    trian: \"hard:0..63\",\n)\n";
+    std::fs::write(&config, text).expect("writable");
+    let output = playbot(folder.path(), &["train", "--run", "r", "--experiment", "bad.ron"]);
+    assert_eq!(code(&output), 3);
+    let errors = errors(&output);
+    assert!(errors.contains("bad.ron:3:") && errors.contains("`trian`") && errors.contains("`train`"), "{errors}");
+    assert!(!folder.path().join("r").exists(), "nothing is written for a bad experiment");
+}
+
+#[test]
+fn traces_stop_at_the_end_and_read_back_exactly() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let actions = vec!["8"; 200].join(",");
+    let output = playbot(folder.path(), &["trace", "coinrun", "--mode", "hard", "--seed", "0", "--actions", &actions, "--json"]);
+    let steps = lines(&output);
+    assert_eq!(steps.len(), 63);
+    assert_eq!(steps[0], serde_json::json!([1.5999999, 3.0787, 0.1, 1.5, 0, 0]));
+    assert_eq!((&steps[62][4], &steps[62][5]), (&Value::from(10), &Value::from(1)));
+    std::fs::write(folder.path().join("actions.txt"), actions.replace(',', "\n")).expect("writable");
+    let from_file =
+        playbot(folder.path(), &["trace", "coinrun", "--seed", "0", "--actions-file", "actions.txt", "--json"]);
+    assert_eq!(output.stdout, from_file.stdout);
+    let wrong = playbot(folder.path(), &["trace", "coinrun", "--actions", "99", "--json"]);
+    assert_eq!(code(&wrong), 2);
+    assert!(errors(&wrong).contains("action 99 is outside 0..15"), "{}", errors(&wrong));
+}
+
+#[test]
+fn blind_bots_score_what_they_score_in_the_original() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = playbot(
+        folder.path(),
+        &[
+            "eval", "--bot", "right-jump", "--episodes-per-level", "1", "--levels", "hard:64..127", "--levels",
+            "hard:0..63", "--json",
+        ],
+    );
+    let rows = lines(&output);
+    assert_eq!(rows.len(), 2);
+    assert_eq!(rows[0]["split"], "hard:64..127");
+    assert_eq!((rows[0]["episodes"].as_u64(), rows[0]["return_mean"].as_f64()), (Some(64), Some(5.46875)));
+    assert_eq!((rows[1]["method"].as_str(), rows[1]["return_mean"].as_f64()), (Some("right-jump"), Some(6.40625)));
+}
+
+#[test]
+fn recording_verifying_and_repairing_from_the_shell() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| playbot(folder.path(), args);
+    let output = run(&["record", "coinrun", "--levels", "easy:0..3", "--noise", "0.2", "--out", "a.demo"]);
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let again = run(&["record", "coinrun", "--levels", "easy:0..3", "--out", "a.demo"]);
+    assert_eq!(code(&again), 3, "an existing recording is not overwritten");
+    let verified = run(&["demo", "verify", "a.demo", "--json"]);
+    assert_eq!(code(&verified), 0, "{}", errors(&verified));
+    assert_eq!(lines(&verified)[0]["report"]["episodes"], 4);
+    assert_eq!(lines(&run(&["demo", "ls", "a.demo", "--json"]))[0]["episodes"], 4);
+    assert_eq!(lines(&run(&["demo", "show", "a.demo", "--json"])).len(), 4);
+
+    let bytes = std::fs::read(folder.path().join("a.demo")).expect("readable");
+    std::fs::write(folder.path().join("torn.demo"), &bytes[..bytes.len() - 5]).expect("writable");
+    let torn = run(&["demo", "verify", "torn.demo"]);
+    assert_eq!(code(&torn), 3);
+    assert!(errors(&torn).contains("playbot demo repair"), "{}", errors(&torn));
+    let mended = run(&["demo", "repair", "torn.demo", "--out", "mended.demo", "--json"]);
+    assert_eq!(lines(&mended)[0]["kept_episodes"], 3);
+    assert_eq!(code(&run(&["demo", "verify", "mended.demo"])), 0);
+
+    let mut flipped = bytes;
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 16;
+    std::fs::write(folder.path().join("flipped.demo"), flipped).expect("writable");
+    let flipped = run(&["demo", "verify", "flipped.demo"]);
+    assert_eq!(code(&flipped), 3);
+    assert!(errors(&flipped).contains("byte"), "{}", errors(&flipped));
+}
+
+#[test]
+fn a_small_run_from_demonstrations_to_evaluation() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| playbot(folder.path(), args);
+    let config = r#"(
+        game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "demos", steps: 512, arenas: 8, worlds: 2,
+        skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+        ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
+        eval: (episodes_per_level: 1),
+    )"#;
+    std::fs::write(folder.path().join("tiny.ron"), config).expect("writable");
+    std::fs::create_dir(folder.path().join("demos")).expect("writable");
+    let ok = |output: Output| {
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        output
+    };
+    ok(run(&["record", "coinrun", "--levels", "easy:0..7", "--out", "demos/a.demo"]));
+    ok(run(&["learn-skills", "--experiment", "tiny.ron", "--out", "skills.safetensors"]));
+    let train = ["train", "--experiment", "tiny.ron", "--skills", "skills.safetensors", "--run", "runs/a"];
+    ok(run(&train));
+    let again = run(&train);
+    assert_eq!(code(&again), 3);
+    assert!(errors(&again).contains("--force"), "{}", errors(&again));
+    ok(run(&["train", "--run", "runs/a", "--resume", "--steps", "1024"]));
+    let rows = lines(&ok(run(&["eval", "--run", "runs/a", "--skills", "skills.safetensors", "--bot", "random", "--json"])));
+    let methods: Vec<_> = rows.iter().filter_map(|row| row["method"].as_str()).collect();
+    assert_eq!(methods, ["score-ppo", "bc", "random"]);
+    assert!(rows.iter().all(|row| row["split"] == "hard:64..65" && row["episodes"] == 2));
+
+    let quick = ok(run(&["quickstart", "--experiment", "tiny.ron", "--run", "runs/quick", "--json"]));
+    let methods: Vec<_> = lines(&quick).iter().filter_map(|row| row["method"].as_str().map(str::to_owned)).collect();
+    assert_eq!(methods, ["score-ppo", "ppo", "bc", "right-jump", "random"]);
+    let report = std::fs::read_to_string(folder.path().join("runs/quick/report.html")).expect("written");
+    assert!(report.contains("score-ppo") && report.contains("<svg"));
+
+    std::fs::write(folder.path().join("not.safetensors"), b"nothing of the kind").expect("writable");
+    let foreign = run(&["eval", "--skills", "not.safetensors"]);
+    assert_eq!(code(&foreign), 3, "{}", errors(&foreign));
+}

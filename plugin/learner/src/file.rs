@@ -1,0 +1,236 @@
+//! Self-describing safetensors files: tensors by name, and a JSON description in the header.
+
+use crate::nn::{ParamVisitor, Parameters, host};
+use crate::{FileError, LearnError};
+use burn::tensor::{Device, Tensor, TensorData};
+use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+use serde::{Serialize, de::DeserializeOwned};
+use std::collections::{BTreeMap, HashMap};
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The header entry that holds the description.
+const DESCRIPTION: &str = "playbot";
+
+/// A tensor in host memory.
+#[derive(Clone, Debug)]
+struct Stored {
+    shape: Vec<usize>,
+    dtype: Dtype,
+    bytes: Vec<u8>,
+}
+
+/// The contents of one file, to be written or just read.
+#[derive(Clone, Debug)]
+pub(crate) struct TensorFile {
+    path: PathBuf,
+    description: String,
+    tensors: BTreeMap<String, Stored>,
+}
+
+impl TensorFile {
+    /// An empty file for `path` with `description` in its header.
+    pub(crate) fn new(path: &Path, description: &impl Serialize) -> Result<Self, FileError> {
+        let description = serde_json::to_string(description)
+            .map_err(|e| FileError::Format { path: path.to_owned(), detail: e.to_string() })?;
+        Ok(Self { path: path.to_owned(), description, tensors: BTreeMap::new() })
+    }
+
+    /// Adds single-precision numbers.
+    pub(crate) fn put(&mut self, name: &str, shape: &[usize], values: &[f32]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.tensors.insert(name.to_owned(), Stored { shape: shape.to_vec(), dtype: Dtype::F32, bytes });
+    }
+
+    /// Adds a vector of double-precision numbers.
+    pub(crate) fn put_f64(&mut self, name: &str, values: &[f64]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        let shape = vec![values.len()];
+        self.tensors.insert(name.to_owned(), Stored { shape, dtype: Dtype::F64, bytes });
+    }
+
+    /// Adds all parameters of `network`.
+    pub(crate) fn put_network<M: Parameters + Clone>(
+        &mut self,
+        prefix: &str,
+        network: &M,
+    ) -> Result<(), FileError> {
+        let mut writer = Put { file: self, error: None };
+        network.clone().visit(prefix, &mut writer);
+        let error = writer.error;
+        error.map_or(Ok(()), |source| Err(FileError::Learner { path: self.path.clone(), source }))
+    }
+
+    /// Writes everything under a temporary name, flushes it to the disk and renames it into place.
+    pub(crate) fn write(&self) -> Result<(), FileError> {
+        let views: Result<Vec<_>, _> = self
+            .tensors
+            .iter()
+            .map(|(name, t)| {
+                TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|view| (name, view))
+            })
+            .collect();
+        let header = HashMap::from([(DESCRIPTION.to_owned(), self.description.clone())]);
+        let bytes = views
+            .and_then(|views| safetensors::serialize(views, Some(header)))
+            .map_err(|e| self.format(e.to_string()))?;
+        write_atomically(&self.path, &bytes)
+            .map_err(|source| FileError::Io { path: self.path.clone(), source })
+    }
+
+    /// Reads a whole file.
+    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
+        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
+        let bytes = fs::read(path).map_err(|source| FileError::Io { path: path.to_owned(), source })?;
+        let (_, metadata) =
+            SafeTensors::read_metadata(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let description = metadata
+            .metadata()
+            .as_ref()
+            .and_then(|map| map.get(DESCRIPTION).cloned())
+            .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry")))?;
+        let views = SafeTensors::deserialize(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let tensors = views
+            .iter()
+            .map(|(name, view)| {
+                let stored = Stored {
+                    shape: view.shape().to_vec(),
+                    dtype: view.dtype(),
+                    bytes: view.data().to_vec(),
+                };
+                (name.to_owned(), stored)
+            })
+            .collect();
+        Ok(Self { path: path.to_owned(), description, tensors })
+    }
+
+    /// The description.
+    pub(crate) fn description<T: DeserializeOwned>(&self) -> Result<T, FileError> {
+        serde_json::from_str(&self.description)
+            .map_err(|e| self.format(format!("description in the header: {e}")))
+    }
+
+    /// Takes out a single-precision tensor of the given shape.
+    pub(crate) fn take(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f32>, FileError> {
+        let bytes = self.take_bytes(name, Some(shape), Dtype::F32)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out a double-precision vector, of length `len` if given.
+    pub(crate) fn take_f64(&mut self, name: &str, len: Option<usize>) -> Result<Vec<f64>, FileError> {
+        let shape = len.map(|len| vec![len]);
+        let bytes = self.take_bytes(name, shape.as_deref(), Dtype::F64)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out all parameters of `network`, which gives their shapes, and puts them on `device`.
+    pub(crate) fn take_network<M: Parameters>(
+        &mut self,
+        prefix: &str,
+        network: &mut M,
+        device: &Device,
+    ) -> Result<(), FileError> {
+        let mut reader = Take { file: self, device, error: None };
+        network.visit(prefix, &mut reader);
+        reader.error.map_or(Ok(()), Err)
+    }
+
+    /// Fails if any tensor was not taken out.
+    pub(crate) fn finish(self) -> Result<(), FileError> {
+        match self.tensors.into_keys().next() {
+            None => Ok(()),
+            Some(name) => Err(FileError::ExtraTensor { path: self.path, name }),
+        }
+    }
+
+    /// An error about this file's contents.
+    pub(crate) fn format(&self, detail: String) -> FileError {
+        FileError::Format { path: self.path.clone(), detail }
+    }
+
+    /// An error of what the contents describe.
+    pub(crate) fn learner(&self, source: LearnError) -> FileError {
+        FileError::Learner { path: self.path.clone(), source }
+    }
+
+    fn take_bytes(
+        &mut self,
+        name: &str,
+        shape: Option<&[usize]>,
+        dtype: Dtype,
+    ) -> Result<Vec<u8>, FileError> {
+        let Some(stored) = self.tensors.remove(name) else {
+            return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
+        };
+        if let Some(shape) = shape.filter(|shape| *shape != stored.shape) {
+            return Err(FileError::WrongShape {
+                path: self.path.clone(),
+                name: name.to_owned(),
+                expected: shape.to_vec(),
+                found: stored.shape,
+            });
+        }
+        if stored.dtype != dtype {
+            let detail = format!("tensor `{name}` is {:?}, expected {dtype:?}", stored.dtype);
+            return Err(self.format(detail));
+        }
+        Ok(stored.bytes)
+    }
+}
+
+/// Puts `bytes` at `path` so that a reader sees the old contents or the new, never a part.
+fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".tmp{}", std::process::id()));
+    let temporary = path.with_file_name(name);
+    let written = (|| {
+        let mut file = File::create(&temporary)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&temporary, path)
+    })();
+    if written.is_err() {
+        // The first error is the one to report.
+        let _ = fs::remove_file(&temporary);
+        return written;
+    }
+    // Makes the new name durable where directories can be opened; elsewhere the rename is all there is.
+    if let Some(Ok(folder)) = path.parent().map(File::open) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+struct Put<'a> {
+    file: &'a mut TensorFile,
+    error: Option<LearnError>,
+}
+
+impl ParamVisitor for Put<'_> {
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
+        match host(tensor.clone().inner()) {
+            Ok(values) => self.file.put(name, &tensor.dims(), &values),
+            Err(error) => self.error = self.error.take().or(Some(error)),
+        }
+    }
+}
+
+struct Take<'a> {
+    file: &'a mut TensorFile,
+    device: &'a Device,
+    error: Option<FileError>,
+}
+
+impl ParamVisitor for Take<'_> {
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
+        if self.error.is_some() {
+            return;
+        }
+        let shape = tensor.dims();
+        match self.file.take(name, &shape) {
+            Ok(values) => *tensor = Tensor::from_data(TensorData::new(values, shape), self.device),
+            Err(error) => self.error = Some(error),
+        }
+    }
+}

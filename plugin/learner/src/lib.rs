@@ -1,0 +1,54 @@
+//! Learning from demonstrations and from reward, over burn; knows nothing of any game engine.
+//!
+//! # Concepts
+//!
+//! - A [`SkillModel`] is learned from [`DemoEpisode`]s by a [`SkillTrainer`]: an encoder that names what a player did
+//!   for some steps by a latent skill z, a decoder π(a | s, z) that can do it again, and a [`Prior`] p(z | s) that says
+//!   which skills fit a state.
+//! - A [`Policy`] is a frozen snapshot that plays: [`Policy::forward`] gives action distributions and values for a
+//!   batch of observations. The decoder under the prior is one ([`SkillModel::policy`]): behaviour cloning.
+//! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO: the policy sees
+//!   the skill z, starts as a copy of the decoder, and pays for leaving it where the decoder is sure ([`ScoreConfig`]).
+//!
+//! Rows are flat `f32` slices in host memory, row-major. All randomness comes from generators that the caller owns or
+//! from the named [`rng::Streams`] of one seed: the same seed gives the same numbers, whatever the number of threads.
+//!
+//! # Example
+//!
+//! ```
+//! use playbot_learner::rng::Streams;
+//! use playbot_learner::{ActionSpace, DeviceKind, PolicySpec, PpoConfig, PpoLearner};
+//!
+//! let spec = PolicySpec { obs_dim: 2, latent: 0, action_space: ActionSpace::Discrete(3) };
+//! let learner = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?;
+//! let policy = learner.policy();
+//! let output = policy.forward(&[], &[0.1, 0.2, 0.3, 0.4], 2)?;
+//! let mut rng = Streams::new(1).stream("actions", 0);
+//! let (action, log_prob) = output.sample(0, &mut rng);
+//! assert!(log_prob <= 0.0, "{action:?} has a probability");
+//! # Ok::<(), playbot_learner::LearnError>(())
+//! ```
+
+mod device;
+mod error;
+mod file;
+pub mod nn;
+pub mod norm;
+pub mod policy;
+pub mod ppo;
+pub mod rng;
+pub mod score;
+pub mod skill;
+mod space;
+
+pub use device::{DeviceKind, UnknownDevice};
+pub use error::{FileError, LearnError};
+pub use policy::{Policy, PolicyOutput, StdKind};
+pub use ppo::{PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
+pub use rng::{RngState, Streams};
+pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
+pub use skill::{
+    Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+    SkillProgress, SkillTrainer,
+};
+pub use space::{Action, ActionSpace, Actions};

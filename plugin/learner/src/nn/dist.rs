@@ -1,0 +1,173 @@
+//! Distributions over actions (and over latents), as pure functions of tensors.
+
+use super::tensors::{host, matrix};
+use crate::{Actions, LearnError};
+use burn::tensor::{Device, Int, Tensor, TensorData, activation::log_softmax};
+
+/// ln(2π)/2.
+const HALF_LN_TAU: f32 = 0.918_938_5;
+
+/// A batch of distributions, one per row.
+#[derive(Clone, Debug)]
+pub enum Dist {
+    /// Choices with these normalised log-probabilities, `[n, choices]`.
+    Categorical {
+        /// Log-softmax of the logits.
+        log_probs: Tensor<2>,
+    },
+    /// Independent normal distributions.
+    Gaussian {
+        /// `[n, dim]`.
+        mean: Tensor<2>,
+        /// Logarithm of the standard deviation, `[n, dim]`, or `[1, dim]` for all rows alike.
+        log_std: Tensor<2>,
+    },
+}
+
+/// A batch of actions on a device, one per row.
+#[derive(Clone, Debug)]
+pub enum ActionRows {
+    /// Indices, `[n, 1]`.
+    Discrete(Tensor<2, Int>),
+    /// Vectors, `[n, dim]`.
+    Continuous(Tensor<2>),
+}
+
+impl ActionRows {
+    /// Moves `actions` to `device`.
+    pub fn new(actions: &Actions, device: &Device) -> Self {
+        let n = actions.len();
+        match actions {
+            Actions::Discrete(values) => {
+                let values: Vec<i64> = values.iter().map(|&a| i64::from(a)).collect();
+                Self::Discrete(Tensor::from_data(TensorData::new(values, [n, 1]), device))
+            }
+            Actions::Continuous { dim, values } => {
+                Self::Continuous(matrix(values.clone(), n, *dim, device))
+            }
+        }
+    }
+}
+
+impl Dist {
+    /// The categorical distributions of `logits` `[n, choices]`.
+    pub fn categorical(logits: Tensor<2>) -> Self {
+        Self::Categorical { log_probs: log_softmax(logits, 1) }
+    }
+
+    /// Log-probability (or log-density, summed over dimensions) of one action per row, `[n]`.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if the actions are of the other kind.
+    pub fn log_prob(&self, actions: &ActionRows) -> Result<Tensor<1>, LearnError> {
+        match (self, actions) {
+            (Self::Categorical { log_probs }, ActionRows::Discrete(index)) => {
+                Ok(log_probs.clone().gather(1, index.clone()).squeeze_dim(1))
+            }
+            (Self::Gaussian { mean, log_std }, ActionRows::Continuous(action)) => {
+                let score = (action.clone() - mean.clone()) * log_std.clone().neg().exp();
+                let terms = score.square() * 0.5 + log_std.clone() + HALF_LN_TAU;
+                Ok(terms.sum_dim(1).squeeze_dim(1).neg())
+            }
+            _ => Err(LearnError::Action("distribution and actions differ in kind".to_owned())),
+        }
+    }
+
+    /// Entropy in nats, `[n]` (or `[1]` if it is the same for all rows), summed over dimensions.
+    pub fn entropy(&self) -> Tensor<1> {
+        match self {
+            Self::Categorical { log_probs } => {
+                let terms = log_probs.clone().exp() * log_probs.clone();
+                terms.sum_dim(1).squeeze_dim(1).neg()
+            }
+            Self::Gaussian { log_std, .. } => {
+                (log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1)
+            }
+        }
+    }
+
+    /// KL(self ‖ other) in nats per row, `[n]`, summed over dimensions. Exactly 0 for equal parameters.
+    ///
+    /// Categorical: Σ p (ln p - ln q). Gaussian, per dimension:
+    /// ln σ_q - ln σ_p + (σ_p² / σ_q² + (μ_p - μ_q)² / σ_q² - 1) / 2.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if the two are of different kinds.
+    pub fn kl(&self, other: &Self) -> Result<Tensor<1>, LearnError> {
+        match (self, other) {
+            (Self::Categorical { log_probs: p }, Self::Categorical { log_probs: q }) => {
+                let terms = p.clone().exp() * (p.clone() - q.clone());
+                Ok(terms.sum_dim(1).squeeze_dim(1))
+            }
+            (
+                Self::Gaussian { mean: mp, log_std: lp },
+                Self::Gaussian { mean: mq, log_std: lq },
+            ) => {
+                let ratio = ((lp.clone() - lq.clone()) * 2.0).exp();
+                let distance = ((mp.clone() - mq.clone()) * lq.clone().neg().exp()).square();
+                let terms = (ratio + distance - 1.0) * 0.5 + (lq.clone() - lp.clone());
+                Ok(terms.sum_dim(1).squeeze_dim(1))
+            }
+            _ => Err(LearnError::Action("the distributions differ in kind".to_owned())),
+        }
+    }
+
+    /// The same numbers outside of any gradient graph.
+    pub fn detach(self) -> Self {
+        match self {
+            Self::Categorical { log_probs } => Self::Categorical { log_probs: log_probs.inner() },
+            Self::Gaussian { mean, log_std } => {
+                Self::Gaussian { mean: mean.inner(), log_std: log_std.inner() }
+            }
+        }
+    }
+
+    /// Reads the distributions of all rows to the host.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if a tensor cannot be read.
+    pub fn to_host(self) -> Result<HostDist, LearnError> {
+        match self {
+            Self::Categorical { log_probs } => {
+                let [_, dim] = log_probs.dims();
+                Ok(HostDist { dim, head: host(log_probs.inner())?, log_std: None })
+            }
+            Self::Gaussian { mean, log_std } => {
+                let [n, dim] = mean.dims();
+                let mut stds = host(log_std.inner())?;
+                if stds.len() == dim {
+                    stds = stds.repeat(n);
+                }
+                Ok(HostDist { dim, head: host(mean.inner())?, log_std: Some(stds) })
+            }
+        }
+    }
+}
+
+/// A batch of distributions in host memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HostDist {
+    /// Choices, or dimensions.
+    pub dim: usize,
+    /// Log-probabilities or means, `n * dim`.
+    pub head: Vec<f32>,
+    /// Logarithms of the standard deviations, `n * dim`; `None` if categorical.
+    pub log_std: Option<Vec<f32>>,
+}
+
+impl HostDist {
+    /// The distributions of `rows` as constants on `device`.
+    pub fn rows(&self, rows: &[usize], device: &Device) -> Dist {
+        let gather = |values: &[f32]| {
+            let mut out = Vec::with_capacity(rows.len() * self.dim);
+            for &r in rows {
+                out.extend_from_slice(&values[r * self.dim..(r + 1) * self.dim]);
+            }
+            matrix(out, rows.len(), self.dim, device)
+        };
+        match &self.log_std {
+            None => Dist::Categorical { log_probs: gather(&self.head) },
+            Some(stds) => Dist::Gaussian { mean: gather(&self.head), log_std: gather(stds) },
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Starting weights.
+
+use crate::rng::{normal, unit};
+use rand::Rng;
+
+/// A `[inputs, outputs]` matrix, row-major, with orthonormal rows or columns (whichever are fewer) times `gain`.
+///
+/// Saxe et al. 2013, "Exact solutions to the nonlinear dynamics of learning in deep linear neural networks".
+/// Made by Gram and Schmidt's process (applied twice for accuracy) on normal numbers in double precision.
+pub fn orthogonal<R: Rng + ?Sized>(inputs: usize, outputs: usize, gain: f64, rng: &mut R) -> Vec<f32> {
+    let (count, length) = (inputs.min(outputs), inputs.max(outputs));
+    let mut basis: Vec<Vec<f64>> = Vec::with_capacity(count);
+    while basis.len() < count {
+        let mut v: Vec<f64> = (0..length).map(|_| f64::from(normal(rng))).collect();
+        for _ in 0..2 {
+            for b in &basis {
+                let along = dot(&v, b);
+                v.iter_mut().zip(b).for_each(|(x, y)| *x -= along * y);
+            }
+        }
+        let norm = dot(&v, &v).sqrt();
+        if norm > 1e-6 {
+            v.iter_mut().for_each(|x| *x /= norm);
+            basis.push(v);
+        }
+    }
+    let mut out = vec![0.0; inputs * outputs];
+    for (k, b) in basis.iter().enumerate() {
+        for (j, x) in b.iter().enumerate() {
+            let at = if inputs <= outputs { k * outputs + j } else { j * outputs + k };
+            out[at] = (x * gain) as f32;
+        }
+    }
+    out
+}
+
+/// `len` numbers uniform in [-bound, bound).
+pub(crate) fn uniform<R: Rng + ?Sized>(len: usize, bound: f64, rng: &mut R) -> Vec<f32> {
+    (0..len).map(|_| ((2.0 * unit(rng) - 1.0) * bound) as f32).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Streams;
+
+    #[test]
+    fn columns_are_orthonormal_times_gain() {
+        for (inputs, outputs) in [(7, 4), (4, 7), (5, 5)] {
+            let w = orthogonal(inputs, outputs, 2.0, &mut Streams::new(1).stream("w", 0));
+            let few = inputs.min(outputs);
+            let vector = |k: usize| -> Vec<f64> {
+                if inputs <= outputs {
+                    (0..outputs).map(|j| f64::from(w[k * outputs + j])).collect()
+                } else {
+                    (0..inputs).map(|i| f64::from(w[i * outputs + k])).collect()
+                }
+            };
+            for a in 0..few {
+                for b in 0..few {
+                    let want = if a == b { 4.0 } else { 0.0 };
+                    assert!((dot(&vector(a), &vector(b)) - want).abs() < 1e-5);
+                }
+            }
+        }
+    }
+}

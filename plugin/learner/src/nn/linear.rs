@@ -1,0 +1,62 @@
+//! A linear layer.
+
+use super::params::{ParamVisitor, Parameters, path};
+use super::{init::orthogonal, matrix, vector};
+use burn::tensor::{Device, Tensor, module::linear};
+use rand::Rng;
+
+/// y = x W + b.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    /// W, `[inputs, outputs]`.
+    pub weight: Tensor<2>,
+    /// b, `[outputs]`.
+    pub bias: Tensor<1>,
+}
+
+impl Linear {
+    /// Orthogonal weights times `gain`, zero bias.
+    pub fn new<R: Rng + ?Sized>(
+        inputs: usize,
+        outputs: usize,
+        gain: f64,
+        rng: &mut R,
+        device: &Device,
+    ) -> Self {
+        Self {
+            weight: matrix(orthogonal(inputs, outputs, gain, rng), inputs, outputs, device),
+            bias: vector(vec![0.0; outputs], device),
+        }
+    }
+
+    /// `[.., inputs]` to `[.., outputs]`.
+    pub fn forward<const D: usize>(&self, x: Tensor<D>) -> Tensor<D> {
+        linear(x, self.weight.clone(), Some(self.bias.clone()))
+    }
+
+    /// The layer applied to `[held, x]` without joining the two: `held` is `[B, H]`, `x` is `[steps * B, inputs - H]`,
+    /// and row `b` of `held` goes with the rows `t * B + b` of `x`.
+    ///
+    /// Gives `[steps * B, outputs]`. No gradient is computed for a constant `x`, which saves the largest product
+    /// of the backward pass.
+    pub fn forward_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
+        let [batch, width] = held.dims();
+        let [inputs, outputs] = self.weight.dims();
+        let weight = self.weight.clone().slice([width..inputs, 0..outputs]);
+        let rest = linear(x, weight, Some(self.bias.clone()));
+        if width == 0 {
+            return rest;
+        }
+        let held = held
+            .matmul(self.weight.clone().slice([0..width, 0..outputs]))
+            .reshape([1, batch, outputs]);
+        (rest.reshape([steps, batch, outputs]) + held).reshape([steps * batch, outputs])
+    }
+}
+
+impl Parameters for Linear {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        visitor.visit(&path(prefix, "weight"), &mut self.weight);
+        visitor.visit(&path(prefix, "bias"), &mut self.bias);
+    }
+}

@@ -1,0 +1,72 @@
+//! A multi-layer perceptron.
+
+use super::params::{ParamVisitor, Parameters, path};
+use super::{Activation, Linear};
+use burn::tensor::{Device, Tensor};
+use rand::Rng;
+
+/// Hidden layers `l0`, `l1`, ... with an activation after each, then a linear `head`.
+#[derive(Clone, Debug)]
+pub struct Mlp {
+    /// The hidden layers.
+    pub layers: Vec<Linear>,
+    /// The output layer.
+    pub head: Linear,
+    /// The function after each hidden layer.
+    pub activation: Activation,
+}
+
+impl Mlp {
+    /// Orthogonal weights: gain √2 in the hidden layers, `head_gain` in the head; biases 0.
+    pub fn new<R: Rng + ?Sized>(
+        inputs: usize,
+        hidden: &[usize],
+        outputs: usize,
+        activation: Activation,
+        head_gain: f64,
+        rng: &mut R,
+        device: &Device,
+    ) -> Self {
+        let mut width = inputs;
+        let mut layers = Vec::with_capacity(hidden.len());
+        for &next in hidden {
+            layers.push(Linear::new(width, next, std::f64::consts::SQRT_2, rng, device));
+            width = next;
+        }
+        Self { layers, head: Linear::new(width, outputs, head_gain, rng, device), activation }
+    }
+
+    /// Input width.
+    pub fn inputs(&self) -> usize {
+        self.layers.first().unwrap_or(&self.head).weight.dims()[0]
+    }
+
+    /// The last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
+    pub fn features(&self, x: Tensor<2>) -> Tensor<2> {
+        self.layers.iter().fold(x, |x, layer| self.activation.forward(layer.forward(x)))
+    }
+
+    /// [`Self::features`] of `[held, x]` joined, where row `b` of `held` `[B, H]` goes with the rows `t * B + b` of
+    /// `x` `[steps * B, inputs - H]`.
+    pub fn features_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
+        let Some((first, rest)) = self.layers.split_first() else {
+            return Tensor::cat(vec![held.repeat_dim(0, steps), x], 1);
+        };
+        let first = self.activation.forward(first.forward_held(held, x, steps));
+        rest.iter().fold(first, |x, layer| self.activation.forward(layer.forward(x)))
+    }
+
+    /// `[n, inputs]` to `[n, outputs]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        self.head.forward(self.features(x))
+    }
+}
+
+impl Parameters for Mlp {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        for (i, layer) in self.layers.iter_mut().enumerate() {
+            layer.visit(&path(prefix, &format!("l{i}")), visitor);
+        }
+        self.head.visit(&path(prefix, "head"), visitor);
+    }
+}

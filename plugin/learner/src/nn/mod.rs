@@ -1,0 +1,30 @@
+//! The building blocks of the networks: layers with named parameters, distributions, and the optimizer.
+//!
+//! Every network is a plain struct of tensors that implements [`Parameters`]. The names that it gives its tensors are
+//! those of the files (`actor.l0.weight`), of the optimizer's moments and of error messages. Weights start from
+//! generators that the caller owns; nothing here touches burn's global generator.
+
+mod activation;
+mod adam;
+mod dist;
+mod grads;
+mod gru;
+mod init;
+mod linear;
+mod mlp;
+mod params;
+mod sample;
+mod tensors;
+
+pub use activation::Activation;
+pub use adam::{Adam, AdamConfig};
+pub use dist::{ActionRows, Dist, HostDist};
+pub use grads::NamedGrads;
+pub use gru::{Gru, GruLayer};
+pub use init::orthogonal;
+pub use linear::Linear;
+pub use mlp::Mlp;
+pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
+pub use sample::{argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
+pub(crate) use params::path;
+pub(crate) use tensors::{host, matrix, scalar, vector};

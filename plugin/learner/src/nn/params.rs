@@ -1,0 +1,65 @@
+//! Named parameters: one way to walk over the tensors of a network.
+
+use burn::tensor::Tensor;
+
+/// Does something with each parameter of a network in turn.
+pub trait ParamVisitor {
+    /// Called once per parameter, always in the same order. `name` is unique in the network.
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>);
+}
+
+/// A network (or a part of one) that can name its parameters.
+pub trait Parameters {
+    /// Shows every parameter to `visitor`; `prefix` (may be empty) goes before each name.
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V);
+}
+
+/// `prefix.name`, or `name` without a prefix.
+pub(crate) fn path(prefix: &str, name: &str) -> String {
+    if prefix.is_empty() { name.to_owned() } else { format!("{prefix}.{name}") }
+}
+
+struct Track;
+
+impl ParamVisitor for Track {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        *tensor = tensor.clone().inner().autodiff().require_grad();
+    }
+}
+
+struct Freeze;
+
+impl ParamVisitor for Freeze {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        *tensor = tensor.clone().inner();
+    }
+}
+
+/// A copy of `network` whose parameters receive gradients. The numbers are shared, not copied.
+pub fn tracked<M: Parameters + Clone>(network: &M) -> M {
+    let mut copy = network.clone();
+    copy.visit("", &mut Track);
+    copy
+}
+
+/// A copy of `network` for inference, outside of any gradient graph. The numbers are shared, not copied.
+pub fn frozen<M: Parameters + Clone>(network: &M) -> M {
+    let mut copy = network.clone();
+    copy.visit("", &mut Freeze);
+    copy
+}
+
+struct Count(usize);
+
+impl ParamVisitor for Count {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        self.0 += tensor.dims().iter().product::<usize>();
+    }
+}
+
+/// How many numbers the parameters of `network` hold.
+pub fn parameter_count<M: Parameters + Clone>(network: &M) -> usize {
+    let mut count = Count(0);
+    network.clone().visit("", &mut count);
+    count.0
+}

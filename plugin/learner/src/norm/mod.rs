@@ -1,0 +1,9 @@
+//! Running normalisation of observations and rewards.
+
+mod obs;
+mod reward;
+mod running;
+
+pub use obs::{ObsNormalizer, ObsStats};
+pub use reward::RewardNormalizer;
+pub use running::RunningStats;

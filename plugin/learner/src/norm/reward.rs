@@ -1,0 +1,62 @@
+//! Scaling of rewards by the spread of the discounted return.
+
+use super::RunningStats;
+use crate::LearnError;
+
+/// Added to the variance.
+const EPS: f64 = 1e-8;
+/// Scaled rewards are clipped to ± this.
+const CLIP: f64 = 10.0;
+
+/// Divides rewards by the running standard deviation of the discounted return. No mean is subtracted.
+///
+/// Per step: G = γ G + r for every environment, the running variance takes in all G as one batch, the reward becomes
+/// clip(r/√(var + 1e-8), ±10), and G of the environments whose episode ended is set to 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RewardNormalizer {
+    /// γ.
+    pub gamma: f64,
+    /// The running variance, one dimension.
+    pub stats: RunningStats,
+    /// The discounted return of each environment; empty before the first batch.
+    pub returns: Vec<f64>,
+}
+
+impl RewardNormalizer {
+    /// Nothing seen yet.
+    pub fn new(gamma: f64) -> Self {
+        Self { gamma, stats: RunningStats::new(1), returns: Vec::new() }
+    }
+
+    /// Takes in and scales rewards `[T, envs]`, row-major; `done` marks the steps that ended an episode in any way.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] if `envs` is not what it was in earlier calls, or the lengths differ.
+    pub fn normalize(
+        &mut self,
+        rewards: &[f32],
+        done: &[bool],
+        envs: usize,
+    ) -> Result<Vec<f32>, LearnError> {
+        if self.returns.is_empty() {
+            self.returns = vec![0.0; envs];
+        }
+        LearnError::check("environments of the reward normaliser", self.returns.len(), envs)?;
+        LearnError::check("episode ends", rewards.len(), done.len())?;
+        let mut out = Vec::with_capacity(rewards.len());
+        for (rewards, done) in rewards.chunks_exact(envs).zip(done.chunks_exact(envs)) {
+            for (g, &r) in self.returns.iter_mut().zip(rewards) {
+                *g = self.gamma * *g + f64::from(r);
+            }
+            self.stats.update(self.returns.iter().copied(), envs);
+            let scale = 1.0 / (self.stats.var[0] + EPS).sqrt();
+            out.extend(rewards.iter().map(|&r| (f64::from(r) * scale).clamp(-CLIP, CLIP) as f32));
+            for (g, &done) in self.returns.iter_mut().zip(done) {
+                if done {
+                    *g = 0.0;
+                }
+            }
+        }
+        Ok(out)
+    }
+}

@@ -1,0 +1,116 @@
+//! The network that gives a distribution over actions.
+
+use crate::ActionSpace;
+use crate::nn::{Activation, Dist, Linear, Mlp, ParamVisitor, Parameters, path, vector};
+use burn::tensor::{Device, Tensor};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// Bounds of a state-dependent log-std.
+const LOG_STD_RANGE: (f32, f32) = (-10.0, 2.0);
+
+/// How a Gaussian's standard deviation is made.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StdKind {
+    /// One learned vector for all states (the SCORE paper's released form).
+    Vector,
+    /// A second head, clamped to ln σ in [-10, 2] (OPAL's form).
+    State,
+}
+
+/// The part of a Gaussian actor that gives ln σ.
+#[derive(Clone, Debug)]
+pub enum LogStd {
+    /// Discrete actions have none.
+    None,
+    /// The same for all states, `[dim]`.
+    Vector(Tensor<1>),
+    /// From the last hidden layer.
+    State(Linear),
+}
+
+/// Sizes of an actor or critic.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
+pub struct NetShape {
+    /// Width of the observation.
+    pub obs_dim: usize,
+    /// Width of the skill z that goes before the observation; 0 for none.
+    pub latent: usize,
+    /// Width of each hidden layer.
+    pub hidden: Vec<usize>,
+    /// The function after each hidden layer.
+    pub activation: Activation,
+}
+
+/// π(a | s, z): input `[z, s]`, hidden layers, and a head of logits or means.
+///
+/// The skill decoder and the policy are this same type, so that a policy can start as an exact copy of the decoder.
+/// The prior over skills is one too: its action is the latent.
+#[derive(Clone, Debug)]
+pub struct Actor {
+    /// Hidden layers and the head.
+    pub net: Mlp,
+    /// ln σ, for continuous actions.
+    pub log_std: LogStd,
+}
+
+impl Actor {
+    /// Orthogonal weights (gain √2 in the hidden layers, 0.01 in the head), ln σ = 0.
+    pub fn new<R: Rng + ?Sized>(
+        shape: &NetShape,
+        space: ActionSpace,
+        std: StdKind,
+        rng: &mut R,
+        device: &Device,
+    ) -> Self {
+        let inputs = shape.latent + shape.obs_dim;
+        let net = Mlp::new(inputs, &shape.hidden, space.dim(), shape.activation, 0.01, rng, device);
+        let log_std = match (space, std) {
+            (ActionSpace::Discrete(_), _) => LogStd::None,
+            (ActionSpace::Continuous(n), StdKind::Vector) => {
+                LogStd::Vector(vector(vec![0.0; n], device))
+            }
+            (ActionSpace::Continuous(n), StdKind::State) => {
+                let width = shape.hidden.last().copied().unwrap_or(inputs);
+                LogStd::State(Linear::new(width, n, 0.01, rng, device))
+            }
+        };
+        Self { net, log_std }
+    }
+
+    /// The distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`.
+    pub fn forward(&self, x: Tensor<2>) -> Dist {
+        self.head(self.net.features(x))
+    }
+
+    /// The distributions for skills `z` `[B, latent]` that are each held for `steps` observations: row `t * B + b` of
+    /// `states` `[steps * B, obs_dim]` goes with row `b` of `z`.
+    pub fn forward_held(&self, z: Tensor<2>, states: Tensor<2>, steps: usize) -> Dist {
+        self.head(self.net.features_held(z, states, steps))
+    }
+
+    fn head(&self, features: Tensor<2>) -> Dist {
+        let head = self.net.head.forward(features.clone());
+        match &self.log_std {
+            LogStd::None => Dist::categorical(head),
+            LogStd::Vector(log_std) => {
+                Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze() }
+            }
+            LogStd::State(layer) => {
+                let (low, high) = LOG_STD_RANGE;
+                Dist::Gaussian { mean: head, log_std: layer.forward(features).clamp(low, high) }
+            }
+        }
+    }
+}
+
+impl Parameters for Actor {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        self.net.visit(prefix, visitor);
+        match &mut self.log_std {
+            LogStd::None => {}
+            LogStd::Vector(tensor) => visitor.visit(&path(prefix, "log_std"), tensor),
+            LogStd::State(layer) => layer.visit(&path(prefix, "log_std"), visitor),
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! The network that estimates the return.
+
+use super::NetShape;
+use crate::nn::{Mlp, ParamVisitor, Parameters};
+use burn::tensor::{Device, Tensor};
+use rand::Rng;
+
+/// V(s, z): the actor's input and hidden layers, one output.
+#[derive(Clone, Debug)]
+pub struct Critic {
+    /// Hidden layers and the head.
+    pub net: Mlp,
+}
+
+impl Critic {
+    /// Orthogonal weights, gain √2 in the hidden layers and 1 in the head.
+    pub fn new<R: Rng + ?Sized>(shape: &NetShape, rng: &mut R, device: &Device) -> Self {
+        let inputs = shape.latent + shape.obs_dim;
+        Self { net: Mlp::new(inputs, &shape.hidden, 1, shape.activation, 1.0, rng, device) }
+    }
+
+    /// Values of joined inputs `[z, s]`: `[n, latent + obs_dim]` to `[n]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<1> {
+        self.net.forward(x).squeeze_dim(1)
+    }
+}
+
+impl Parameters for Critic {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        self.net.visit(prefix, visitor);
+    }
+}

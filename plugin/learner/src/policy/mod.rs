@@ -1,0 +1,13 @@
+//! Networks that act and networks that judge, and the snapshot of both that plays.
+
+mod actor;
+mod critic;
+mod join;
+mod output;
+mod snapshot;
+
+pub use actor::{Actor, LogStd, NetShape, StdKind};
+pub use critic::Critic;
+pub(crate) use join::joined_rows;
+pub use output::PolicyOutput;
+pub use snapshot::Policy;

@@ -1,0 +1,124 @@
+//! A frozen policy that plays.
+
+use super::{Actor, Critic, PolicyOutput, joined_rows};
+use crate::nn::{frozen, host, matrix};
+use crate::norm::ObsStats;
+use crate::{ActionSpace, LearnError};
+use burn::tensor::{Device, Tensor};
+use std::sync::Arc;
+
+/// An inference snapshot of an actor and, if there is one, its critic.
+///
+/// Clones share the weights. A clone per thread needs no locks, and a row's numbers do not depend on which other rows
+/// are in the batch or on the number of threads.
+#[derive(Clone, Debug)]
+pub struct Policy {
+    actor: Actor,
+    critic: Option<Critic>,
+    stats: Option<Arc<ObsStats>>,
+    space: ActionSpace,
+    obs_dim: usize,
+    latent: usize,
+    device: Device,
+}
+
+impl Policy {
+    /// A snapshot of `actor` and `critic`, which must read `latent + obs_dim` numbers.
+    pub(crate) fn new(
+        actor: &Actor,
+        critic: Option<&Critic>,
+        stats: Option<ObsStats>,
+        space: ActionSpace,
+        (obs_dim, latent): (usize, usize),
+        device: Device,
+    ) -> Self {
+        Self {
+            actor: frozen(actor),
+            critic: critic.map(frozen),
+            stats: stats.map(Arc::new),
+            space,
+            obs_dim,
+            latent,
+            device,
+        }
+    }
+
+    /// What it acts in.
+    pub fn action_space(&self) -> ActionSpace {
+        self.space
+    }
+
+    /// Width of the skill it reads; 0 if it ignores skills.
+    pub fn latent(&self) -> usize {
+        self.latent
+    }
+
+    /// Width of the observation it reads.
+    pub fn obs_dim(&self) -> usize {
+        self.obs_dim
+    }
+
+    /// Distributions and values for `n` observations.
+    ///
+    /// `z` is `n * latent` (ignored if [`Self::latent`] is 0), `obs` is `n * obs_dim`.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::NotFinite`] if an output is NaN or infinite.
+    pub fn forward(&self, z: &[f32], obs: &[f32], n: usize) -> Result<PolicyOutput, LearnError> {
+        if n == 0 {
+            let (head, log_std, values) = Default::default();
+            return Ok(PolicyOutput { space: self.space, head, log_std, values });
+        }
+        let x = self.inputs(z, obs, n)?;
+        let dist = self.actor.forward(x.clone()).to_host()?;
+        let dim = self.space.dim();
+        let mut head = dist.head;
+        head.truncate(n * dim);
+        let mut log_std = dist.log_std.unwrap_or_default();
+        log_std.truncate(n * dim);
+        let values = match &self.critic {
+            Some(critic) => {
+                let mut values = host(critic.forward(x))?;
+                values.truncate(n);
+                values
+            }
+            None => vec![0.0; n],
+        };
+        for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
+            // A log-probability may be -infinity without harm.
+            if numbers.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
+                return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: 0 });
+            }
+        }
+        Ok(PolicyOutput { space: self.space, head, log_std, values })
+    }
+
+    /// Only the values of [`Self::forward`]; zeros if there is no critic.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn values(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Vec<f32>, LearnError> {
+        let Some(critic) = self.critic.as_ref().filter(|_| n > 0) else {
+            return Ok(vec![0.0; n]);
+        };
+        let mut values = host(critic.forward(self.inputs(z, obs, n)?))?;
+        values.truncate(n);
+        Ok(values)
+    }
+
+    /// The joined inputs, at least two rows: matrix libraries sum a single row in another order than the rows of a
+    /// matrix, and a lone agent shall act like one of many.
+    fn inputs(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Tensor<2>, LearnError> {
+        LearnError::check("observations", n * self.obs_dim, obs.len())?;
+        if self.latent > 0 {
+            LearnError::check("skills", n * self.latent, z.len())?;
+        }
+        let stats = self.stats.as_deref();
+        let width = self.latent + self.obs_dim;
+        let mut rows = joined_rows(z, self.latent, obs, self.obs_dim, stats, 0..n);
+        if n == 1 {
+            rows.extend_from_within(..);
+        }
+        Ok(matrix(rows, n.max(2), width, &self.device))
+    }
+}

@@ -1,0 +1,147 @@
+//! Settings of PPO.
+
+use crate::nn::Activation;
+use crate::{ActionSpace, LearnError};
+use serde::{Deserialize, Serialize};
+
+/// What a step that ran into the time limit leads to.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TimeLimit {
+    /// The value of the episode's last observation: the game would have gone on.
+    Bootstrap,
+    /// Nothing, as if the episode had ended by itself (the released code).
+    Legacy,
+}
+
+/// What a policy reads and does.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+#[serde(deny_unknown_fields)]
+pub struct PolicySpec {
+    /// Width of an observation.
+    pub obs_dim: usize,
+    /// Width of the skill before it; 0 for plain PPO.
+    pub latent: usize,
+    /// What it acts in.
+    pub action_space: ActionSpace,
+}
+
+/// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+#[serde(deny_unknown_fields, default)]
+pub struct PpoConfig {
+    /// Learning rate of Adam.
+    pub lr: f64,
+    /// Whether the learning rate falls linearly to 0 over `total_updates`.
+    pub anneal_lr: bool,
+    /// Updates of the whole run; needed only by `anneal_lr`.
+    pub total_updates: Option<u64>,
+    /// Steps per environment in a rollout.
+    pub num_steps: usize,
+    /// Parts into which a rollout is shuffled.
+    pub minibatches: usize,
+    /// Passes over a rollout.
+    pub epochs: usize,
+    /// Discount γ.
+    pub gamma: f64,
+    /// λ of the generalised advantage estimate.
+    pub lambda: f64,
+    /// Bound of the probability ratio's distance from 1, and of the value's change if that is clipped.
+    pub clip: f64,
+    /// Whether the value loss is clipped too.
+    pub clip_value_loss: bool,
+    /// Weight of the value loss.
+    pub vf_coef: f64,
+    /// Weight of the entropy bonus.
+    pub ent_coef: f64,
+    /// Bound of the gradient's Euclidean norm over all parameters.
+    pub max_grad_norm: f64,
+    /// Whether advantages are normalised within each minibatch.
+    pub norm_adv: bool,
+    /// What a step that ran into the time limit leads to.
+    pub time_limit: TimeLimit,
+    /// Whether rewards are divided by the running deviation of the discounted return.
+    pub norm_reward: bool,
+    /// Whether actor and critic see normalised observations. Not together with a copied decoder, which reads raw ones.
+    pub norm_obs: bool,
+    /// Hidden layers of actor and critic. A copied decoder brings its own.
+    pub hidden: Vec<usize>,
+    /// The function after each hidden layer.
+    pub activation: Activation,
+    /// ε of Adam.
+    pub adam_eps: f64,
+}
+
+impl Default for PpoConfig {
+    fn default() -> Self {
+        Self {
+            lr: 5e-4,
+            anneal_lr: false,
+            total_updates: None,
+            num_steps: 256,
+            minibatches: 8,
+            epochs: 3,
+            gamma: 0.999,
+            lambda: 0.95,
+            clip: 0.2,
+            clip_value_loss: true,
+            vf_coef: 0.5,
+            ent_coef: 0.01,
+            max_grad_norm: 0.5,
+            norm_adv: true,
+            time_limit: TimeLimit::Bootstrap,
+            norm_reward: true,
+            norm_obs: false,
+            hidden: vec![200, 200],
+            activation: Activation::Relu,
+            adam_eps: 1e-5,
+        }
+    }
+}
+
+impl PpoConfig {
+    /// `Ok` if these settings can work.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] names the first setting that cannot.
+    pub fn validate(&self) -> Result<(), LearnError> {
+        let bad = |text: String| Err(LearnError::Config(text));
+        let counts = [
+            ("num_steps", self.num_steps),
+            ("minibatches", self.minibatches),
+            ("epochs", self.epochs),
+            ("hidden", self.hidden.iter().copied().min().unwrap_or(1)),
+        ];
+        if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
+            return bad(format!("ppo {name} must be at least 1"));
+        }
+        let positive = [
+            ("lr", self.lr),
+            ("clip", self.clip),
+            ("max_grad_norm", self.max_grad_norm),
+            ("adam_eps", self.adam_eps),
+        ];
+        if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
+            return bad(format!("ppo {name} must be positive, not {x}"));
+        }
+        let shares = [("gamma", self.gamma), ("lambda", self.lambda)];
+        if let Some((name, x)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
+            return bad(format!("ppo {name} must lie in 0..1, not {x}"));
+        }
+        let weights = [("vf_coef", self.vf_coef), ("ent_coef", self.ent_coef)];
+        if let Some((name, x)) = weights.iter().find(|(_, x)| !x.is_finite()) {
+            return bad(format!("ppo {name} must be finite, not {x}"));
+        }
+        if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
+            return bad("ppo anneal_lr needs total_updates".into());
+        }
+        Ok(())
+    }
+
+    /// The learning rate of update number `update`, from 0.
+    pub fn lr_at(&self, update: u64) -> f64 {
+        match self.total_updates.filter(|_| self.anneal_lr) {
+            Some(total) => self.lr * (1.0 - update as f64 / total as f64).max(0.0),
+            None => self.lr,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Generalised advantage estimation.
+
+use super::{Rollout, TimeLimit};
+
+/// Advantages and returns, one per row of the rollout.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Advantages {
+    /// A.
+    pub advantages: Vec<f32>,
+    /// A + V, what the critic should have said.
+    pub returns: Vec<f32>,
+}
+
+/// Schulman et al. 2016, "High-dimensional continuous control using generalized advantage estimation":
+///
+/// δ = r + γ v' - V(s), A = δ + γ λ (1 - done) A'. v' is 0 after a termination; after a truncation it is the value of
+/// the episode's last observation (or 0 by [`TimeLimit::Legacy`]); else it is the next row's value. A step that is both
+/// counts as a termination.
+///
+/// `rewards` take the place of the rollout's own.
+///
+/// # Panics
+/// If the lengths do not fit; see [`Rollout::check`].
+pub fn gae(rollout: &Rollout, rewards: &[f32], gamma: f64, lambda: f64, time_limit: TimeLimit) -> Advantages {
+    let (steps, envs) = (rollout.steps, rollout.envs);
+    let mut advantages = vec![0.0; steps * envs];
+    for b in 0..envs {
+        let mut following = 0.0;
+        let mut next_value = f64::from(rollout.next_values[b]);
+        for t in (0..steps).rev() {
+            let row = t * envs + b;
+            let value = f64::from(rollout.values[row]);
+            let ended = rollout.terminated[row] || rollout.truncated[row];
+            let bootstrap = match (ended, rollout.terminated[row], time_limit) {
+                (false, _, _) => next_value,
+                (true, false, TimeLimit::Bootstrap) => f64::from(rollout.final_values[row]),
+                (true, _, _) => 0.0,
+            };
+            let delta = f64::from(rewards[row]) + gamma * bootstrap - value;
+            following = delta + if ended { 0.0 } else { gamma * lambda * following };
+            advantages[row] = following as f32;
+            next_value = value;
+        }
+    }
+    let returns = advantages.iter().zip(&rollout.values).map(|(a, v)| a + v).collect();
+    Advantages { advantages, returns }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ActionSpace, Actions};
+
+    /// One environment, two steps, γ = ½, λ = ½, V = 2 and 4, r = 1 and 3, next value 8, final value 6.
+    fn advantages(terminated: bool, truncated: bool, limit: TimeLimit) -> Vec<f32> {
+        let rollout = Rollout {
+            steps: 2,
+            obs: vec![0.0; 2],
+            actions: Actions::Discrete(vec![0; 2]),
+            log_probs: vec![0.0; 2],
+            values: vec![2.0, 4.0],
+            rewards: vec![1.0, 3.0],
+            terminated: vec![terminated, false],
+            truncated: vec![truncated, false],
+            final_values: vec![6.0, f32::NAN],
+            next_values: vec![8.0],
+            ..Rollout::new(1, 1, 0, &ActionSpace::Discrete(1))
+        };
+        gae(&rollout, &rollout.rewards, 0.5, 0.5, limit).advantages
+    }
+
+    #[test]
+    fn by_hand() {
+        // Second step: 3 + 8/2 - 4 = 3.
+        // Going on: 1 + 4/2 - 2 + 3/4 = 1.75.
+        assert_eq!(advantages(false, false, TimeLimit::Bootstrap), [1.75, 3.0]);
+        // Terminated: 1 - 2 = -1.
+        assert_eq!(advantages(true, false, TimeLimit::Bootstrap), [-1.0, 3.0]);
+        // Truncated: 1 + 6/2 - 2 = 2, or as a termination.
+        assert_eq!(advantages(false, true, TimeLimit::Bootstrap), [2.0, 3.0]);
+        assert_eq!(advantages(false, true, TimeLimit::Legacy), [-1.0, 3.0]);
+        // Both: termination wins.
+        assert_eq!(advantages(true, true, TimeLimit::Bootstrap), [-1.0, 3.0]);
+    }
+}

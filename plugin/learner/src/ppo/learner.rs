@@ -1,0 +1,333 @@
+//! The learner: PPO, and SCORE-PPO if it is given a skill model.
+
+use super::batch::{DecoderRows, Prepared};
+use super::update::{StepMetrics, gradient_step};
+use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
+use crate::nn::{Adam, AdamConfig, HostDist, matrix, tracked};
+use crate::norm::{ObsNormalizer, RewardNormalizer};
+use crate::policy::{Actor, Critic, NetShape, Policy, StdKind, joined_rows};
+use crate::rng::{Streams, shuffle};
+use crate::score::{AlphaKind, PriorKind, ScoreConfig, alphas, decoder_kl, own_samples};
+use crate::skill::{Prior, SkillDescription, SkillModel};
+use crate::{DeviceKind, LearnError};
+
+/// Rows that the frozen decoder reads at a time.
+const DECODER_CHUNK: usize = 2048;
+
+/// A skill model's decoder and prior, which do not learn any more.
+#[derive(Clone, Debug)]
+pub(super) struct FrozenSkill {
+    pub(super) config: ScoreConfig,
+    pub(super) description: SkillDescription,
+    pub(super) decoder: Actor,
+    pub(super) prior: Actor,
+}
+
+/// Improves a policy from rollouts.
+///
+/// Without a skill model this is PPO; with one it is SCORE-PPO (see [`crate::score`]). The numbers depend only on the
+/// settings, the seed and the rollouts.
+#[derive(Debug)]
+pub struct PpoLearner {
+    pub(super) config: PpoConfig,
+    pub(super) spec: PolicySpec,
+    pub(super) skill: Option<FrozenSkill>,
+    pub(super) nets: PpoNets,
+    pub(super) adam: Adam,
+    pub(super) rewards: Option<RewardNormalizer>,
+    pub(super) observations: Option<ObsNormalizer>,
+    pub(super) streams: Streams,
+    pub(super) updates: u64,
+    pub(super) device: DeviceKind,
+}
+
+impl PpoLearner {
+    /// Plain PPO with starting weights from `seed`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for settings that cannot work.
+    pub fn new(
+        config: PpoConfig,
+        spec: PolicySpec,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        Self::build(config, spec, None, seed, device)
+    }
+
+    /// SCORE-PPO: tied to `model`'s decoder as `score` says.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for settings that cannot work.
+    pub fn with_skill(
+        config: PpoConfig,
+        score: ScoreConfig,
+        model: &SkillModel,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        let skill = FrozenSkill {
+            config: score,
+            description: model.description.clone(),
+            decoder: model.nets.decoder.clone(),
+            prior: model.nets.prior.clone(),
+        };
+        Self::build(config, skill.spec(), Some(skill), seed, device)
+    }
+
+    pub(super) fn build(
+        config: PpoConfig,
+        spec: PolicySpec,
+        skill: Option<FrozenSkill>,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        config.validate()?;
+        if spec.obs_dim == 0 || spec.action_space.dim() == 0 {
+            return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
+        }
+        let streams = Streams::new(seed);
+        let shape = NetShape {
+            obs_dim: spec.obs_dim,
+            latent: spec.latent,
+            hidden: config.hidden.clone(),
+            activation: config.activation,
+        };
+        let plain = device.plain();
+        let fresh = || {
+            let mut rng = streams.stream("ppo.actor", 0);
+            Actor::new(&shape, spec.action_space, StdKind::Vector, &mut rng, &plain)
+        };
+        let actor = match &skill {
+            None => fresh(),
+            Some(skill) => {
+                skill.config.validate()?;
+                if skill.config.init_from_decoder && config.norm_obs {
+                    let text = "ppo norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
+                    return Err(LearnError::Config(text.to_owned()));
+                }
+                if skill.config.init_from_decoder { skill.decoder.clone() } else { fresh() }
+            }
+        };
+        let critic = Critic::new(&shape, &mut streams.stream("ppo.critic", 0), &plain);
+        let adam = AdamConfig { eps: config.adam_eps, ..AdamConfig::default() };
+        Ok(Self {
+            nets: tracked(&PpoNets { actor, critic }),
+            adam: Adam::new(adam),
+            rewards: config.norm_reward.then(|| RewardNormalizer::new(config.gamma)),
+            observations: config.norm_obs.then(|| ObsNormalizer::new(spec.obs_dim)),
+            updates: 0,
+            config,
+            spec,
+            skill,
+            streams,
+            device,
+        })
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &PpoConfig {
+        &self.config
+    }
+
+    /// The settings of SCORE, with a skill model.
+    pub fn score_config(&self) -> Option<&ScoreConfig> {
+        self.skill.as_ref().map(|skill| &skill.config)
+    }
+
+    /// What the policy reads and does. Rollouts need skills also where `latent` is 0 if there is a penalty.
+    pub fn spec(&self) -> PolicySpec {
+        self.spec
+    }
+
+    /// Width of the skills that a rollout must hold.
+    pub fn rollout_latent(&self) -> usize {
+        self.skill.as_ref().map_or(self.spec.latent, |skill| skill.description.config.latent)
+    }
+
+    /// Updates done.
+    pub fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.streams.seed()
+    }
+
+    /// Where skills come from, by [`ScoreConfig::prior`]; `None` without a skill model.
+    pub fn prior(&self) -> Option<Prior> {
+        let skill = self.skill.as_ref()?;
+        let (latent, tanh) = (skill.description.config.latent, skill.description.config.tanh_latent);
+        Some(match skill.config.prior {
+            PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
+            PriorKind::Learned => {
+                let device = self.device.plain();
+                Prior::learned(&skill.prior, skill.description.obs_dim, latent, tanh, device)
+            }
+        })
+    }
+
+    /// A snapshot of the policy that plays, with its critic.
+    pub fn policy(&self) -> Policy {
+        let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
+        let widths = (self.spec.obs_dim, self.spec.latent);
+        let (actor, critic) = (&self.nets.actor, Some(&self.nets.critic));
+        Policy::new(actor, critic, stats, self.spec.action_space, widths, self.device.plain())
+    }
+
+    /// Mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is still a copy
+    /// of the decoder. `None` without a skill model.
+    ///
+    /// # Errors
+    /// [`LearnError::InitialKl`] if the policy should be a copy (no update was done, and
+    /// [`ScoreConfig::init_from_decoder`]) and the divergence is not exactly 0; [`LearnError::Shape`].
+    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
+        let Some(skill) = &self.skill else { return Ok(None) };
+        if n == 0 {
+            return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
+        }
+        let policy = self.policy();
+        let played = policy.forward(z, obs, n)?;
+        let copy = Policy::new(
+            &skill.decoder,
+            None,
+            None,
+            self.spec.action_space,
+            (self.spec.obs_dim, skill.description.config.latent),
+            self.device.plain(),
+        );
+        let decoded = copy.forward(z, obs, n)?;
+        let device = self.device.plain();
+        let rows: Vec<usize> = (0..n).collect();
+        let dist = |output: crate::PolicyOutput| {
+            let log_std = (!output.log_std.is_empty()).then_some(output.log_std);
+            let host = HostDist { dim: self.spec.action_space.dim(), head: output.head, log_std };
+            host.rows(&rows, &device)
+        };
+        let kl = decoder_kl(&dist(decoded), &dist(played), skill.config.kl_direction)?;
+        let kl = crate::nn::scalar(kl.mean())?;
+        if skill.config.init_from_decoder && self.updates == 0 && kl != 0.0 {
+            return Err(LearnError::InitialKl { kl });
+        }
+        Ok(Some(kl))
+    }
+
+    /// Trains on a rollout: epochs × minibatches gradient steps.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] or [`LearnError::Action`] if the rollout does not fit, before anything is changed;
+    /// [`LearnError::NotFinite`] names what ran away, and the learner is of no further use then.
+    pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
+        self.check(rollout)?;
+        let rewards = match &mut self.rewards {
+            Some(normalizer) => {
+                normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?
+            }
+            None => rollout.rewards.clone(),
+        };
+        let config = &self.config;
+        let estimate = gae(rollout, &rewards, config.gamma, config.lambda, config.time_limit);
+        let explained = explained_variance(&rollout.values, &estimate.returns);
+        let prepared = Prepared {
+            rollout,
+            advantages: estimate.advantages,
+            returns: estimate.returns,
+            decoder: self.decoder_rows(rollout)?,
+            latent: self.spec.latent,
+            stats: self.observations.as_ref().map(ObsNormalizer::snapshot),
+            norm_adv: config.norm_adv,
+        };
+        let lr = config.lr_at(self.updates);
+        let mut rng = self.streams.stream("ppo.minibatches", self.updates);
+        let mut rows: Vec<usize> = (0..rollout.rows()).collect();
+        let (n, parts) = (rows.len(), config.minibatches.min(rows.len()));
+        let mut sum = StepMetrics::default();
+        for _ in 0..self.config.epochs {
+            shuffle(&mut rows, &mut rng);
+            for part in 0..parts {
+                let rows = &rows[part * n / parts..(part + 1) * n / parts];
+                sum.add(&self.step(&prepared, rows, lr)?);
+            }
+        }
+        self.updates += 1;
+        if let Some(normalizer) = &mut self.observations {
+            normalizer.update(&rollout.obs);
+        }
+        let mean = |total: f64| (total / (self.config.epochs * parts) as f64) as f32;
+        let penalised = prepared.decoder.is_some();
+        Ok(UpdateMetrics {
+            policy_loss: mean(sum.policy_loss),
+            value_loss: mean(sum.value_loss),
+            entropy: mean(sum.entropy),
+            approx_kl: mean(sum.approx_kl),
+            clip_fraction: mean(sum.clip_fraction),
+            explained_variance: explained as f32,
+            decoder_kl: penalised.then(|| mean(sum.decoder_kl)),
+            alpha_mean: penalised.then(|| mean(sum.alpha_mean)),
+            grad_norm: mean(sum.grad_norm),
+            lr: lr as f32,
+        })
+    }
+
+    pub(super) fn step(
+        &mut self,
+        prepared: &Prepared<'_>,
+        rows: &[usize],
+        lr: f64,
+    ) -> Result<StepMetrics, LearnError> {
+        let batch = prepared.minibatch(rows, &self.device.plain());
+        let score = self.skill.as_ref().map(|skill| &skill.config);
+        gradient_step(&mut self.nets, &mut self.adam, &batch, &self.config, score, lr)
+    }
+
+    fn check(&self, rollout: &Rollout) -> Result<(), LearnError> {
+        rollout.check()?;
+        self.spec.action_space.check(&rollout.actions)?;
+        LearnError::check("obs_dim of the rollout", self.spec.obs_dim, rollout.obs_dim)?;
+        LearnError::check("latent of the rollout", self.rollout_latent(), rollout.latent)?;
+        if rollout.rows() == 0 {
+            return Err(LearnError::Config("the rollout is empty".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// The decoder's distributions and α for the whole rollout: it is frozen, so once per update is enough.
+    fn decoder_rows(&self, rollout: &Rollout) -> Result<Option<DecoderRows>, LearnError> {
+        let Some(skill) = self.skill.as_ref().filter(|skill| skill.config.kl) else {
+            return Ok(None);
+        };
+        let (n, latent, obs_dim) = (rollout.rows(), rollout.latent, rollout.obs_dim);
+        let device = self.device.plain();
+        let mut dist = HostDist { dim: self.spec.action_space.dim(), head: Vec::new(), log_std: None };
+        for start in (0..n).step_by(DECODER_CHUNK) {
+            let rows = start..(start + DECODER_CHUNK).min(n);
+            let len = rows.len();
+            let inputs = joined_rows(&rollout.z, latent, &rollout.obs, obs_dim, None, rows);
+            let part = skill.decoder.forward(matrix(inputs, len, latent + obs_dim, &device)).to_host()?;
+            dist.head.extend(part.head);
+            if let Some(stds) = part.log_std {
+                dist.log_std.get_or_insert_default().extend(stds);
+            }
+        }
+        let alpha = match skill.config.alpha {
+            AlphaKind::OwnSample => {
+                let mut rng = self.streams.stream("score.own_samples", self.updates);
+                alphas(AlphaKind::OwnSample, &dist, &own_samples(&dist, &mut rng))?
+            }
+            kind => alphas(kind, &dist, &rollout.actions)?,
+        };
+        Ok(Some(DecoderRows { dist, alpha }))
+    }
+}
+
+impl FrozenSkill {
+    /// What a policy tied to this skill model reads and does.
+    pub(super) fn spec(&self) -> PolicySpec {
+        PolicySpec {
+            obs_dim: self.description.obs_dim,
+            latent: if self.config.condition { self.description.config.latent } else { 0 },
+            action_space: self.description.action_space,
+        }
+    }
+}

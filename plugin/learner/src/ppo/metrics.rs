@@ -1,0 +1,68 @@
+//! What an update reports.
+
+use serde::{Deserialize, Serialize};
+
+/// Means over all minibatches of an update.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
+pub struct UpdateMetrics {
+    /// Clipped surrogate loss.
+    pub policy_loss: f32,
+    /// Value loss, with its ½ and without its weight.
+    pub value_loss: f32,
+    /// Entropy in nats.
+    pub entropy: f32,
+    /// Estimate of KL(old ‖ new) in nats: mean(ratio - 1 - ln ratio).
+    pub approx_kl: f32,
+    /// Share of rows whose ratio was clipped.
+    pub clip_fraction: f32,
+    /// 1 - Var(R - V) / Var(R) of the rollout's own values; NaN if the returns are all equal.
+    pub explained_variance: f32,
+    /// Mean divergence between decoder and policy in nats, not weighted; `None` without a penalty.
+    pub decoder_kl: Option<f32>,
+    /// Mean of α; `None` without a penalty.
+    pub alpha_mean: Option<f32>,
+    /// Norm of the gradient before clipping.
+    pub grad_norm: f32,
+    /// The learning rate used.
+    pub lr: f32,
+}
+
+/// How far a policy has moved from the one that played.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RatioStats {
+    /// mean(ratio - 1 - ln ratio).
+    pub approx_kl: f64,
+    /// mean(-ln ratio).
+    pub old_approx_kl: f64,
+    /// Share of |ratio - 1| > clip.
+    pub clip_fraction: f64,
+}
+
+/// Statistics of `log_ratios` = ln(new probability / old probability).
+pub fn ratio_stats(log_ratios: &[f32], clip: f64) -> RatioStats {
+    let n = log_ratios.len().max(1) as f64;
+    let (mut kl, mut old, mut clipped) = (0.0, 0.0, 0.0);
+    for &l in log_ratios {
+        let l = f64::from(l);
+        let moved = l.exp_m1();
+        kl += moved - l;
+        old -= l;
+        if moved.abs() > clip {
+            clipped += 1.0;
+        }
+    }
+    RatioStats { approx_kl: kl / n, old_approx_kl: old / n, clip_fraction: clipped / n }
+}
+
+/// 1 - Var(returns - values) / Var(returns); NaN if the returns do not vary.
+pub fn explained_variance(values: &[f32], returns: &[f32]) -> f64 {
+    let errors = values.iter().zip(returns).map(|(v, r)| f64::from(*r) - f64::from(*v));
+    let spread = variance(returns.iter().map(|&r| f64::from(r)));
+    if spread == 0.0 { f64::NAN } else { 1.0 - variance(errors) / spread }
+}
+
+fn variance(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    values.map(|x| (x - mean).powi(2)).sum::<f64>() / n
+}

@@ -1,0 +1,232 @@
+//! What was played since the last update.
+
+use crate::{ActionSpace, Actions, LearnError};
+
+/// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rollout {
+    /// T.
+    pub steps: usize,
+    /// B.
+    pub envs: usize,
+    /// Width of an observation.
+    pub obs_dim: usize,
+    /// Width of a skill; may be 0.
+    pub latent: usize,
+    /// Raw observations, `T * B * obs_dim`.
+    pub obs: Vec<f32>,
+    /// The skill active at each step, `T * B * latent`.
+    pub z: Vec<f32>,
+    /// The actions taken, `T * B`.
+    pub actions: Actions,
+    /// Their log-probabilities when taken.
+    pub log_probs: Vec<f32>,
+    /// Values of the observations when seen.
+    pub values: Vec<f32>,
+    /// Raw rewards of the actions.
+    pub rewards: Vec<f32>,
+    /// Whether the action ended the episode by the game's own rules.
+    pub terminated: Vec<bool>,
+    /// Whether the episode was cut off after the action.
+    pub truncated: Vec<bool>,
+    /// Value of the last observation of an episode that was cut off after this step; not read elsewhere.
+    pub final_values: Vec<f32>,
+    /// Value of the observation after the last step of each environment (under the skill active then), `B`.
+    pub next_values: Vec<f32>,
+}
+
+/// One tick of all environments of a [`Rollout`].
+#[derive(Clone, Copy, Debug)]
+pub struct RolloutStep<'a> {
+    /// `B * obs_dim`.
+    pub obs: &'a [f32],
+    /// `B * latent`.
+    pub z: &'a [f32],
+    /// `B`.
+    pub actions: &'a Actions,
+    /// `B`.
+    pub log_probs: &'a [f32],
+    /// `B`.
+    pub values: &'a [f32],
+    /// `B`.
+    pub rewards: &'a [f32],
+    /// `B`.
+    pub terminated: &'a [bool],
+    /// `B`.
+    pub truncated: &'a [bool],
+    /// `B`; read only where cut off and not terminated.
+    pub final_values: &'a [f32],
+}
+
+impl Rollout {
+    /// No steps yet.
+    pub fn new(envs: usize, obs_dim: usize, latent: usize, space: &ActionSpace) -> Self {
+        Self {
+            steps: 0,
+            envs,
+            obs_dim,
+            latent,
+            obs: Vec::new(),
+            z: Vec::new(),
+            actions: Actions::empty(space),
+            log_probs: Vec::new(),
+            values: Vec::new(),
+            rewards: Vec::new(),
+            terminated: Vec::new(),
+            truncated: Vec::new(),
+            final_values: Vec::new(),
+            next_values: Vec::new(),
+        }
+    }
+
+    /// Number of rows, T · B.
+    pub fn rows(&self) -> usize {
+        self.steps * self.envs
+    }
+
+    /// Forgets all steps and keeps the memory.
+    pub fn clear(&mut self) {
+        self.steps = 0;
+        self.actions.clear();
+        for values in [
+            &mut self.obs,
+            &mut self.z,
+            &mut self.log_probs,
+            &mut self.values,
+            &mut self.rewards,
+            &mut self.final_values,
+            &mut self.next_values,
+        ] {
+            values.clear();
+        }
+        self.terminated.clear();
+        self.truncated.clear();
+    }
+
+    /// Adds one tick.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if the actions are of another kind. Lengths are checked when the rollout is used.
+    pub fn push_step(&mut self, step: RolloutStep<'_>) -> Result<(), LearnError> {
+        self.actions.extend_rows(step.actions, 0, step.actions.len())?;
+        self.obs.extend_from_slice(step.obs);
+        self.z.extend_from_slice(step.z);
+        self.log_probs.extend_from_slice(step.log_probs);
+        self.values.extend_from_slice(step.values);
+        self.rewards.extend_from_slice(step.rewards);
+        self.terminated.extend_from_slice(step.terminated);
+        self.truncated.extend_from_slice(step.truncated);
+        self.final_values.extend_from_slice(step.final_values);
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ...
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for no parts; [`LearnError::Shape`] or [`LearnError::Action`] if they do not fit together.
+    pub fn join(parts: &[Self]) -> Result<Self, LearnError> {
+        let Some(first) = parts.first() else {
+            return Err(LearnError::Config("no rollouts to join".to_owned()));
+        };
+        let mut all = Self { actions: first.actions.clone(), ..Self::new(0, first.obs_dim, first.latent, &ActionSpace::Discrete(0)) };
+        all.actions.clear();
+        all.steps = first.steps;
+        for part in parts {
+            part.check()?;
+            LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
+            LearnError::check("obs_dim of a joined rollout", first.obs_dim, part.obs_dim)?;
+            LearnError::check("latent of a joined rollout", first.latent, part.latent)?;
+            all.envs += part.envs;
+            all.next_values.extend_from_slice(&part.next_values);
+        }
+        for t in 0..first.steps {
+            for part in parts {
+                let rows = t * part.envs..(t + 1) * part.envs;
+                let wide = |width: usize| rows.start * width..rows.end * width;
+                all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
+                all.obs.extend_from_slice(&part.obs[wide(part.obs_dim)]);
+                all.z.extend_from_slice(&part.z[wide(part.latent)]);
+                all.log_probs.extend_from_slice(&part.log_probs[rows.clone()]);
+                all.values.extend_from_slice(&part.values[rows.clone()]);
+                all.rewards.extend_from_slice(&part.rewards[rows.clone()]);
+                all.terminated.extend_from_slice(&part.terminated[rows.clone()]);
+                all.truncated.extend_from_slice(&part.truncated[rows.clone()]);
+                all.final_values.extend_from_slice(&part.final_values[rows]);
+            }
+        }
+        Ok(all)
+    }
+
+    /// `Ok` if all lengths fit T and B.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] names the first that does not.
+    pub fn check(&self) -> Result<(), LearnError> {
+        let rows = self.rows();
+        for (name, expected, found) in [
+            ("rollout obs", rows * self.obs_dim, self.obs.len()),
+            ("rollout z", rows * self.latent, self.z.len()),
+            ("rollout actions", rows, self.actions.len()),
+            ("rollout log_probs", rows, self.log_probs.len()),
+            ("rollout values", rows, self.values.len()),
+            ("rollout rewards", rows, self.rewards.len()),
+            ("rollout terminated", rows, self.terminated.len()),
+            ("rollout truncated", rows, self.truncated.len()),
+            ("rollout final_values", rows, self.final_values.len()),
+            ("rollout next_values", self.envs, self.next_values.len()),
+        ] {
+            LearnError::check(name, expected, found)?;
+        }
+        Ok(())
+    }
+
+    /// Whether an episode ended at each row, in either way.
+    pub fn done(&self) -> Vec<bool> {
+        self.terminated.iter().zip(&self.truncated).map(|(a, b)| *a || *b).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(envs: usize, base: f32) -> Rollout {
+        let mut rollout = Rollout::new(envs, 1, 0, &ActionSpace::Discrete(9));
+        for t in 0..2 {
+            let row: Vec<f32> = (0..envs).map(|b| base + (t * 10 + b) as f32).collect();
+            let actions = Actions::Discrete(vec![t as u32; envs]);
+            let flags = vec![false; envs];
+            let step = RolloutStep {
+                obs: &row,
+                z: &[],
+                actions: &actions,
+                log_probs: &row,
+                values: &row,
+                rewards: &row,
+                terminated: &flags,
+                truncated: &flags,
+                final_values: &row,
+            };
+            rollout.push_step(step).expect("discrete");
+        }
+        rollout.next_values = vec![base; envs];
+        rollout
+    }
+
+    #[test]
+    fn joined_rollouts_lie_side_by_side() {
+        let joined = Rollout::join(&[part(2, 0.0), part(1, 100.0)]).expect("they fit");
+        assert_eq!((joined.steps, joined.envs), (2, 3));
+        assert_eq!(joined.rewards, [0.0, 1.0, 100.0, 10.0, 11.0, 110.0]);
+        assert_eq!(joined.next_values, [0.0, 0.0, 100.0]);
+        assert!(joined.check().is_ok());
+    }
+
+    #[test]
+    fn a_wrong_length_is_named() {
+        let mut rollout = part(2, 0.0);
+        rollout.rewards.pop();
+        assert!(rollout.check().expect_err("too short").to_string().contains("rewards"));
+    }
+}

@@ -1,0 +1,101 @@
+//! One gradient step.
+
+use super::batch::Minibatch;
+use super::{PpoConfig, PpoNets, ppo_loss, ratio_stats};
+use crate::LearnError;
+use crate::nn::{Adam, NamedGrads, host, scalar};
+use crate::score::{ScoreConfig, decoder_kl};
+use burn::tensor::Tensor;
+
+/// What one gradient step looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepMetrics {
+    /// Clipped surrogate loss.
+    pub policy_loss: f64,
+    /// Value loss, with its ½ and without its weight.
+    pub value_loss: f64,
+    /// Entropy in nats.
+    pub entropy: f64,
+    /// The loss that was minimised.
+    pub total_loss: f64,
+    /// mean(ratio - 1 - ln ratio).
+    pub approx_kl: f64,
+    /// Share of |ratio - 1| > clip.
+    pub clip_fraction: f64,
+    /// Mean divergence between decoder and policy, not weighted.
+    pub decoder_kl: f64,
+    /// mean(α · divergence), without kl_coef.
+    pub kl_penalty: f64,
+    /// Mean of α.
+    pub alpha_mean: f64,
+    /// Norm of the gradient before clipping.
+    pub grad_norm: f64,
+}
+
+impl StepMetrics {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.policy_loss += other.policy_loss;
+        self.value_loss += other.value_loss;
+        self.entropy += other.entropy;
+        self.total_loss += other.total_loss;
+        self.approx_kl += other.approx_kl;
+        self.clip_fraction += other.clip_fraction;
+        self.decoder_kl += other.decoder_kl;
+        self.kl_penalty += other.kl_penalty;
+        self.alpha_mean += other.alpha_mean;
+        self.grad_norm += other.grad_norm;
+    }
+}
+
+/// Loss, gradient, clipping by the global norm, one step of Adam on tracked `nets`.
+///
+/// With a decoder in `batch` and settings of SCORE, kl_coef · mean(α · divergence) is added to the loss.
+///
+/// # Errors
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite.
+pub fn gradient_step(
+    nets: &mut PpoNets,
+    adam: &mut Adam,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    score: Option<&ScoreConfig>,
+    lr: f64,
+) -> Result<StepMetrics, LearnError> {
+    let dist = nets.actor.forward(batch.inputs.clone());
+    let values = nets.critic.forward(batch.inputs.clone());
+    let loss = ppo_loss(&dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
+    let mut metrics = StepMetrics {
+        policy_loss: read("policy_loss", &loss.policy_loss, adam)?,
+        value_loss: read("value_loss", &loss.value_loss, adam)?,
+        entropy: read("entropy", &loss.entropy, adam)?,
+        ..StepMetrics::default()
+    };
+    let mut total =
+        loss.policy_loss - loss.entropy * config.ent_coef + loss.value_loss * config.vf_coef;
+    if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
+        let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
+        let penalty = (kl.clone() * decoder.alpha.clone()).mean();
+        metrics.decoder_kl = read("decoder_kl", &kl.mean(), adam)?;
+        metrics.kl_penalty = read("kl_penalty", &penalty, adam)?;
+        metrics.alpha_mean = decoder.alpha_mean;
+        total = total + penalty * score.kl_coef;
+    }
+    let ratios = ratio_stats(&host(loss.log_ratio.inner())?, config.clip);
+    metrics.approx_kl = ratios.approx_kl;
+    metrics.clip_fraction = ratios.clip_fraction;
+    metrics.total_loss = read("total_loss", &total, adam)?;
+    let grads = NamedGrads::read(nets, "", &total.backward())?;
+    let (norm, scale) = grads.clip_factor(config.max_grad_norm, adam.steps())?;
+    metrics.grad_norm = norm;
+    adam.step(nets, "", &grads, lr, scale)?;
+    Ok(metrics)
+}
+
+/// The number of a `[1]` tensor, which must be finite.
+fn read(name: &str, tensor: &Tensor<1>, adam: &Adam) -> Result<f64, LearnError> {
+    let value = scalar(tensor.clone().inner())?;
+    if value.is_finite() {
+        return Ok(f64::from(value));
+    }
+    Err(LearnError::NotFinite { tensor: name.to_owned(), steps: adam.steps() })
+}

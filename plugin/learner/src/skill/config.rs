@@ -1,0 +1,123 @@
+//! Settings of the skill model.
+
+use crate::LearnError;
+use crate::policy::StdKind;
+use serde::{Deserialize, Serialize};
+
+/// How the terms of the loss are summed.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reduction {
+    /// NLL: sum over time, mean over the batch; KL: mean over the batch. No clamps.
+    Standard,
+    /// The released code: NLL: mean over time and batch; KL: sum over the batch; both clamped to ±100, without a
+    /// gradient beyond. For replication only.
+    Legacy,
+}
+
+/// Hyperparameters of the skill model.
+///
+/// The defaults are the paper's, with an encoder small enough for a CPU (the paper's is 200 wide with 4 layers).
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+#[serde(deny_unknown_fields, default)]
+pub struct SkillConfig {
+    /// Dimensions of z.
+    pub latent: usize,
+    /// Steps in a window.
+    pub window: usize,
+    /// β, the weight of the KL term.
+    pub beta: f64,
+    /// Hidden layers of the decoder and of the prior, ReLU.
+    pub hidden: Vec<usize>,
+    /// Width of the encoder's three per-step layers.
+    pub encoder_hidden: usize,
+    /// Width of each direction of the encoder's recurrent layers.
+    pub gru_hidden: usize,
+    /// Number of the encoder's recurrent layers.
+    pub gru_layers: usize,
+    /// Learning rate of Adam.
+    pub lr: f64,
+    /// Windows per batch.
+    pub batch: usize,
+    /// Passes over the demonstrations.
+    pub epochs: usize,
+    /// Bound of the gradient's Euclidean norm over all parameters.
+    pub max_grad_norm: f64,
+    /// Whether the decoder sees tanh(z) and not z.
+    pub tanh_latent: bool,
+    /// Weight of the mean Euclidean norm of the decoder's latent.
+    pub latent_reg: f64,
+    /// How the prior's standard deviation is made. By state, so that it can be narrow where players agree and wide
+    /// where they do not.
+    pub prior_std: StdKind,
+    /// How the decoder's standard deviation is made; only for continuous actions.
+    pub decoder_std: StdKind,
+    /// How the terms of the loss are summed.
+    pub reduction: Reduction,
+}
+
+impl Default for SkillConfig {
+    fn default() -> Self {
+        Self {
+            latent: 8,
+            window: 10,
+            beta: 0.1,
+            hidden: vec![200, 200],
+            encoder_hidden: 64,
+            gru_hidden: 64,
+            gru_layers: 1,
+            lr: 3e-4,
+            batch: 50,
+            epochs: 100,
+            max_grad_norm: 0.5,
+            tanh_latent: true,
+            latent_reg: 0.0,
+            prior_std: StdKind::State,
+            decoder_std: StdKind::Vector,
+            reduction: Reduction::Standard,
+        }
+    }
+}
+
+impl SkillConfig {
+    /// `Ok` if these settings can work.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] names the first setting that cannot.
+    pub fn validate(&self) -> Result<(), LearnError> {
+        let counts = [
+            ("latent", self.latent),
+            ("window", self.window),
+            ("encoder_hidden", self.encoder_hidden),
+            ("gru_hidden", self.gru_hidden),
+            ("gru_layers", self.gru_layers),
+            ("batch", self.batch),
+            ("hidden", self.hidden.iter().copied().min().unwrap_or(1)),
+        ];
+        if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
+            return Err(LearnError::Config(format!("skill {name} must be at least 1")));
+        }
+        let positive = [("lr", self.lr), ("max_grad_norm", self.max_grad_norm)];
+        if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
+            return Err(LearnError::Config(format!("skill {name} must be positive, not {x}")));
+        }
+        let weights = [("beta", self.beta), ("latent_reg", self.latent_reg)];
+        if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+            return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_settings_and_zero_sizes_are_refused() {
+        assert!(serde_json::from_str::<SkillConfig>(r#"{"latnet": 4}"#).is_err());
+        let config: SkillConfig = serde_json::from_str(r#"{"latent": 4}"#).expect("one setting");
+        assert_eq!((config.latent, config.window), (4, 10));
+        let error = SkillConfig { batch: 0, ..SkillConfig::default() }.validate();
+        assert!(error.expect_err("no windows").to_string().contains("batch"));
+    }
+}

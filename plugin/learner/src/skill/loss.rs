@@ -1,0 +1,41 @@
+//! J = NLL + β KL(q ‖ p), the loss of the skill model.
+
+use super::{Reduction, SkillConfig, SkillForward};
+use burn::tensor::Tensor;
+
+/// Bound of the legacy clamps.
+const LEGACY_BOUND: f32 = 100.0;
+
+/// The terms of the loss, `[1]` each.
+#[derive(Clone, Debug)]
+pub struct SkillLoss {
+    /// Negative log-likelihood of the actions.
+    pub nll: Tensor<1>,
+    /// KL from the encoder to the prior.
+    pub kl: Tensor<1>,
+    /// Mean Euclidean norm of the decoder's latent.
+    pub latent_norm: Tensor<1>,
+    /// nll + β · kl + latent_reg · latent_norm.
+    pub total: Tensor<1>,
+}
+
+/// Reduces a batch to the loss.
+pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
+    let [batch, _] = forward.decoder_latent.dims();
+    let (nll, kl) = match config.reduction {
+        Reduction::Standard => (
+            forward.nll_per_step.clone().sum() / batch as f32,
+            forward.kl_per_sequence.clone().mean(),
+        ),
+        Reduction::Legacy => (
+            forward.nll_per_step.clone().mean().clamp(-LEGACY_BOUND, LEGACY_BOUND),
+            forward.kl_per_sequence.clone().sum().clamp(-LEGACY_BOUND, LEGACY_BOUND),
+        ),
+    };
+    let latent_norm = forward.decoder_latent.clone().square().sum_dim(1).sqrt().mean();
+    let mut total = nll.clone() + kl.clone() * config.beta;
+    if config.latent_reg != 0.0 {
+        total = total + latent_norm.clone() * config.latent_reg;
+    }
+    SkillLoss { nll, kl, latent_norm, total }
+}

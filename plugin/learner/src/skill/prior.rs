@@ -1,0 +1,88 @@
+//! p(z | s₀) in use.
+
+use crate::LearnError;
+use crate::nn::{frozen, matrix};
+use crate::policy::Actor;
+use burn::tensor::Device;
+use serde::{Deserialize, Serialize};
+
+/// How z is taken from the prior.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum SkillDraw {
+    /// A random draw (the paper's text).
+    #[default]
+    Sample,
+    /// The mean (the paper's released code for mazes).
+    Mean,
+}
+
+/// Draws skills for states. Clones share the weights.
+#[derive(Clone, Debug)]
+pub struct Prior {
+    net: Option<(Actor, usize, Device)>,
+    latent: usize,
+    tanh: bool,
+}
+
+impl Prior {
+    /// The learned prior `net`, which reads `obs_dim` numbers.
+    pub(crate) fn learned(net: &Actor, obs_dim: usize, latent: usize, tanh: bool, device: Device) -> Self {
+        Self { net: Some((frozen(net), obs_dim, device)), latent, tanh }
+    }
+
+    /// A prior that ignores the state: standard normal, then tanh if `tanh`.
+    pub fn standard_normal(latent: usize, tanh: bool) -> Self {
+        Self { net: None, latent, tanh }
+    }
+
+    /// Width of z.
+    pub fn latent(&self) -> usize {
+        self.latent
+    }
+
+    /// Skills for `n` raw observations (`n * obs_dim`), as the decoder and the policy take them: `n * latent`.
+    ///
+    /// `normal(row)` must give the next standard normal number of that row's own generator; it is called `latent`
+    /// times per row, in order of rows, and not at all for [`SkillDraw::Mean`].
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] for observations of the wrong length; [`LearnError::NotFinite`] if a skill is.
+    pub fn sample(
+        &self,
+        obs: &[f32],
+        n: usize,
+        draw: SkillDraw,
+        normal: &mut dyn FnMut(usize) -> f32,
+    ) -> Result<Vec<f32>, LearnError> {
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        let numbers = n * self.latent;
+        let (mut z, log_std) = match &self.net {
+            None => (vec![0.0; numbers], vec![0.0; numbers]),
+            Some((net, obs_dim, device)) => {
+                LearnError::check("observations", n * obs_dim, obs.len())?;
+                let mut rows = obs.to_vec();
+                if n == 1 {
+                    // As in `Policy`: a single row would be summed in another order.
+                    rows.extend_from_within(..);
+                }
+                let dist = net.forward(matrix(rows, n.max(2), *obs_dim, device)).to_host()?;
+                (dist.head, dist.log_std.unwrap_or_default())
+            }
+        };
+        z.truncate(numbers);
+        for (i, (z, s)) in z.iter_mut().zip(&log_std).enumerate() {
+            if draw == SkillDraw::Sample {
+                *z += normal(i / self.latent) * s.exp();
+            }
+            if self.tanh {
+                *z = z.tanh();
+            }
+        }
+        if z.iter().any(|x| !x.is_finite()) {
+            return Err(LearnError::NotFinite { tensor: "prior output".to_owned(), steps: 0 });
+        }
+        Ok(z)
+    }
+}

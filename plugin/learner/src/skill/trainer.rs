@@ -1,0 +1,233 @@
+//! Training of the skill model.
+
+use super::nets::encoder_actions;
+use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
+use crate::nn::{ActionRows, Adam, AdamConfig, Dist, NamedGrads, argmax, host, matrix, scalar, tracked};
+use crate::rng::{Streams, normal};
+use crate::{Actions, DeviceKind, LearnError};
+use std::ops::ControlFlow;
+
+/// What one batch, or the mean over an epoch's batches, looked like.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SkillMetrics {
+    /// The whole loss.
+    pub loss: f32,
+    /// Negative log-likelihood of a window's actions, in nats (see [`super::Reduction`]).
+    pub nll: f32,
+    /// KL from the encoder to the prior, in nats.
+    pub kl: f32,
+    /// Mean Euclidean norm of the decoder's latent.
+    pub latent_norm: f32,
+    /// Share of steps whose action is the decoder's most likely one; `None` for continuous actions.
+    pub accuracy: Option<f32>,
+    /// Norm of the gradient before clipping.
+    pub grad_norm: f32,
+}
+
+/// Where training stands, after each batch.
+#[derive(Clone, Copy, Debug)]
+pub struct SkillProgress {
+    /// Number of the running epoch, from 0.
+    pub epoch: u64,
+    /// Batches done in it.
+    pub batch: usize,
+    /// Batches it has.
+    pub batches: usize,
+    /// The batch just done.
+    pub metrics: SkillMetrics,
+}
+
+/// Trains a skill model on demonstrations, batch by batch, so that the caller can show progress and stop at any time.
+#[derive(Debug)]
+pub struct SkillTrainer {
+    config: SkillConfig,
+    dataset: Dataset,
+    nets: SkillNets,
+    adam: Adam,
+    streams: Streams,
+    device: DeviceKind,
+    epoch: u64,
+    windows: Vec<Window>,
+    next: usize,
+    sums: Sums,
+    last_epoch: SkillMetrics,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    count: usize,
+    total: [f64; 6],
+}
+
+impl SkillTrainer {
+    /// A trainer with starting weights from `seed`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for settings that cannot work, [`LearnError::NoWindow`] if no episode is long enough.
+    pub fn new(
+        config: SkillConfig,
+        dataset: Dataset,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        config.validate()?;
+        let streams = Streams::new(seed);
+        let nets = SkillNets::new(&config, dataset.obs_dim, dataset.space, &streams, &device.plain());
+        let windows = dataset.windows(config.window, &streams, 0)?;
+        Ok(Self {
+            nets: tracked(&nets),
+            adam: Adam::new(AdamConfig { eps: 1e-8, ..AdamConfig::default() }),
+            epoch: 0,
+            next: 0,
+            sums: Sums::default(),
+            last_epoch: SkillMetrics::default(),
+            config,
+            dataset,
+            streams,
+            device,
+            windows,
+        })
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &SkillConfig {
+        &self.config
+    }
+
+    /// Complete passes over the demonstrations.
+    pub fn epochs_done(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Batches in the running epoch; it varies a little with where the episodes are cut.
+    pub fn batches_per_epoch(&self) -> usize {
+        self.windows.len().div_ceil(self.config.batch)
+    }
+
+    /// Batches done in the running epoch.
+    pub fn batches_done(&self) -> usize {
+        self.next / self.config.batch
+    }
+
+    /// Trains on the next batch; the last one of an epoch may be smaller.
+    ///
+    /// # Errors
+    /// [`LearnError::NotFinite`] names what ran away; the trainer is of no further use then.
+    pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
+        let end = (self.next + self.config.batch).min(self.windows.len());
+        let windows = self.windows[self.next..end].to_vec();
+        let metrics = self.step(&windows)?;
+        self.sums.add(&metrics);
+        self.next = end;
+        if end == self.windows.len() {
+            self.epoch += 1;
+            self.next = 0;
+            self.last_epoch = std::mem::take(&mut self.sums).mean(metrics.accuracy.is_some());
+            self.windows = self.dataset.windows(self.config.window, &self.streams, self.epoch)?;
+        }
+        Ok(metrics)
+    }
+
+    /// Trains to the end of the running epoch and gives the means over its batches, or `None` if `progress`, which is
+    /// called after each batch, stopped it. A later call goes on from there.
+    ///
+    /// # Errors
+    /// As [`Self::train_batch`].
+    pub fn train_epoch(
+        &mut self,
+        progress: &mut dyn FnMut(SkillProgress) -> ControlFlow<()>,
+    ) -> Result<Option<SkillMetrics>, LearnError> {
+        let epoch = self.epoch;
+        let batches = self.batches_per_epoch();
+        loop {
+            let batch = self.batches_done() + 1;
+            let metrics = self.train_batch()?;
+            let go_on = progress(SkillProgress { epoch, batch, batches, metrics });
+            if self.epoch != epoch {
+                return Ok(Some(self.last_epoch));
+            }
+            if go_on.is_break() {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// The model as it is now.
+    pub fn model(&self) -> SkillModel {
+        let description = SkillDescription {
+            config: self.config.clone(),
+            obs_dim: self.dataset.obs_dim,
+            action_space: self.dataset.space,
+        };
+        SkillModel::new(description, &self.nets, self.device)
+    }
+
+    /// The trained model.
+    pub fn into_model(self) -> SkillModel {
+        self.model()
+    }
+
+    fn step(&mut self, windows: &[Window]) -> Result<SkillMetrics, LearnError> {
+        let (forward, actions) = self.forward(windows)?;
+        let loss = skill_loss(&forward, &self.config);
+        let steps = self.adam.steps();
+        let mut metrics = SkillMetrics {
+            loss: scalar(loss.total.clone())?,
+            nll: scalar(loss.nll)?,
+            kl: scalar(loss.kl)?,
+            latent_norm: scalar(loss.latent_norm)?,
+            accuracy: accuracy(&forward.decoded, &actions)?,
+            grad_norm: 0.0,
+        };
+        let parts = [("nll", metrics.nll), ("kl", metrics.kl), ("loss", metrics.loss)];
+        if let Some((name, _)) = parts.iter().find(|(_, x)| !x.is_finite()) {
+            return Err(LearnError::NotFinite { tensor: (*name).to_owned(), steps });
+        }
+        let grads = NamedGrads::read(&mut self.nets, "", &loss.total.backward())?;
+        let (norm, scale) = grads.clip_factor(self.config.max_grad_norm, steps)?;
+        metrics.grad_norm = norm as f32;
+        self.adam.step(&mut self.nets, "", &grads, self.config.lr, scale)?;
+        Ok(metrics)
+    }
+
+    fn forward(&self, windows: &[Window]) -> Result<(SkillForward, Actions), LearnError> {
+        let (batch, steps) = (windows.len(), self.config.window);
+        let (obs_dim, space) = (self.dataset.obs_dim, self.dataset.space);
+        let device = self.device.plain();
+        let (observations, actions) = self.dataset.gather(windows, steps)?;
+        let first = matrix(observations[..batch * obs_dim].to_vec(), batch, obs_dim, &device);
+        let states = matrix(observations, steps * batch, obs_dim, &device);
+        let encoded = encoder_actions(&actions, space);
+        let encoded = matrix(encoded, steps * batch, space.dim(), &device);
+        let mut rng = self.streams.stream("skill.noise", self.adam.steps());
+        let noise = (0..batch * self.config.latent).map(|_| normal(&mut rng)).collect();
+        let noise = matrix(noise, batch, self.config.latent, &device);
+        let rows = ActionRows::new(&actions, &device);
+        let forward = self.nets.forward(states, first, &rows, encoded, noise, steps)?;
+        Ok((forward, actions))
+    }
+}
+
+fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError> {
+    let (Dist::Categorical { log_probs }, Actions::Discrete(actions)) = (decoded, actions) else {
+        return Ok(None);
+    };
+    let [rows, dim] = log_probs.dims();
+    let log_probs = host(log_probs.clone().inner())?;
+    let hits = log_probs.chunks_exact(dim).zip(actions).filter(|(row, a)| argmax(row) == **a).count();
+    Ok(Some(hits as f32 / rows as f32))
+}
+
+impl Sums {
+    fn add(&mut self, m: &SkillMetrics) {
+        let values = [m.loss, m.nll, m.kl, m.latent_norm, m.accuracy.unwrap_or(0.0), m.grad_norm];
+        self.count += 1;
+        self.total.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(x));
+    }
+
+    fn mean(self, accuracy: bool) -> SkillMetrics {
+        let [loss, nll, kl, latent_norm, hits, grad_norm] =
+            self.total.map(|sum| (sum / self.count.max(1) as f64) as f32);
+        SkillMetrics { loss, nll, kl, latent_norm, accuracy: accuracy.then_some(hits), grad_norm }
+    }
+}

@@ -1,0 +1,171 @@
+//! Action spaces and actions.
+
+use crate::LearnError;
+use serde::{Deserialize, Serialize};
+
+/// What an agent can do in one step.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ActionSpace {
+    /// One of `n` choices, numbered from 0.
+    Discrete(usize),
+    /// A vector of `n` real numbers.
+    Continuous(usize),
+}
+
+impl ActionSpace {
+    /// Number of outputs of a network that acts in this space: the choices, or the vector's length.
+    pub fn dim(&self) -> usize {
+        match *self {
+            Self::Discrete(n) | Self::Continuous(n) => n,
+        }
+    }
+
+    /// `Ok` if every action of `actions` lies in this space.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] names the first action that does not fit.
+    pub fn check(&self, actions: &Actions) -> Result<(), LearnError> {
+        match (self, actions) {
+            (Self::Discrete(n), Actions::Discrete(values)) => {
+                match values.iter().position(|&a| a as usize >= *n) {
+                    None => Ok(()),
+                    Some(row) => Err(LearnError::Action(format!(
+                        "row {row} is {} of {n} choices",
+                        values[row]
+                    ))),
+                }
+            }
+            (Self::Continuous(n), Actions::Continuous { dim, values }) => {
+                if n != dim {
+                    return Err(LearnError::Action(format!("width {dim}, expected {n}")));
+                }
+                match values.iter().position(|v| !v.is_finite()) {
+                    None => Ok(()),
+                    Some(at) => Err(LearnError::Action(format!("row {} is not finite", at / n))),
+                }
+            }
+            (space, _) => Err(LearnError::Action(format!("wrong kind for {space:?}"))),
+        }
+    }
+}
+
+/// One action.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub enum Action {
+    /// Index of the choice.
+    Discrete(u32),
+    /// The vector.
+    Continuous(Vec<f32>),
+}
+
+/// Many actions of one space, in order.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub enum Actions {
+    /// Indices of the choices.
+    Discrete(Vec<u32>),
+    /// Vectors, one after the other.
+    Continuous {
+        /// Length of each vector.
+        dim: usize,
+        /// The numbers, `dim` per action.
+        values: Vec<f32>,
+    },
+}
+
+impl Actions {
+    /// No actions yet, of the kind of `space`.
+    pub fn empty(space: &ActionSpace) -> Self {
+        match *space {
+            ActionSpace::Discrete(_) => Self::Discrete(Vec::new()),
+            ActionSpace::Continuous(dim) => Self::Continuous { dim, values: Vec::new() },
+        }
+    }
+
+    /// Number of actions.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Discrete(values) => values.len(),
+            Self::Continuous { dim, values } => values.len() / (*dim).max(1),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Forgets all actions and keeps the memory.
+    pub fn clear(&mut self) {
+        match self {
+            Self::Discrete(values) => values.clear(),
+            Self::Continuous { values, .. } => values.clear(),
+        }
+    }
+
+    /// The action of row `row`, if there is one.
+    pub fn get(&self, row: usize) -> Option<Action> {
+        match self {
+            Self::Discrete(values) => values.get(row).copied().map(Action::Discrete),
+            Self::Continuous { dim, values } => values
+                .get(row * dim..(row + 1) * dim)
+                .map(|v| Action::Continuous(v.to_vec())),
+        }
+    }
+
+    /// Adds one action at the end.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if it is of another kind or width.
+    pub fn push(&mut self, action: &Action) -> Result<(), LearnError> {
+        match (self, action) {
+            (Self::Discrete(values), Action::Discrete(a)) => values.push(*a),
+            (Self::Continuous { dim, values }, Action::Continuous(a)) if a.len() == *dim => {
+                values.extend_from_slice(a);
+            }
+            (all, one) => {
+                return Err(LearnError::Action(format!("{one:?} among {}", all.kind())));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds rows `start..end` of `other` at the end.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if `other` is of another kind or width.
+    pub fn extend_rows(&mut self, other: &Self, start: usize, end: usize) -> Result<(), LearnError> {
+        match (self, other) {
+            (Self::Discrete(to), Self::Discrete(from)) => to.extend_from_slice(&from[start..end]),
+            (Self::Continuous { dim, values }, Self::Continuous { dim: d, values: from })
+                if dim == d =>
+            {
+                values.extend_from_slice(&from[start * *d..end * *d]);
+            }
+            (all, other) => {
+                return Err(LearnError::Action(format!("{} among {}", other.kind(), all.kind())));
+            }
+        }
+        Ok(())
+    }
+
+    /// The actions at `rows`, in that order.
+    pub(crate) fn gather(&self, rows: &[usize]) -> Self {
+        match self {
+            Self::Discrete(values) => Self::Discrete(rows.iter().map(|&r| values[r]).collect()),
+            Self::Continuous { dim, values } => {
+                let mut out = Vec::with_capacity(rows.len() * dim);
+                for &r in rows {
+                    out.extend_from_slice(&values[r * dim..(r + 1) * dim]);
+                }
+                Self::Continuous { dim: *dim, values: out }
+            }
+        }
+    }
+
+    fn kind(&self) -> String {
+        match self {
+            Self::Discrete(_) => "discrete actions".to_owned(),
+            Self::Continuous { dim, .. } => format!("continuous actions of width {dim}"),
+        }
+    }
+}

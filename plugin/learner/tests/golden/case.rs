@@ -1,0 +1,254 @@
+//! One case: its file of numbers and its tolerances.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use playbot_learner::nn::{ParamVisitor, Parameters};
+use playbot_learner::{Actions, DeviceKind};
+use safetensors::{Dtype, SafeTensors};
+use serde_json::Value;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+/// A case, with a record of what was compared.
+pub struct Case {
+    name: String,
+    json: Value,
+    tensors: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
+    checked: RefCell<BTreeSet<String>>,
+}
+
+impl Case {
+    pub fn load(name: &str) -> Self {
+        let folder = std::env::var_os("PLAYBOT_GOLDEN").map_or_else(
+            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/numerics"),
+            PathBuf::from,
+        );
+        let read = |ending: &str| {
+            let path = folder.join(format!("{name}.{ending}"));
+            std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+        };
+        let json: Value = serde_json::from_slice(&read("json")).expect("the case is JSON");
+        let bytes = read("safetensors");
+        let file = SafeTensors::deserialize(&bytes).expect("the tensors are safetensors");
+        let generated = json["procedural"].as_array().into_iter().flatten().map(generate);
+        let tensors = file
+            .iter()
+            .map(|(name, view)| {
+                let data = view.data();
+                let values = match view.dtype() {
+                    Dtype::F32 => bytemuck::pod_collect_to_vec::<u8, f32>(data).into_iter().map(f64::from).collect(),
+                    Dtype::I64 => bytemuck::pod_collect_to_vec::<u8, i64>(data).into_iter().map(|x| x as f64).collect(),
+                    other => panic!("{name} is {other:?}"),
+                };
+                (name.to_owned(), (view.shape().to_vec(), values))
+            })
+            .chain(generated)
+            .collect();
+        Self { name: name.to_owned(), json, tensors, checked: RefCell::default() }
+    }
+
+    pub fn hyper(&self, name: &str) -> &Value {
+        &self.json["hyper"][name]
+    }
+
+    pub fn number(&self, name: &str) -> f64 {
+        self.hyper(name).as_f64().unwrap_or_else(|| panic!("{}: no number {name}", self.name))
+    }
+
+    pub fn dim(&self, name: &str) -> usize {
+        self.json["dims"][name].as_u64().unwrap_or_else(|| panic!("{}: no size {name}", self.name)) as usize
+    }
+
+    pub fn expected(&self, name: &str) -> &Value {
+        self.checked.borrow_mut().insert(name.to_owned());
+        &self.json["expected"][name]
+    }
+
+    pub fn has(&self, name: &str) -> bool {
+        self.tensors.contains_key(name)
+    }
+
+    pub fn shape(&self, name: &str) -> &[usize] {
+        &self.get(name).0
+    }
+
+    pub fn f64s(&self, name: &str) -> &[f64] {
+        &self.get(name).1
+    }
+
+    pub fn f32s(&self, name: &str) -> Vec<f32> {
+        self.f64s(name).iter().map(|&x| x as f32).collect()
+    }
+
+    pub fn bools(&self, name: &str) -> Vec<bool> {
+        self.f64s(name).iter().map(|&x| x != 0.0).collect()
+    }
+
+    pub fn indices(&self, name: &str) -> Vec<usize> {
+        self.f64s(name).iter().map(|&x| x as usize).collect()
+    }
+
+    /// Discrete if stored as whole numbers, else continuous.
+    pub fn actions(&self, name: &str) -> Actions {
+        let values = self.f64s(name);
+        match self.shape(name) {
+            [_] => Actions::Discrete(values.iter().map(|&x| x as u32).collect()),
+            [_, dim] => Actions::Continuous { dim: *dim, values: self.f32s(name) },
+            shape => panic!("{name} has shape {shape:?}"),
+        }
+    }
+
+    pub fn tensor<const D: usize>(&self, name: &str, device: &Device) -> Tensor<D> {
+        Tensor::from_data(TensorData::new(self.f32s(name), self.shape(name).to_vec()), device)
+    }
+
+    fn get(&self, name: &str) -> &(Vec<usize>, Vec<f64>) {
+        self.tensors.get(name).unwrap_or_else(|| panic!("{}: no tensor {name}", self.name))
+    }
+
+    /// Compares with the expected tensor `name`.
+    pub fn check(&self, name: &str, got: &[f32]) {
+        self.checked.borrow_mut().insert(name.to_owned());
+        self.compare(name, self.f64s(name), got.iter().map(|&x| f64::from(x)));
+    }
+
+    /// Compares with the expected number `name`.
+    pub fn check_number(&self, name: &str, got: f64) {
+        let want = self.expected(name).as_f64().unwrap_or_else(|| panic!("{}: no number {name}", self.name));
+        self.compare(name, &[want], [got].into_iter());
+    }
+
+    /// Compares with entry `index` of the expected list `name`.
+    pub fn check_entry(&self, name: &str, index: usize, got: f64) {
+        let want = self.expected(name)[index].as_f64().unwrap_or_else(|| panic!("{}: no {name}", self.name));
+        self.compare(name, &[want], [got].into_iter());
+    }
+
+    /// Compares with given numbers by the tolerance of `name`.
+    pub fn compare(&self, name: &str, want: &[f64], got: impl ExactSizeIterator<Item = f64>) {
+        let tolerance = &self.json["tolerance"];
+        let rule = tolerance["overrides"]
+            .as_array()
+            .and_then(|all| all.iter().find(|o| name.starts_with(o["prefix"].as_str().unwrap_or("?"))))
+            .unwrap_or(tolerance);
+        let (abs, rel) = (rule["abs"].as_f64().expect("abs"), rule["rel"].as_f64().expect("rel"));
+        assert_eq!(want.len(), got.len(), "{}: length of {name}", self.name);
+        for (i, (want, got)) in want.iter().zip(got).enumerate() {
+            let bound = abs + rel * want.abs();
+            assert!((got - want).abs() <= bound, "{}: {name}[{i}] is {got}, expected {want} ± {bound}", self.name);
+        }
+    }
+
+    /// Asserts that every expected tensor and number was compared, but for those that start with one of `skipped`.
+    pub fn finish(&self, skipped: &[&str]) {
+        let checked = self.checked.borrow();
+        let tensors = self.tensors.keys().filter(|name| {
+            ["out.", "grad.", "after.", "adam_", "step1_grad."].iter().any(|p| name.starts_with(p))
+        });
+        let numbers = self.json["expected"].as_object().into_iter().flat_map(|map| map.keys());
+        for name in tensors.chain(numbers) {
+            let skip = skipped.iter().any(|prefix| name.starts_with(prefix));
+            assert!(skip || checked.contains(name), "{}: {name} was not compared", self.name);
+        }
+    }
+
+    /// The stored tensor(s) for our parameter `name`, in our layout; `None` if the case does not hold them.
+    pub fn parameter(&self, group: &str, name: &str) -> Option<(String, Vec<f64>)> {
+        let theirs = format!("{group}{}", their_name(name));
+        let (stem, last) = theirs.rsplit_once('.').unwrap_or(("", &theirs));
+        if let Some((stem, layer)) = stem.rsplit_once(".l").filter(|_| name.contains("gru")) {
+            let one = |suffix: &str| {
+                let name = format!("{stem}.{last}_l{layer}{suffix}");
+                self.has(&name).then(|| self.transposed(&name))
+            };
+            let mut values = one("")?;
+            values.extend(one("_reverse").unwrap_or_default());
+            let mark = format!("{stem}.{last}_l{layer}");
+            self.checked.borrow_mut().extend([mark.clone(), format!("{mark}_reverse")]);
+            return Some((mark, values));
+        }
+        if !self.has(&theirs) {
+            return None;
+        }
+        self.checked.borrow_mut().insert(theirs.clone());
+        let values = self.transposed(&theirs);
+        Some((theirs, values))
+    }
+
+    /// `[out, in]` to `[in, out]`; anything else as it is.
+    fn transposed(&self, name: &str) -> Vec<f64> {
+        let (shape, values) = self.get(name);
+        let [rows, columns] = shape[..] else { return values.clone() };
+        (0..rows * columns).map(|i| values[(i % rows) * columns + i / rows]).collect()
+    }
+
+    /// Fills `network`'s parameters from the tensors of `group` (`"param."`, `"in."`).
+    pub fn fill<M: Parameters>(&self, network: &mut M, group: &str, prefix: &str, device: DeviceKind) {
+        network.visit(prefix, &mut Fill { case: self, group, device: device.plain() });
+    }
+
+    /// Compares a parameter-like tensor of ours (a gradient, a weight, a moment) with the stored one, if there is one.
+    pub fn check_parameter(&self, group: &str, name: &str, got: &[f32]) {
+        if let Some((theirs, want)) = self.parameter(group, name) {
+            self.compare(&theirs, &want, got.iter().map(|&x| f64::from(x)));
+        }
+    }
+}
+
+/// A tensor that is made by rule instead of stored (SplitMix64 over the element numbers).
+fn generate(rule: &Value) -> (String, (Vec<usize>, Vec<f64>)) {
+    let shape: Vec<usize> =
+        rule["shape"].as_array().into_iter().flatten().map(|n| n.as_u64().expect("size") as usize).collect();
+    let seed = rule["seed"].as_u64().expect("seed");
+    let bound = rule["bound"].as_f64().expect("bound");
+    let element = |i: usize| {
+        let mut z = seed.wrapping_add((i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^= z >> 31;
+        f64::from((((z >> 40) as f64 / 8_388_608.0 - 1.0) * bound) as f32)
+    };
+    let values: Vec<f64> = (0..shape.iter().product()).map(element).collect();
+    for (bits, x) in rule["first_bits"].as_array().into_iter().flatten().zip(&values) {
+        assert_eq!(bits.as_u64(), Some(u64::from((*x as f32).to_bits())));
+    }
+    (rule["name"].as_str().expect("name").to_owned(), (shape, values))
+}
+
+fn their_name(name: &str) -> String {
+    let name = name
+        .replace("encoder.state.head", "enc.state.l2")
+        .replace("encoder.", "enc.")
+        .replace("decoder.head", "dec.mean")
+        .replace("decoder.", "dec.")
+        .replace("prior.head", "prior.mean");
+    name.replace("frozen.", "decoder.").replace("gru.uni", "uni").replace("gru.bi", "bi")
+}
+
+struct Fill<'a> {
+    case: &'a Case,
+    group: &'a str,
+    device: Device,
+}
+
+impl ParamVisitor for Fill<'_> {
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
+        let (_, values) = self
+            .case
+            .parameter(self.group, name)
+            .unwrap_or_else(|| panic!("{}: no {}{name}", self.case.name, self.group));
+        let values: Vec<f32> = values.into_iter().map(|x| x as f32).collect();
+        assert_eq!(values.len(), tensor.dims().iter().product::<usize>(), "size of {name}");
+        *tensor = Tensor::from_data(TensorData::new(values, tensor.dims()), &self.device);
+    }
+}
+
+/// All numbers of a tensor.
+pub fn host<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.try_into_vec_as::<f32>().expect("readable")
+}
+
+/// The number of a tensor of one element.
+pub fn number(tensor: Tensor<1>) -> f64 {
+    f64::from(host(tensor)[0])
+}

@@ -1,0 +1,61 @@
+//! Recurrent layers, one and two directions, one and two layers, with and without a starting state.
+
+use crate::case::{Case, host};
+use burn::tensor::Tensor;
+use playbot_learner::DeviceKind;
+use playbot_learner::nn::{Gru, NamedGrads, tracked};
+use playbot_learner::rng::Streams;
+
+fn check(case: &Case, stack: &str, weights: &str, kind: DeviceKind) {
+    let device = kind.plain();
+    let (inputs, hidden, steps) = (case.dim("I"), case.dim("H"), case.dim("T"));
+    let directions = if weights == "uni" { 1 } else { 2 };
+    let layers = if weights == "bi2" { 2 } else { 1 };
+    let mut rng = Streams::new(0).stream("gru", 0);
+    let mut gru = Gru::new(inputs, hidden, layers, directions == 2, &mut rng, &device);
+    case.fill(&mut gru, "param.", &format!("gru.{weights}"), kind);
+    let mut gru = tracked(&gru);
+
+    let x = case.tensor::<3>("in.x", &device).autodiff().require_grad();
+    let batch = case.dim("B");
+    let sequence: Vec<Tensor<2>> = (0..steps)
+        .map(|t| x.clone().slice([0..batch, t..t + 1, 0..inputs]).squeeze_dim(1))
+        .collect();
+    let initial = (stack == "bi2_h0").then(|| {
+        let all = case.tensor::<3>("in.h0_bi2", &device);
+        (0..layers).map(|k| all.clone().slice([2 * k..2 * k + 2, 0..batch, 0..hidden])).collect()
+    });
+    let summary = (initial.is_none() && directions == 2).then(|| gru.summary(sequence.clone()));
+    let (outputs, last) = gru.forward(sequence, initial);
+    let output: Tensor<3> = Tensor::stack(outputs, 1);
+    case.check(&format!("out.{stack}.output"), &host(output.clone()));
+    let states: Tensor<3> = Tensor::cat(last, 0);
+    case.check(&format!("out.{stack}.h_n"), &host(states.clone()));
+    if let Some(summary) = summary {
+        case.check(&format!("out.{stack}.feature"), &host(summary));
+    } else if directions == 2 {
+        let top = states.slice([2 * layers - 2..2 * layers, 0..batch, 0..hidden]);
+        let feature: Tensor<2> = top.swap_dims(0, 1).reshape([batch, 2 * hidden]);
+        case.check(&format!("out.{stack}.feature"), &host(feature));
+    }
+    let probe = if directions == 2 { "in.probe_bi" } else { "in.probe_uni" };
+    let grads = (output * case.tensor::<3>(probe, &device)).sum().backward();
+    case.check(&format!("grad.{stack}.x"), &host(x.grad(&grads).expect("tracked")));
+    if stack == weights {
+        let grads = NamedGrads::read(&mut gru, &format!("gru.{weights}"), &grads).expect("readable");
+        for (name, values) in grads.iter() {
+            case.check_parameter("grad.", name, values);
+        }
+    }
+}
+
+#[test]
+fn golden_gru_stack() {
+    let case = Case::load("gru_stack");
+    for kind in DeviceKind::ALL {
+        for (stack, weights) in [("uni", "uni"), ("bi", "bi"), ("bi2", "bi2"), ("bi2_h0", "bi2")] {
+            check(&case, stack, weights, kind);
+        }
+    }
+    case.finish(&[]);
+}

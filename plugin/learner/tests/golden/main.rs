@@ -1,0 +1,13 @@
+//! Golden tests: the learner against reference numbers computed with PyTorch in double precision.
+//!
+//! The cases lie in `tests/fixtures/numerics`, or in the folder that the environment variable `PLAYBOT_GOLDEN` names.
+
+mod adam;
+mod case;
+mod gae;
+mod gru;
+mod kl;
+mod norm;
+mod ppo_loss;
+mod update;
+mod vae;

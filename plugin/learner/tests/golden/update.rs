@@ -1,0 +1,238 @@
+//! Whole updates: two epochs of four minibatches, with every loss, the weights after, and Adam's moments.
+
+use crate::case::{Case, host};
+use burn::tensor::{Tensor, TensorData};
+use playbot_learner::nn::{
+    ActionRows, Activation, Adam, AdamConfig, ParamVisitor, Parameters, tracked,
+};
+use playbot_learner::policy::{Actor, Critic, NetShape};
+use playbot_learner::ppo::{
+    DecoderBatch, Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages,
+};
+use playbot_learner::rng::Streams;
+use playbot_learner::score::alphas;
+use playbot_learner::{ActionSpace, Actions, AlphaKind, DeviceKind, PpoConfig, ScoreConfig, StdKind};
+
+fn check(name: &str) {
+    let case = Case::load(name);
+    for kind in DeviceKind::ALL {
+        Update::new(&case, kind).run();
+    }
+    case.finish(&["old_approx_kl"]);
+}
+
+struct Update<'a> {
+    case: &'a Case,
+    kind: DeviceKind,
+    config: PpoConfig,
+    score: Option<ScoreConfig>,
+    nets: PpoNets,
+    decoder: Option<Actor>,
+}
+
+impl<'a> Update<'a> {
+    fn new(case: &'a Case, kind: DeviceKind) -> Self {
+        let space = match case.actions("in.actions") {
+            Actions::Discrete(_) => ActionSpace::Discrete(case.dim("K")),
+            Actions::Continuous { .. } => ActionSpace::Continuous(case.dim("A")),
+        };
+        let shape = NetShape {
+            obs_dim: case.dim("obs"),
+            latent: case.dim("skill"),
+            hidden: vec![case.dim("hidden"); 2],
+            activation: Activation::Tanh,
+        };
+        let mut rng = Streams::new(0).stream("nets", 0);
+        let device = kind.plain();
+        let mut actor = Actor::new(&shape, space, StdKind::Vector, &mut rng, &device);
+        let mut critic = Critic::new(&shape, &mut rng, &device);
+        case.fill(&mut actor, "param.", "actor", kind);
+        case.fill(&mut critic, "param.", "critic", kind);
+        let decoder = case.has("in.decoder.l0.weight").then(|| {
+            let mut decoder = Actor::new(&shape, space, StdKind::Vector, &mut rng, &device);
+            case.fill(&mut decoder, "in.", "frozen", kind);
+            decoder
+        });
+        let score = decoder.is_some().then(|| ScoreConfig {
+            kl_coef: case.number("kl_coef"),
+            alpha: match case.hyper("alpha").as_str() {
+                Some("prob_own_sample") => AlphaKind::OwnSample,
+                Some("score_policy_action" | "prob_policy_action") => AlphaKind::PolicyAction,
+                other => panic!("unknown alpha {other:?}"),
+            },
+            ..ScoreConfig::default()
+        });
+        let config = PpoConfig {
+            clip: case.number("clip"),
+            vf_coef: case.number("vf_coef"),
+            ent_coef: case.number("ent_coef"),
+            max_grad_norm: case.number("max_grad_norm"),
+            adam_eps: case.number("adam_eps"),
+            ..PpoConfig::default()
+        };
+        Self { case, kind, config, score, nets: tracked(&PpoNets { actor, critic }), decoder }
+    }
+
+    fn run(mut self) {
+        let case = self.case;
+        let adam = AdamConfig { eps: self.config.adam_eps, ..AdamConfig::default() };
+        let mut adam = Adam::new(adam);
+        let size = case.dim("minibatch");
+        for (i, rows) in case.indices("in.permutations").chunks_exact(size).enumerate() {
+            let batch = self.minibatch(rows);
+            if i == 0 {
+                self.check_first_gradients(&batch);
+            }
+            let lr = case.number("lr");
+            let (config, score) = (&self.config, self.score.as_ref());
+            let step = gradient_step(&mut self.nets, &mut adam, &batch, config, score, lr);
+            self.check_step(i, &step.expect("finite"));
+        }
+        self.nets.visit("", &mut After(case));
+        let mut names = Names(Vec::new());
+        self.nets.visit("", &mut names);
+        for name in names.0 {
+            let (m, v) = adam.moments(&name).expect("updated");
+            case.check_parameter("adam_m.", &name, m);
+            case.check_parameter("adam_v.", &name, v);
+        }
+    }
+
+    fn minibatch(&self, rows: &[usize]) -> Minibatch {
+        let (case, device) = (self.case, self.kind.plain());
+        let pick = |name: &str| -> Vec<f32> {
+            let values = case.f32s(name);
+            let width = values.len() / case.shape(name)[0];
+            rows.iter().flat_map(|&r| values[r * width..(r + 1) * width].to_vec()).collect()
+        };
+        let matrix = |values: Vec<f32>| -> Tensor<2> {
+            let width = values.len() / rows.len();
+            Tensor::from_data(TensorData::new(values, [rows.len(), width]), &device)
+        };
+        let vector = |values: Vec<f32>| Tensor::<1>::from_floats(values.as_slice(), &device);
+        let actions = |name: &str| match case.actions(name) {
+            Actions::Discrete(all) => Actions::Discrete(rows.iter().map(|&r| all[r]).collect()),
+            Actions::Continuous { dim, .. } => Actions::Continuous { dim, values: pick(name) },
+        };
+        let mut inputs = matrix(pick("in.obs"));
+        if case.has("in.skill") {
+            inputs = Tensor::cat(vec![matrix(pick("in.skill")), inputs], 1);
+        }
+        let mut advantages = pick("in.advantages");
+        normalize_advantages(&mut advantages);
+        let decoder = self.decoder.as_ref().zip(self.score.as_ref()).map(|(decoder, score)| {
+            let dist = decoder.forward(inputs.clone());
+            let actions = match score.alpha {
+                AlphaKind::OwnSample => actions("in.decoder_action"),
+                _ => actions("in.actions"),
+            };
+            let host = dist.clone().to_host().expect("readable");
+            let alpha = alphas(score.alpha, &host, &actions).expect("they fit");
+            let sum: f64 = alpha.iter().map(|&a| f64::from(a)).sum();
+            DecoderBatch { dist, alpha_mean: sum / alpha.len() as f64, alpha: vector(alpha) }
+        });
+        Minibatch {
+            inputs,
+            ppo: PpoBatch {
+                actions: ActionRows::new(&actions("in.actions"), &device),
+                old_log_probs: vector(pick("in.old_log_probs")),
+                advantages: vector(advantages),
+                old_values: vector(pick("in.old_values")),
+                returns: vector(pick("in.returns")),
+            },
+            decoder,
+        }
+    }
+
+    fn check_step(&self, i: usize, step: &StepMetrics) {
+        let mut entries = vec![
+            ("policy_loss", step.policy_loss),
+            ("value_loss", step.value_loss),
+            ("entropy", step.entropy),
+            ("total_loss", step.total_loss),
+            ("approx_kl", step.approx_kl),
+            ("clip_fraction", step.clip_fraction),
+            ("grad_norm", step.grad_norm),
+        ];
+        if self.score.is_some() {
+            entries.push(("kl_mean", step.decoder_kl));
+            entries.push(("kl_reg", step.kl_penalty));
+            entries.push(("alpha_mean", step.alpha_mean));
+        }
+        for (name, got) in entries {
+            self.case.check_entry(name, i, got);
+        }
+    }
+
+    /// A step with learning rate 0 and β = 0 leaves the unclipped gradient in Adam's first moment.
+    fn check_first_gradients(&self, batch: &Minibatch) {
+        let mut nets = self.nets.clone();
+        let mut adam = Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() });
+        let config = PpoConfig { max_grad_norm: 1e30, ..self.config.clone() };
+        let score = self.score.as_ref();
+        gradient_step(&mut nets, &mut adam, batch, &config, score, 0.0).expect("finite");
+        let mut names = Names(Vec::new());
+        nets.visit("", &mut names);
+        for name in names.0 {
+            let (gradient, _) = adam.moments(&name).expect("updated");
+            self.case.check_parameter("step1_grad.", &name, gradient);
+        }
+    }
+}
+
+struct After<'a>(&'a Case);
+
+impl ParamVisitor for After<'_> {
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
+        self.0.check_parameter("after.", name, &host(tensor.clone().inner()));
+    }
+}
+
+struct Names(Vec<String>);
+
+impl ParamVisitor for Names {
+    fn visit<const D: usize>(&mut self, name: &str, _: &mut Tensor<D>) {
+        self.0.push(name.to_owned());
+    }
+}
+
+#[test]
+fn golden_ppo_update_gaussian() {
+    check("ppo_update_gaussian");
+}
+
+#[test]
+fn golden_ppo_update_categorical() {
+    check("ppo_update_categorical");
+}
+
+#[test]
+fn golden_score_update_gaussian_score() {
+    check("score_update_gaussian_score");
+}
+
+#[test]
+fn golden_score_update_categorical_own_sample() {
+    check("score_update_categorical_own_sample");
+}
+
+#[test]
+fn golden_score_update_categorical_policy_action() {
+    check("score_update_categorical_policy_action");
+}
+
+#[test]
+fn an_exact_copy_of_the_decoder_pays_nothing() {
+    let case = Case::load("score_update_categorical_own_sample");
+    for kind in DeviceKind::ALL {
+        let mut update = Update::new(&case, kind);
+        let decoder = update.decoder.clone().expect("a SCORE case");
+        update.nets.actor = decoder;
+        update.nets = tracked(&update.nets);
+        let batch = update.minibatch(&[0, 1, 2, 3, 4, 5, 6, 7]);
+        let mut adam = Adam::new(AdamConfig::default());
+        let (config, score) = (&update.config, update.score.as_ref());
+        let step = gradient_step(&mut update.nets, &mut adam, &batch, config, score, 1e-3);
+        assert_eq!(step.expect("finite").decoder_kl, 0.0);
+    }
+}

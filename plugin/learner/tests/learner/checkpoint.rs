@@ -1,0 +1,71 @@
+//! A saved learner goes on bit for bit.
+
+use crate::corridor::config;
+use crate::score::model;
+use crate::toy::{Driver, OBS, SPACE};
+use playbot_learner::{DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner, ScoreConfig, SkillModel};
+
+fn learners() -> Vec<PpoLearner> {
+    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    let awkward = PpoConfig { lr: 0.1 + 0.2 - 0.297, norm_obs: true, ..config() };
+    let anneal = PpoConfig { anneal_lr: true, total_updates: Some(7), norm_reward: false, ..config() };
+    vec![
+        PpoLearner::new(awkward, spec, 5, DeviceKind::Flex).expect("good settings"),
+        PpoLearner::new(anneal, spec, u64::MAX, DeviceKind::Flex).expect("good settings"),
+        PpoLearner::with_skill(config(), ScoreConfig::default(), &model(1), 5, DeviceKind::Flex)
+            .expect("good settings"),
+    ]
+}
+
+#[test]
+fn a_loaded_learner_goes_on_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    for mut learner in learners() {
+        let mut driver = Driver::new(4, 1);
+        for _ in 0..2 {
+            learner.update(&driver.rollout(&learner, 16)).expect("finite");
+        }
+        learner.save(&path).expect("written");
+        let mut loaded = PpoLearner::load(&path, DeviceKind::Flex).expect("read");
+        assert_eq!((loaded.updates(), loaded.seed()), (2, learner.seed()));
+        assert_eq!(loaded.config(), learner.config());
+        for _ in 0..2 {
+            let rollout = driver.rollout(&learner, 16);
+            let expected = learner.update(&rollout).expect("finite");
+            assert_eq!(loaded.update(&rollout).expect("finite"), expected);
+        }
+        let (first, second) = (folder.path().join("a"), folder.path().join("b"));
+        learner.save(&first).expect("written");
+        loaded.save(&second).expect("written");
+        let read = |path| std::fs::read(path).expect("readable");
+        assert_eq!(read(&first), read(&second), "whole states are equal, byte for byte");
+    }
+}
+
+#[test]
+fn a_wrong_file_is_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    let learner = learners().remove(0);
+    learner.save(&path).expect("written");
+    let error = SkillModel::load(&path, DeviceKind::Flex).expect_err("not a skill model");
+    assert!(matches!(error, FileError::Format { .. }), "{error}");
+
+    // The names in the header are changed in place, so that lengths stay right.
+    let bytes = std::fs::read(&path).expect("readable");
+    let edit = |from: &str, to: &str| {
+        assert_eq!(from.len(), to.len());
+        let at = bytes.windows(from.len()).position(|w| w == from.as_bytes()).expect("in the header");
+        let mut edited = bytes.clone();
+        edited[at..at + to.len()].copy_from_slice(to.as_bytes());
+        std::fs::write(&path, edited).expect("written");
+        PpoLearner::load(&path, DeviceKind::Flex).expect_err("a wrong file").to_string()
+    };
+    let error = edit("actor.l0.bias", "actor.l9.bias");
+    assert!(error.contains("`actor.l0.bias` is missing"), "{error}");
+    let error = edit("[16,16]", "[32,8] ");
+    assert!(error.contains("l1.weight") && error.contains("[32, 8]"), "{error}");
+    let error = edit("\\\"version\\\":1", "\\\"version\\\":2");
+    assert!(error.contains("version 2"), "{error}");
+}

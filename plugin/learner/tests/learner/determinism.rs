@@ -1,0 +1,105 @@
+//! The same seed gives the same bits, whatever the number of threads and the size of the batch.
+
+use crate::corridor::config;
+use crate::score::model;
+use crate::toy::{Driver, OBS, SPACE};
+use playbot_learner::rng::{Streams, normal};
+use playbot_learner::{
+    ActionSpace, DeviceKind, Policy, PolicyOutput, PolicySpec, PpoConfig, PpoLearner, ScoreConfig,
+};
+
+fn numbers(n: usize) -> Vec<f32> {
+    let mut rng = Streams::new(4).stream("numbers", 0);
+    (0..n).map(|_| normal(&mut rng)).collect()
+}
+
+#[test]
+fn two_runs_are_equal() {
+    let run = || {
+        let mut learner =
+            PpoLearner::with_skill(config(), ScoreConfig::default(), &model(1), 3, DeviceKind::Flex)
+                .expect("good settings");
+        let mut driver = Driver::new(4, 1);
+        let mut last = None;
+        for _ in 0..3 {
+            last = Some(learner.update(&driver.rollout(&learner, 16)).expect("finite"));
+        }
+        (last, driver.lengths)
+    };
+    assert_eq!(run(), run());
+}
+
+/// Sizes at which matrix products are split over threads and blocks.
+fn wide_policy(device: DeviceKind) -> Policy {
+    let spec = PolicySpec { obs_dim: 530, latent: 8, action_space: ActionSpace::Discrete(15) };
+    PpoLearner::new(PpoConfig::default(), spec, 1, device).expect("good settings").policy()
+}
+
+#[test]
+fn a_row_does_not_depend_on_the_other_rows() {
+    for device in DeviceKind::ALL {
+        let policy = wide_policy(device);
+        let n = 300;
+        let (z, obs) = (numbers(n * 8), numbers(n * 530));
+        let whole = policy.forward(&z, &obs, n).expect("finite");
+        for size in [1, 2, 3, 16, 64, 127] {
+            let rows = 5..5 + size;
+            let part = policy
+                .forward(&z[rows.start * 8..rows.end * 8], &obs[rows.start * 530..rows.end * 530], size)
+                .expect("finite");
+            assert_eq!(part.head, whole.head[rows.start * 15..rows.end * 15], "{size} rows on {device}");
+            assert_eq!(part.values, whole.values[rows], "{size} rows on {device}");
+        }
+    }
+}
+
+#[test]
+fn threads_with_clones_of_a_policy_agree() {
+    let policy = wide_policy(DeviceKind::Flex);
+    let (z, obs) = (numbers(64 * 8), numbers(64 * 530));
+    let expected = policy.forward(&z, &obs, 64).expect("finite");
+    let outputs: Vec<PolicyOutput> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..4)
+            .map(|_| {
+                let policy = policy.clone();
+                let (z, obs) = (&z, &obs);
+                scope.spawn(move || policy.forward(z, obs, 64).expect("finite"))
+            })
+            .collect();
+        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+    });
+    assert!(outputs.iter().all(|output| *output == expected));
+}
+
+#[test]
+fn updates_do_not_depend_on_the_number_of_threads() {
+    // The pool's size is fixed for a process, so the same run is made in two of them.
+    const CHILD: &str = "PLAYBOT_TEST_THREADS_CHILD";
+    let digest = || {
+        let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+        let config = PpoConfig { hidden: vec![256, 256], minibatches: 2, ..config() };
+        let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
+        let mut driver = Driver::new(64, 1);
+        learner.update(&driver.rollout(&learner, 32)).expect("finite");
+        let output = learner.policy().forward(&[], &numbers(64 * OBS), 64).expect("finite");
+        output.head.iter().fold(0u64, |h, x| h.rotate_left(7) ^ u64::from(x.to_bits()))
+    };
+    if let Some(path) = std::env::var_os(CHILD) {
+        std::fs::write(path, digest().to_string()).expect("writable");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let results = [1, 2, 4].map(|threads| {
+        let path = folder.path().join(threads.to_string());
+        let status = std::process::Command::new(std::env::current_exe().expect("this test"))
+            .args(["--exact", "determinism::updates_do_not_depend_on_the_number_of_threads"])
+            .env(CHILD, &path)
+            .env("RAYON_NUM_THREADS", threads.to_string())
+            .stdout(std::process::Stdio::null())
+            .status();
+        assert!(status.expect("runs").success());
+        std::fs::read_to_string(path).expect("written")
+    });
+    assert_eq!(results[0], results[1]);
+    assert_eq!(results[0], results[2]);
+}

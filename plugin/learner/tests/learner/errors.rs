@@ -1,0 +1,63 @@
+//! Bad data and numbers that run away are errors with names, never panics.
+
+use crate::corridor::config;
+use crate::toy::{Driver, OBS, SPACE};
+use playbot_learner::{Actions, DeviceKind, LearnError, PolicySpec, PpoConfig, PpoLearner, Rollout};
+
+fn learner(config: PpoConfig) -> PpoLearner {
+    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings")
+}
+
+fn after(change: impl Fn(&mut Rollout)) -> LearnError {
+    let mut learner = learner(PpoConfig { norm_reward: false, ..config() });
+    let mut rollout = Driver::new(4, 1).rollout(&learner, 16);
+    change(&mut rollout);
+    learner.update(&rollout).expect_err("a bad rollout")
+}
+
+#[test]
+fn numbers_that_run_away_are_named() {
+    let error = after(|rollout| rollout.rewards[3] = f32::NAN);
+    assert!(matches!(&error, LearnError::NotFinite { tensor, .. } if tensor == "policy_loss"), "{error}");
+    let error = after(|rollout| rollout.obs[5] = f32::INFINITY);
+    assert!(matches!(&error, LearnError::NotFinite { .. }), "{error}");
+    let mut learner = learner(PpoConfig { lr: 1e38, ..config() });
+    let mut driver = Driver::new(4, 1);
+    let rollout = driver.rollout(&learner, 16);
+    let result = (0..5).try_for_each(|_| learner.update(&rollout).map(|_| ()));
+    assert!(matches!(result, Err(LearnError::NotFinite { .. })));
+}
+
+#[test]
+fn rollouts_that_do_not_fit_are_named() {
+    let error = after(|rollout| drop(rollout.values.pop()));
+    assert!(error.to_string().contains("rollout values"), "{error}");
+    let error = after(|rollout| rollout.actions = Actions::Discrete(vec![3; rollout.rows()]));
+    assert!(matches!(error, LearnError::Action(_)), "{error}");
+    let error = after(|rollout| *rollout = Rollout::new(4, OBS, 0, &SPACE));
+    assert!(error.to_string().contains("next_values"), "{error}");
+}
+
+#[test]
+fn a_policy_checks_its_inputs() {
+    let policy = learner(config()).policy();
+    assert!(matches!(policy.forward(&[], &[0.0; OBS + 1], 1), Err(LearnError::Shape { .. })));
+    let error = policy.forward(&[], &[f32::NAN; OBS], 1).expect_err("not a number");
+    assert!(error.to_string().contains("actor"), "{error}");
+    assert!(policy.forward(&[], &[], 0).expect("nothing to do").is_empty());
+}
+
+#[test]
+fn settings_that_cannot_work_are_named() {
+    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    for (name, config) in [
+        ("minibatches", PpoConfig { minibatches: 0, ..config() }),
+        ("gamma", PpoConfig { gamma: 1.5, ..config() }),
+        ("lr", PpoConfig { lr: f64::NAN, ..config() }),
+        ("total_updates", PpoConfig { anneal_lr: true, ..config() }),
+    ] {
+        let error = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect_err("bad settings");
+        assert!(error.to_string().contains(name), "{error}");
+    }
+}

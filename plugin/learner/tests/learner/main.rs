@@ -1,0 +1,9 @@
+//! The learner as a whole: does it learn, is it exact, does it survive a restart.
+
+mod checkpoint;
+mod corridor;
+mod determinism;
+mod errors;
+mod score;
+mod skill;
+mod toy;

@@ -1,0 +1,68 @@
+//! What an agent does in this tick.
+
+use bevy::prelude::*;
+pub use playbot_learner::{Action as ActionValue, ActionSpace};
+
+use crate::{agent::Agent, episode::Episode, fault::Faults};
+
+/// The action of this tick, written in [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide) by whoever
+/// holds the [`Control`](crate::control::Control) and read by the game in `FixedUpdate`.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct Action(pub ActionValue);
+
+impl Default for Action {
+    fn default() -> Self {
+        Self(ActionValue::Discrete(0))
+    }
+}
+
+impl Action {
+    /// The index of a discrete action, or `None` for a continuous one.
+    pub fn discrete(&self) -> Option<u32> {
+        match self.0 {
+            ActionValue::Discrete(index) => Some(index),
+            ActionValue::Continuous(_) => None,
+        }
+    }
+
+    /// The values of a continuous action, or `None` for a discrete one.
+    pub fn continuous(&self) -> Option<&[f32]> {
+        match &self.0 {
+            ActionValue::Discrete(_) => None,
+            ActionValue::Continuous(values) => Some(values),
+        }
+    }
+}
+
+/// Why an action does not belong to its space, or `None` if it does.
+pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
+    match (action, space) {
+        (ActionValue::Discrete(index), ActionSpace::Discrete(n)) if (*index as usize) < *n => None,
+        (ActionValue::Discrete(index), ActionSpace::Discrete(n)) => {
+            Some(format!("discrete action {index} is outside 0..{n}"))
+        }
+        (ActionValue::Continuous(values), ActionSpace::Continuous(n)) if values.len() != *n => {
+            Some(format!("continuous action has {} values, the space has {n}", values.len()))
+        }
+        (ActionValue::Continuous(values), ActionSpace::Continuous(_)) => values
+            .iter()
+            .position(|value| !value.is_finite())
+            .map(|at| format!("continuous action has {} at index {at}", values[at])),
+        (action, space) => Some(format!("action {action:?} does not fit the space {space:?}")),
+    }
+}
+
+/// Reports actions that do not belong to their agent's space, with agent and tick.
+pub(crate) fn check_actions(
+    agents: Query<(&Agent, &Action, &Episode)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, action, episode) in &agents {
+        if !episode.is_running() {
+            continue;
+        }
+        if let Some(why) = misfit(&action.0, &agent.actions) {
+            faults.report(format!("agent {}, level {}, tick {}: {why}", agent.index, episode.level, episode.tick));
+        }
+    }
+}

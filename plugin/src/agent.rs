@@ -1,0 +1,75 @@
+//! The agent: whoever acts in the game, be it a person, a script or a policy.
+
+use bevy::prelude::*;
+use playbot_learner::ActionSpace;
+
+use crate::{
+    action::Action,
+    control::Control,
+    episode::{Episode, EpisodeCount},
+    level::LevelQueue,
+    observation::Observation,
+    policy::{AgentStreams, Decision},
+    reward::Reward,
+    skill_prior::ActiveSkill,
+    state_hash::StateHash,
+};
+
+/// An entity that acts in the game.
+///
+/// Everything the plugin keeps per agent comes along as required components; add a
+/// [`VectorSensor`](crate::observation::VectorSensor) for what it sees and set its [`Control`].
+#[derive(Component, Clone, Debug, PartialEq)]
+#[require(
+    Action,
+    ActiveSkill,
+    AgentStreams,
+    Control,
+    Decision,
+    Episode,
+    EpisodeCount,
+    LevelQueue,
+    Observation,
+    Reward,
+    StateHash
+)]
+pub struct Agent {
+    /// Number of the agent, unique in its World. Random streams and the order of batches come from it, so that a run
+    /// does not depend on the order in which entities were stored.
+    pub index: u32,
+    /// What the agent can do.
+    pub actions: ActionSpace,
+}
+
+impl Agent {
+    /// An agent with this number and these actions.
+    pub fn new(index: u32, actions: ActionSpace) -> Self {
+        Self { index, actions }
+    }
+}
+
+/// All agents of the World in the order of their numbers: the row order of every batch.
+#[derive(Resource, Default, Debug)]
+pub struct AgentOrder(Vec<Entity>);
+
+impl AgentOrder {
+    /// Agents, lowest number first.
+    pub fn entities(&self) -> &[Entity] {
+        &self.0
+    }
+}
+
+/// Keeps [`AgentOrder`] true when agents come or go.
+pub(crate) fn order_agents(
+    mut order: ResMut<AgentOrder>,
+    agents: Query<(Entity, &Agent)>,
+    added: Query<(), Added<Agent>>,
+) {
+    let unchanged = added.is_empty() && order.0.len() == agents.iter().len();
+    if unchanged {
+        return;
+    }
+    let mut sorted: Vec<_> = agents.iter().map(|(entity, agent)| (agent.index, entity)).collect();
+    sorted.sort();
+    order.0 = sorted.into_iter().map(|(_, entity)| entity).collect();
+}

@@ -1,0 +1,40 @@
+//! Bots that do not look: the baselines that any learner has to beat.
+
+use bevy::prelude::*;
+use playbot_learner::{Action as ActionValue, ActionSpace};
+use rand::RngExt;
+
+use crate::{action::Action, agent::Agent, control::Control, episode::Episode, policy::AgentStreams};
+
+/// A scripted bot without eyes. Acts while the agent's control is [`Control::Bot`].
+#[derive(Component, Clone, Debug, PartialEq)]
+pub enum BlindBot {
+    /// The same action in every tick.
+    Constant(ActionValue),
+    /// Uniformly random: over the indices of a discrete space, over [-1, 1] per continuous value.
+    Uniform,
+}
+
+pub(crate) fn run_blind_bots(
+    mut agents: Query<(&Agent, &Control, &BlindBot, &Episode, &mut AgentStreams, &mut Action)>,
+) {
+    for (agent, control, bot, episode, mut streams, mut action) in &mut agents {
+        if *control != Control::Bot || !episode.is_running() {
+            continue;
+        }
+        match bot {
+            BlindBot::Constant(value) => action.0.clone_from(value),
+            BlindBot::Uniform => action.0 = uniform(&agent.actions, &mut streams.action),
+        }
+    }
+}
+
+/// A uniformly random action of a space.
+pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
+    match space {
+        ActionSpace::Discrete(n) => ActionValue::Discrete(rng.random_range(0..*n as u32)),
+        ActionSpace::Continuous(n) => {
+            ActionValue::Continuous((0..*n).map(|_| rng.random_range(-1.0..=1.0)).collect())
+        }
+    }
+}

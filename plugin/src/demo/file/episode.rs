@@ -1,0 +1,209 @@
+//! One recorded episode in memory.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::EpisodeFault;
+use super::header::{DemoActions, DemoHeader};
+
+/// Who decided the action of a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Decider {
+    /// A person at the keyboard or gamepad.
+    Human,
+    /// A scripted bot.
+    Bot,
+    /// A learned policy.
+    Policy,
+    /// A recording that was played back.
+    Replay,
+    /// Nobody: the agent did nothing.
+    Idle,
+}
+
+/// How an episode ended. Termination and truncation are never merged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum DemoEnd {
+    /// The rules of the game ended the episode.
+    Terminated {
+        /// Whether the goal was reached.
+        success: bool,
+    },
+    /// The time limit ended the episode.
+    Truncated,
+    /// The recording stopped before the episode ended: the window was closed, or the level was left.
+    Aborted,
+}
+
+/// The actions of an episode, in the order of its ticks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum EpisodeActions {
+    /// One action number per tick.
+    Discrete(Vec<u32>),
+    /// `dim` numbers per tick, tick after tick: `values` has shape `[steps, dim]`.
+    Continuous {
+        /// Numbers per tick.
+        dim: usize,
+        /// The numbers, row by row.
+        values: Vec<f32>,
+    },
+}
+
+/// One recorded episode: what is needed to run it again, and what it should then lead to.
+///
+/// All lists run over the ticks of the episode; `steps` is their common length.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DemoEpisode {
+    /// Seed of the level: with the game, its version and its mode it gives the layout.
+    pub level_seed: u64,
+    /// The action of each tick.
+    pub actions: EpisodeActions,
+    /// The reward of each tick, `[steps]`.
+    pub rewards: Vec<f32>,
+    /// Hash of the game's state after each tick, `[steps]`.
+    pub state_hashes: Vec<u32>,
+    /// Who decided each tick, `[steps]`.
+    pub deciders: Vec<Decider>,
+    /// How the episode ended.
+    pub end: DemoEnd,
+    /// The observation before each action, `[steps, names]` with the names of the header;
+    /// empty when the header has no names.
+    pub observations: Vec<f32>,
+}
+
+impl DemoEpisode {
+    /// An episode without ticks, to be filled by a recorder.
+    pub fn new(level_seed: u64, actions: DemoActions) -> Self {
+        Self {
+            level_seed,
+            actions: match actions {
+                DemoActions::Discrete(_) => EpisodeActions::Discrete(Vec::new()),
+                DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values: Vec::new() },
+            },
+            rewards: Vec::new(),
+            state_hashes: Vec::new(),
+            deciders: Vec::new(),
+            end: DemoEnd::Aborted,
+            observations: Vec::new(),
+        }
+    }
+
+    /// Number of ticks.
+    pub fn len(&self) -> usize {
+        self.state_hashes.len()
+    }
+
+    /// Whether the episode has no ticks.
+    pub fn is_empty(&self) -> bool {
+        self.state_hashes.is_empty()
+    }
+
+    /// Sum of the rewards (undiscounted return).
+    pub fn episode_return(&self) -> f64 {
+        self.rewards.iter().map(|&r| f64::from(r)).sum()
+    }
+
+    /// Whether the episode terminated with the goal reached.
+    pub fn is_success(&self) -> bool {
+        self.end == DemoEnd::Terminated { success: true }
+    }
+
+    /// Checks the episode against the header of its file.
+    ///
+    /// # Errors
+    ///
+    /// The first [`EpisodeFault`]: lists of different lengths, actions of another kind or out of range,
+    /// or a number that is not finite.
+    pub fn check(&self, header: &DemoHeader) -> Result<(), EpisodeFault> {
+        let steps = self.len();
+        let length = |what, found: usize, expected: usize| {
+            if found == expected { Ok(()) } else { Err(EpisodeFault::Length { what, found, expected, steps }) }
+        };
+        length("rewards", self.rewards.len(), steps)?;
+        length("deciders", self.deciders.len(), steps)?;
+        let width = header.observation_names.len();
+        length("observation values", self.observations.len(), steps.saturating_mul(width))?;
+        match (&self.actions, header.actions) {
+            (EpisodeActions::Discrete(actions), DemoActions::Discrete(count)) => {
+                length("actions", actions.len(), steps)?;
+                if let Some(step) = actions.iter().position(|&a| a as usize >= count) {
+                    return Err(EpisodeFault::ActionRange { step, action: actions[step], count });
+                }
+            }
+            (EpisodeActions::Continuous { dim, values }, DemoActions::Continuous(count)) if *dim == count => {
+                length("action values", values.len(), steps.saturating_mul(count))?;
+                finite("an action value", values, count)?;
+            }
+            (found, expected) => {
+                let found = match found {
+                    EpisodeActions::Discrete(_) => "discrete".to_owned(),
+                    EpisodeActions::Continuous { dim, .. } => DemoActions::Continuous(*dim).to_string(),
+                };
+                return Err(EpisodeFault::ActionKind { found, expected: expected.to_string() });
+            }
+        }
+        finite("the reward", &self.rewards, 1)?;
+        finite("an observation value", &self.observations, width)
+    }
+}
+
+/// Checks that all `values`, `width` of them per step, are finite.
+fn finite(what: &'static str, values: &[f32], width: usize) -> Result<(), EpisodeFault> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(EpisodeFault::NotFinite { what, step: at / width.max(1), value: values[at] }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> DemoHeader {
+        DemoHeader {
+            observation_names: vec!["x".into(), "y".into()],
+            ..DemoHeader::new("game", 1, "easy", 60.0, DemoActions::Discrete(4))
+        }
+    }
+
+    fn episode() -> DemoEpisode {
+        DemoEpisode {
+            actions: EpisodeActions::Discrete(vec![0, 3]),
+            rewards: vec![0.5, 10.0],
+            state_hashes: vec![1, 2],
+            deciders: vec![Decider::Human; 2],
+            end: DemoEnd::Terminated { success: true },
+            observations: vec![0.0, 1.0, 2.0, 3.0],
+            ..DemoEpisode::new(7, DemoActions::Discrete(4))
+        }
+    }
+
+    #[test]
+    fn a_sound_episode_passes() {
+        assert_eq!(episode().check(&header()), Ok(()));
+        assert_eq!((episode().len(), episode().episode_return(), episode().is_success()), (2, 10.5, true));
+        assert_eq!(DemoEpisode::new(7, DemoActions::Discrete(4)).check(&header()), Ok(()));
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        let text = |e: DemoEpisode| e.check(&header()).expect_err("faulty").to_string();
+        let mut e = episode();
+        e.rewards.pop();
+        assert_eq!(text(e), "1 rewards for 2 steps (expected 2)");
+        let mut e = episode();
+        e.actions = EpisodeActions::Discrete(vec![0, 4]);
+        assert_eq!(text(e), "action 4 at step 1 is out of range: the game has actions 0 to 3");
+        let mut e = episode();
+        e.actions = EpisodeActions::Continuous { dim: 1, values: vec![0.0; 2] };
+        assert_eq!(text(e), "the actions are continuous (1 dimensions), but the header says discrete (4 actions)");
+        let mut e = episode();
+        e.observations[3] = f32::NAN;
+        assert_eq!(text(e), "an observation value at step 1 is NaN, not a finite number");
+        let mut e = episode();
+        e.rewards[0] = f32::INFINITY;
+        assert_eq!(text(e), "the reward at step 0 is inf, not a finite number");
+        let mut e = episode();
+        e.observations.clear();
+        assert_eq!(text(e), "0 observation values for 2 steps (expected 4)");
+    }
+}

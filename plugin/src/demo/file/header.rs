@@ -1,0 +1,204 @@
+//! The header of a demonstration file: what was recorded, under which conditions.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::DemoFault;
+
+/// Format written by this version of the crate, and the newest one it reads.
+pub const DEMO_FORMAT: u32 = 1;
+
+/// The kind and number of actions of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DemoActions {
+    /// One of `n` actions per tick, numbered from 0.
+    Discrete(usize),
+    /// `n` numbers per tick.
+    Continuous(usize),
+}
+
+impl DemoActions {
+    /// Number of actions (discrete) or of dimensions (continuous).
+    pub fn count(self) -> usize {
+        match self {
+            Self::Discrete(n) | Self::Continuous(n) => n,
+        }
+    }
+}
+
+impl std::fmt::Display for DemoActions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Discrete(n) => write!(f, "discrete ({n} actions)"),
+            Self::Continuous(n) => write!(f, "continuous ({n} dimensions)"),
+        }
+    }
+}
+
+/// What was recorded, under which conditions. Written as RON text at the top of the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DemoHeader {
+    /// Format of the file, see [`DEMO_FORMAT`].
+    pub format: u32,
+    /// Name of the game.
+    pub game: String,
+    /// Version of the game's rules: a recording replays only with the version that made it.
+    pub game_version: u32,
+    /// Mode (or difficulty) of the game.
+    pub mode: String,
+    /// Fixed ticks per second of game time.
+    pub tick_hz: f64,
+    /// Kind and number of actions.
+    pub actions: DemoActions,
+    /// Names of the observation values kept for each tick; empty when observations are not kept.
+    pub observation_names: Vec<String>,
+    /// Who played: a person's nickname, or the name of a bot.
+    pub demonstrator: String,
+    /// Noise that was added to the demonstrator's actions: the share of random actions (discrete),
+    /// or the standard deviation (continuous); 0 for none.
+    pub action_noise: f64,
+    /// Anything worth knowing, for people.
+    pub note: String,
+}
+
+impl DemoHeader {
+    /// A header in the current format, without observations, noise or a note.
+    pub fn new(game: &str, game_version: u32, mode: &str, tick_hz: f64, actions: DemoActions) -> Self {
+        Self {
+            format: DEMO_FORMAT,
+            game: game.to_owned(),
+            game_version,
+            mode: mode.to_owned(),
+            tick_hz,
+            actions,
+            observation_names: Vec::new(),
+            demonstrator: String::new(),
+            action_noise: 0.0,
+            note: String::new(),
+        }
+    }
+
+    /// Checks the values.
+    ///
+    /// # Errors
+    ///
+    /// [`DemoFault::NewerFormat`] or [`DemoFault::HeaderValue`].
+    pub fn check(&self) -> Result<(), DemoFault> {
+        let refuse = |field, why: String| Err(DemoFault::HeaderValue { field, why });
+        if self.format > DEMO_FORMAT {
+            return Err(DemoFault::NewerFormat { found: self.format, newest: DEMO_FORMAT });
+        }
+        if self.format == 0 {
+            return refuse("format", "there is no format 0".to_owned());
+        }
+        if self.game.is_empty() {
+            return refuse("game", "the name is empty".to_owned());
+        }
+        if !(self.tick_hz.is_finite() && self.tick_hz > 0.0) {
+            return refuse("tick_hz", format!("{} is not a positive number of ticks per second", self.tick_hz));
+        }
+        if !(self.action_noise.is_finite() && self.action_noise >= 0.0) {
+            return refuse("action_noise", format!("{} is neither 0 nor a positive number", self.action_noise));
+        }
+        // Counts are stored in 32 bits, and discrete actions are `u32`.
+        if self.actions.count() == 0 || self.actions.count() > u32::MAX as usize {
+            return refuse("actions", format!("{} cannot be played", self.actions));
+        }
+        Ok(())
+    }
+
+    /// Checks that the recording is of the given game, version and mode (`None`: any mode).
+    ///
+    /// # Errors
+    ///
+    /// [`DemoFault::ForeignGame`], [`DemoFault::ForeignVersion`] or [`DemoFault::ForeignMode`].
+    pub fn check_game(&self, game: &str, game_version: u32, mode: Option<&str>) -> Result<(), DemoFault> {
+        if self.game != game {
+            return Err(DemoFault::ForeignGame { found: self.game.clone(), expected: game.to_owned() });
+        }
+        if self.game_version != game_version {
+            return Err(DemoFault::ForeignVersion {
+                game: self.game.clone(),
+                found: self.game_version,
+                expected: game_version,
+            });
+        }
+        match mode {
+            Some(expected) if self.mode != expected => Err(DemoFault::ForeignMode {
+                game: self.game.clone(),
+                found: self.mode.clone(),
+                expected: expected.to_owned(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that episodes recorded under `wanted` may follow those in a file with this header.
+    /// Every field must agree except `note`; the note of the file stays.
+    ///
+    /// # Errors
+    ///
+    /// [`DemoFault::HeaderDiffers`] names the first field that does not agree.
+    pub fn check_append(&self, wanted: &Self) -> Result<(), DemoFault> {
+        fn same<T: PartialEq + std::fmt::Debug>(field: &'static str, found: &T, wanted: &T) -> Result<(), DemoFault> {
+            if found == wanted {
+                return Ok(());
+            }
+            Err(DemoFault::HeaderDiffers { field, found: format!("{found:?}"), wanted: format!("{wanted:?}") })
+        }
+        same("format", &self.format, &wanted.format)?;
+        same("game", &self.game, &wanted.game)?;
+        same("game_version", &self.game_version, &wanted.game_version)?;
+        same("mode", &self.mode, &wanted.mode)?;
+        same("tick_hz", &self.tick_hz, &wanted.tick_hz)?;
+        same("actions", &self.actions, &wanted.actions)?;
+        same("observation_names", &self.observation_names, &wanted.observation_names)?;
+        same("demonstrator", &self.demonstrator, &wanted.demonstrator)?;
+        same("action_noise", &self.action_noise, &wanted.action_noise)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> DemoHeader {
+        DemoHeader::new("coinrun", 3, "easy", 60.0, DemoActions::Discrete(15))
+    }
+
+    #[test]
+    fn values_are_checked() {
+        assert!(header().check().is_ok());
+        for (field, header) in [
+            ("game", DemoHeader { game: String::new(), ..header() }),
+            ("tick_hz", DemoHeader { tick_hz: 0.0, ..header() }),
+            ("tick_hz", DemoHeader { tick_hz: f64::NAN, ..header() }),
+            ("action_noise", DemoHeader { action_noise: f64::INFINITY, ..header() }),
+            ("actions", DemoHeader { actions: DemoActions::Continuous(0), ..header() }),
+            ("format", DemoHeader { format: 0, ..header() }),
+        ] {
+            let error = header.check().expect_err(field);
+            assert!(matches!(error, DemoFault::HeaderValue { field: f, .. } if f == field), "{error}");
+        }
+    }
+
+    #[test]
+    fn foreign_recordings_are_named() {
+        assert!(header().check_game("coinrun", 3, Some("easy")).is_ok());
+        assert!(header().check_game("coinrun", 3, None).is_ok());
+        let text = |r: Result<(), DemoFault>| r.expect_err("foreign").to_string();
+        assert!(text(header().check_game("maze", 3, None)).contains("the game `coinrun`, not of `maze`"));
+        assert!(
+            text(header().check_game("coinrun", 4, None)).contains("version 3 of `coinrun`, but this is version 4")
+        );
+        assert!(text(header().check_game("coinrun", 3, Some("hard"))).contains("mode `easy`"));
+    }
+
+    #[test]
+    fn only_the_note_may_differ_when_appending() {
+        assert!(header().check_append(&DemoHeader { note: "later".into(), ..header() }).is_ok());
+        let other = DemoHeader { demonstrator: "ada".into(), ..header() };
+        let text = header().check_append(&other).expect_err("other player").to_string();
+        assert_eq!(text, "cannot append: `demonstrator` is \"\" in the file, but \"ada\" is being recorded");
+    }
+}

@@ -1,0 +1,51 @@
+//! The demonstration file: recorded episodes on disk.
+//!
+//! A file begins as text, so `head` shows what it holds, and goes on with one frame per episode:
+//!
+//! ```text
+//! playbot-demo header=00000214 crc32=5d3a90c1     magic line: length and checksum of the header
+//! (
+//!     format: 1,                                  header, RON: see DemoHeader
+//!     game: "coinrun",
+//!     …
+//! )
+//! FE 45 50 FF | length | payload | CRC-32         a frame: see DemoEpisode
+//! FE 45 50 FF | length | payload | CRC-32
+//! ```
+//!
+//! - Files only grow. [`DemoWriter::push`] writes one frame with a single write and waits for the disk:
+//!   whatever happens, the episodes before it stay.
+//! - Nothing is believed unchecked. [`DemoReader`] gives an episode out only when its checksum holds,
+//!   its lists agree in length, its actions are in range and its numbers are finite.
+//! - A damaged file is an error that says where. [`repair`](repair()) recovers every sound episode, also behind
+//!   the damage.
+//! - A tick of a game with at most 256 actions takes about 5 bytes: the action and the state hash.
+//!   Rewards and deciders are stored as runs.
+
+mod bytes;
+mod episode;
+mod error;
+mod find;
+mod frame;
+mod header;
+mod payload;
+mod preamble;
+mod reader;
+mod repair;
+mod store;
+mod summary;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions};
+pub use error::{DemoFault, DemoFileError, EpisodeFault};
+pub use find::find_demos;
+pub use header::{DEMO_FORMAT, DemoActions, DemoHeader};
+pub use preamble::DEMO_MAGIC;
+pub use reader::DemoReader;
+pub use repair::{DroppedRegion, RepairReport, repair, repair_with_header};
+pub use summary::DemoSummary;
+pub use writer::DemoWriter;

@@ -1,0 +1,128 @@
+//! The bytes of one episode inside its frame.
+//!
+//! | Field | Coding |
+//! |---|---|
+//! | steps | `u32` |
+//! | state hashes | `steps` × `u32` |
+//! | level seed | `u64` |
+//! | end | `u8`: 0 terminated without, 1 with success, 2 truncated, 3 aborted |
+//! | kind of actions | `u8`: 1, 2 or 4 bytes for a discrete action; 0 for continuous ones, then `u32` dimensions |
+//! | actions | discrete: list; continuous: `steps` × dimensions × `f32` |
+//! | rewards | list of `f32` |
+//! | deciders | list of `u8`: 0 human, 1 bot, 2 policy, 3 replay, 4 idle |
+//! | observation width | `u32` |
+//! | observations | `steps` × width × `f32` |
+//!
+//! All numbers are little-endian. A list is one byte and then either the plain values (byte 0) or runs
+//! of a count (seven bits a byte, lowest first) and a value (byte 1), whichever is shorter.
+//! The hashes come first: they bound the number of steps by the size of the frame.
+
+use super::bytes::{Cursor, malformed, put_list, put_plain};
+use super::episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions};
+use super::error::EpisodeFault;
+use super::header::{DemoActions, DemoHeader};
+
+/// Appends the episode to `out`, after [`DemoEpisode::check`] against the header.
+pub(super) fn encode(episode: &DemoEpisode, header: &DemoHeader, out: &mut Vec<u8>) -> Result<(), EpisodeFault> {
+    episode.check(header)?;
+    let steps = u32::try_from(episode.len()).map_err(|_| malformed("more steps than 32 bits count"))?;
+    put_plain(&[steps], out);
+    put_plain(&episode.state_hashes, out);
+    put_plain(&[episode.level_seed], out);
+    out.push(match episode.end {
+        DemoEnd::Terminated { success: false } => 0,
+        DemoEnd::Terminated { success: true } => 1,
+        DemoEnd::Truncated => 2,
+        DemoEnd::Aborted => 3,
+    });
+    match &episode.actions {
+        EpisodeActions::Discrete(actions) => {
+            // The actions were checked to be below the header's count, so the casts lose nothing.
+            let size = action_size(header.actions);
+            out.push(size);
+            match size {
+                1 => put_list(&actions.iter().map(|&a| a as u8).collect::<Vec<_>>(), out),
+                2 => put_list(&actions.iter().map(|&a| a as u16).collect::<Vec<_>>(), out),
+                _ => put_list(actions, out),
+            }
+        }
+        EpisodeActions::Continuous { dim, values } => {
+            out.push(0);
+            put_plain(&[*dim as u32], out);
+            put_plain(values, out);
+        }
+    }
+    put_list(&episode.rewards, out);
+    put_list(&episode.deciders.iter().map(|&d| decider_code(d)).collect::<Vec<_>>(), out);
+    put_plain(&[header.observation_names.len() as u32], out);
+    put_plain(&episode.observations, out);
+    Ok(())
+}
+
+/// Reads an episode and checks it against the header.
+pub(super) fn decode(payload: &[u8], header: &DemoHeader) -> Result<DemoEpisode, EpisodeFault> {
+    let mut cursor = Cursor(payload);
+    let steps = cursor.scalar::<u32>("the number of steps")? as usize;
+    let state_hashes = cursor.plain(steps, "state hashes")?;
+    let level_seed = cursor.scalar("the level seed")?;
+    let end = match cursor.scalar::<u8>("the end reason")? {
+        0 => DemoEnd::Terminated { success: false },
+        1 => DemoEnd::Terminated { success: true },
+        2 => DemoEnd::Truncated,
+        3 => DemoEnd::Aborted,
+        other => return Err(malformed(format!("unknown end reason {other}"))),
+    };
+    let actions = match cursor.scalar::<u8>("the kind of actions")? {
+        0 => {
+            let dim = cursor.scalar::<u32>("the number of dimensions")? as usize;
+            let count = steps.checked_mul(dim).ok_or_else(|| malformed("too many action values"))?;
+            EpisodeActions::Continuous { dim, values: cursor.plain(count, "action values")? }
+        }
+        1 => EpisodeActions::Discrete(cursor.list::<u8>(steps, "actions")?.into_iter().map(u32::from).collect()),
+        2 => EpisodeActions::Discrete(cursor.list::<u16>(steps, "actions")?.into_iter().map(u32::from).collect()),
+        4 => EpisodeActions::Discrete(cursor.list(steps, "actions")?),
+        other => return Err(malformed(format!("unknown kind of actions {other}"))),
+    };
+    let rewards = cursor.list(steps, "rewards")?;
+    let deciders = cursor.list(steps, "deciders")?.into_iter().map(decider).collect::<Result<_, _>>()?;
+    let width = cursor.scalar::<u32>("the observation width")? as usize;
+    let count = steps.checked_mul(width).ok_or_else(|| malformed("too many observation values"))?;
+    let observations = cursor.plain(count, "observation values")?;
+    if !cursor.0.is_empty() {
+        return Err(malformed(format!("{} bytes after the last field", cursor.0.len())));
+    }
+    let episode = DemoEpisode { level_seed, actions, rewards, state_hashes, deciders, end, observations };
+    episode.check(header)?;
+    Ok(episode)
+}
+
+/// Bytes of a discrete action; 0 for continuous ones.
+fn action_size(actions: DemoActions) -> u8 {
+    match actions {
+        DemoActions::Discrete(0..=0x100) => 1,
+        DemoActions::Discrete(0x101..=0x1_0000) => 2,
+        DemoActions::Discrete(_) => 4,
+        DemoActions::Continuous(_) => 0,
+    }
+}
+
+fn decider_code(decider: Decider) -> u8 {
+    match decider {
+        Decider::Human => 0,
+        Decider::Bot => 1,
+        Decider::Policy => 2,
+        Decider::Replay => 3,
+        Decider::Idle => 4,
+    }
+}
+
+fn decider(code: u8) -> Result<Decider, EpisodeFault> {
+    Ok(match code {
+        0 => Decider::Human,
+        1 => Decider::Bot,
+        2 => Decider::Policy,
+        3 => Decider::Replay,
+        4 => Decider::Idle,
+        other => return Err(malformed(format!("unknown decider {other}"))),
+    })
+}

@@ -1,0 +1,187 @@
+//! The text at the top of the file: one magic line, then the header as RON.
+//!
+//! ```text
+//! playbot-demo header=00000214 crc32=5d3a90c1
+//! (
+//!     format: 1,
+//!     game: "coinrun",
+//!     …
+//! )
+//! ```
+//!
+//! The magic line gives the length of the RON text in bytes and its CRC-32. It stays the same in all
+//! formats, so that an older program can say that a file is too new for it.
+
+use std::io::Read;
+
+use serde::Deserialize;
+
+use super::error::DemoFault;
+use super::header::{DEMO_FORMAT, DemoHeader};
+
+/// How every demonstration file begins.
+pub const DEMO_MAGIC: &str = "playbot-demo ";
+/// Length of the magic line in bytes, with its line feed.
+const LINE_LENGTH: usize = "playbot-demo header=00000000 crc32=00000000\n".len();
+/// Longest header that is read, in bytes; it guards the memory against a damaged length.
+const MAX_HEADER: usize = 1 << 20;
+
+/// The only field that is read before the format is known.
+#[derive(Deserialize)]
+struct FormatOnly {
+    format: u32,
+}
+
+fn magic_line(length: usize, crc: u32) -> String {
+    format!("{DEMO_MAGIC}header={length:08} crc32={crc:08x}\n")
+}
+
+/// The bytes at the top of a file with this header.
+pub(super) fn encode(header: &DemoHeader) -> Result<Vec<u8>, DemoFault> {
+    header.check()?;
+    let pretty = ron::ser::PrettyConfig::new().new_line("\n");
+    let mut text = ron::ser::to_string_pretty(header, pretty)
+        .map_err(|e| DemoFault::HeaderValue { field: "header", why: e.to_string() })?;
+    text.push('\n');
+    if text.len() > MAX_HEADER {
+        let why = format!("{} bytes of text, but at most {MAX_HEADER} are read back", text.len());
+        return Err(DemoFault::HeaderValue { field: "header", why });
+    }
+    let mut bytes = magic_line(text.len(), crc32fast::hash(text.as_bytes())).into_bytes();
+    bytes.extend_from_slice(text.as_bytes());
+    Ok(bytes)
+}
+
+/// Reads the header from the start of a file. Returns it with the offset of the first frame.
+pub(super) fn decode(mut input: impl Read) -> Result<(DemoHeader, u64), DemoFault> {
+    let line = read_up_to(&mut input, LINE_LENGTH)?;
+    let magic = &line[..line.len().min(DEMO_MAGIC.len())];
+    if !DEMO_MAGIC.as_bytes().starts_with(magic) {
+        return Err(DemoFault::NotADemo { found: magic.escape_ascii().to_string() });
+    }
+    if line.len() < LINE_LENGTH {
+        return Err(DemoFault::TruncatedHeader { length: line.len() as u64 });
+    }
+    let (length, crc) = parse_line(&line)?;
+    let text = read_up_to(&mut input, length)?;
+    if text.len() < length {
+        return Err(DemoFault::TruncatedHeader { length: (LINE_LENGTH + text.len()) as u64 });
+    }
+    let intact = crc32fast::hash(&text) == crc;
+    let parsed = parse_text(&text, intact);
+    // A damaged header that still parses must not be taken at its word.
+    if parsed.is_ok() && !intact {
+        return Err(DemoFault::HeaderChecksum);
+    }
+    let header = parsed?;
+    header.check()?;
+    Ok((header, (LINE_LENGTH + length) as u64))
+}
+
+fn read_up_to(input: &mut impl Read, length: usize) -> Result<Vec<u8>, DemoFault> {
+    let mut bytes = Vec::new();
+    input.take(length as u64).read_to_end(&mut bytes).map_err(DemoFault::io("read the header"))?;
+    Ok(bytes)
+}
+
+fn parse_line(line: &[u8]) -> Result<(usize, u32), DemoFault> {
+    let refuse = |why| DemoFault::HeaderLine { found: line.trim_ascii_end().escape_ascii().to_string(), why };
+    let parsed = std::str::from_utf8(line).ok().and_then(|text| {
+        let rest = text.strip_prefix(DEMO_MAGIC)?.strip_prefix("header=")?.strip_suffix('\n')?;
+        let (length, crc) = rest.split_once(" crc32=")?;
+        Some((length.parse::<usize>().ok()?, u32::from_str_radix(crc, 16).ok()?))
+    });
+    let (length, crc) = parsed.ok_or_else(|| refuse("expected `header=<8 digits> crc32=<8 hex digits>`"))?;
+    if magic_line(length, crc).as_bytes() != line {
+        return Err(refuse("expected `header=<8 digits> crc32=<8 hex digits>`"));
+    }
+    if length > MAX_HEADER {
+        return Err(refuse("the header is longer than any header"));
+    }
+    Ok((length, crc))
+}
+
+fn parse_text(text: &[u8], intact: bool) -> Result<DemoHeader, DemoFault> {
+    let syntax = |e: ron::error::SpannedError| DemoFault::HeaderSyntax {
+        // Line 1 of the file is the magic line.
+        line: e.span.start.line + 1,
+        column: e.span.start.col,
+        message: e.code.to_string(),
+    };
+    if intact
+        && let Ok(FormatOnly { format }) = ron::de::from_bytes(text)
+        && format > DEMO_FORMAT
+    {
+        return Err(DemoFault::NewerFormat { found: format, newest: DEMO_FORMAT });
+    }
+    ron::de::from_bytes(text).map_err(syntax)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::header::DemoActions;
+    use super::*;
+
+    fn header() -> DemoHeader {
+        DemoHeader {
+            observation_names: vec!["x".into(), "y \"quoted\"\n".into()],
+            demonstrator: "Zoë".into(),
+            ..DemoHeader::new("coinrun", 3, "easy", 60.0, DemoActions::Discrete(15))
+        }
+    }
+
+    fn with_text(text: &str) -> Vec<u8> {
+        let mut bytes = magic_line(text.len(), crc32fast::hash(text.as_bytes())).into_bytes();
+        bytes.extend_from_slice(text.as_bytes());
+        bytes
+    }
+
+    #[test]
+    fn the_text_reads_back_and_is_for_people() {
+        let bytes = encode(&header()).expect("valid");
+        let text = std::str::from_utf8(&bytes).expect("text");
+        assert!(text.starts_with("playbot-demo header="), "{text}");
+        assert!(text.contains("\n    game: \"coinrun\",\n"), "{text}");
+        assert!(text.contains("\n    actions: Discrete(15),\n"), "{text}");
+        let (back, offset) = decode(bytes.as_slice()).expect("reads back");
+        assert_eq!((back, offset), (header(), bytes.len() as u64));
+    }
+
+    #[test]
+    fn a_syntax_error_names_its_line_in_the_file() {
+        let text = "(\n    format: 1,\n    game: ,\n)\n";
+        match decode(with_text(text).as_slice()).expect_err("syntax") {
+            DemoFault::HeaderSyntax { line: 4, column, .. } => assert!((10..=11).contains(&column), "{column}"),
+            other => panic!("{other}"),
+        }
+        let unknown = String::from_utf8(encode(&header()).expect("valid")[LINE_LENGTH..].to_vec())
+            .expect("text")
+            .replace("note:", "nota:");
+        let error = decode(with_text(&unknown).as_slice()).expect_err("unknown field").to_string();
+        assert!(error.contains("nota"), "{error}");
+    }
+
+    #[test]
+    fn a_newer_format_is_said_even_when_its_fields_are_unknown() {
+        let error = decode(with_text("(format: 2, sound: [1, 2])").as_slice()).expect_err("newer");
+        assert!(matches!(error, DemoFault::NewerFormat { found: 2, newest: 1 }), "{error}");
+    }
+
+    #[test]
+    fn an_edited_header_is_refused() {
+        let text = String::from_utf8(encode(&header()).expect("valid")).expect("text");
+        let edited = text.replace("coinrun", "coinrum");
+        assert!(matches!(decode(edited.as_bytes()), Err(DemoFault::HeaderChecksum)));
+    }
+
+    #[test]
+    fn other_files_and_cut_files_are_told_apart() {
+        assert!(
+            matches!(decode(b"PK\x03\x04".as_slice()), Err(DemoFault::NotADemo { found }) if found == "PK\\x03\\x04")
+        );
+        assert!(matches!(decode(b"".as_slice()), Err(DemoFault::TruncatedHeader { length: 0 })));
+        assert!(matches!(decode(b"playbot-de".as_slice()), Err(DemoFault::TruncatedHeader { length: 10 })));
+        let huge = b"playbot-demo header=99999999 crc32=00000000\n";
+        assert!(matches!(decode(huge.as_slice()), Err(DemoFault::HeaderLine { .. })));
+    }
+}

@@ -1,0 +1,255 @@
+//! Recovering what is sound in a damaged demonstration file.
+
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::error::{DemoFault, DemoFileError};
+use super::frame::{self, FRAME_EXTRA, FRAME_MAGIC, MAX_PAYLOAD};
+use super::header::DemoHeader;
+use super::{payload, preamble, store};
+
+/// A stretch of the input that holds no sound frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct DroppedRegion {
+    /// Where it begins, in bytes from the start of the input.
+    pub offset: u64,
+    /// Its length in bytes.
+    pub bytes: u64,
+}
+
+/// What [`repair`] kept and what it dropped.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RepairReport {
+    /// Episodes in the repaired file.
+    pub kept_episodes: usize,
+    /// Ticks in the repaired file.
+    pub kept_steps: usize,
+    /// Bytes of the input that were dropped: the sum over the regions.
+    pub dropped_bytes: u64,
+    /// Where bytes were dropped, in the order of the file.
+    pub dropped_regions: Vec<DroppedRegion>,
+    /// Where the damaged file was kept, when it was repaired in place.
+    pub backup: Option<PathBuf>,
+}
+
+/// Copies the header and every sound episode of `path` to `out`.
+///
+/// A frame is sound when its checksum holds and its episode fits the header. After a damaged frame the
+/// search goes on at the next frame magic, so episodes behind the damage are kept too.
+/// The result is written under a temporary name and then renamed. The input is not modified, unless
+/// `out` is the same file: then the damaged file is kept beside it as `FILE.bak` (or `FILE.bak2`, … if
+/// that exists), and a file without damage is left alone.
+///
+/// # Errors
+///
+/// When the header is not sound (see [`repair_with_header`]), when `out` is another file that exists
+/// ([`DemoFault::Exists`]), while another program records to the file that is repaired in place
+/// ([`DemoFault::Locked`]), or when reading or writing fails.
+pub fn repair(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RepairReport, DemoFileError> {
+    repair_inner(path.as_ref(), out.as_ref(), None)
+}
+
+/// Like [`repair`], for a file whose header is lost: `header` takes its place, and the whole file is
+/// searched for frames that fit it.
+///
+/// # Errors
+///
+/// Those of [`repair`], and [`DemoFault::HeaderValue`] when `header` itself is not valid.
+pub fn repair_with_header(
+    path: impl AsRef<Path>,
+    out: impl AsRef<Path>,
+    header: &DemoHeader,
+) -> Result<RepairReport, DemoFileError> {
+    repair_inner(path.as_ref(), out.as_ref(), Some(header))
+}
+
+fn repair_inner(path: &Path, out: &Path, header: Option<&DemoHeader>) -> Result<RepairReport, DemoFileError> {
+    let at_input = |fault| DemoFileError::new(path, fault);
+    let file = File::open(path).map_err(|e| at_input(DemoFault::io("open the file")(e)))?;
+    let in_place = match (fs::canonicalize(path), fs::canonicalize(out)) {
+        (Ok(a), Ok(b)) if a == b => true,
+        (_, Ok(_)) => return Err(DemoFileError::new(out, DemoFault::Exists)),
+        _ => false,
+    };
+    if in_place {
+        store::lock(&file).map_err(at_input)?;
+    }
+    let (input, mut output, header, start) = load(&file, header).map_err(at_input)?;
+    let mut report = salvage(&input, start, &header, &mut output);
+    if in_place {
+        if output == input {
+            return Ok(report);
+        }
+        let backup = keep_backup(path, &input);
+        report.backup = Some(backup.map_err(|e| at_input(DemoFault::io("keep a backup")(e)))?);
+    }
+    let temporary = beside(out, ".repairing");
+    let written = File::create(&temporary)
+        .and_then(|mut file| file.write_all(&output).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&temporary, out));
+    written.map_err(|source| {
+        let _ = fs::remove_file(&temporary);
+        DemoFileError::new(out, DemoFault::io("write the repaired file")(source))
+    })?;
+    Ok(report)
+}
+
+/// The bytes of the input, the start of the output, the header, and where frames may begin.
+fn load(mut file: &File, header: Option<&DemoHeader>) -> Result<(Vec<u8>, Vec<u8>, DemoHeader, usize), DemoFault> {
+    let mut input = Vec::new();
+    file.read_to_end(&mut input).map_err(DemoFault::io("read the file"))?;
+    if let Some(header) = header {
+        return Ok((input, preamble::encode(header)?, header.clone(), 0));
+    }
+    let (header, start) = preamble::decode(input.as_slice())?;
+    let start = start as usize;
+    let output = input[..start].to_vec();
+    Ok((input, output, header, start))
+}
+
+/// Appends every sound frame from `start` on to `output`.
+pub(super) fn salvage(input: &[u8], start: usize, header: &DemoHeader, output: &mut Vec<u8>) -> RepairReport {
+    let mut report = RepairReport::default();
+    let mut drop_region = |from: usize, to: usize| {
+        if from < to {
+            let region = DroppedRegion { offset: from as u64, bytes: (to - from) as u64 };
+            report.dropped_bytes += region.bytes;
+            report.dropped_regions.push(region);
+        }
+    };
+    let (mut at, mut sound_until) = (start, start);
+    let (mut episodes, mut steps) = (0, 0);
+    while let Some(found) = find_magic(&input[at..]) {
+        at += found;
+        let Some((frame, episode_steps)) = sound_frame(&input[at..], header) else {
+            at += 1;
+            continue;
+        };
+        drop_region(sound_until, at);
+        output.extend_from_slice(frame);
+        at += frame.len();
+        sound_until = at;
+        episodes += 1;
+        steps += episode_steps;
+    }
+    drop_region(sound_until, input.len());
+    RepairReport { kept_episodes: episodes, kept_steps: steps, ..report }
+}
+
+fn find_magic(bytes: &[u8]) -> Option<usize> {
+    bytes.windows(FRAME_MAGIC.len()).position(|w| w == FRAME_MAGIC)
+}
+
+/// The frame at the start of `bytes` and the steps of its episode, if all of it is sound.
+fn sound_frame<'a>(bytes: &'a [u8], header: &DemoHeader) -> Option<(&'a [u8], usize)> {
+    let length = frame::payload_length(bytes).filter(|&n| n <= MAX_PAYLOAD)?;
+    let frame = bytes.get(..length + FRAME_EXTRA)?;
+    let episode = payload::decode(frame::payload(frame)?, header).ok()?;
+    Some((frame, episode.len()))
+}
+
+/// Gives the file a second name, `FILE.bak`, without ever replacing a file.
+fn keep_backup(path: &Path, content: &[u8]) -> std::io::Result<PathBuf> {
+    let mut number = 1;
+    loop {
+        let backup = match number {
+            1 => beside(path, ".bak"),
+            _ => beside(path, &format!(".bak{number}")),
+        };
+        match fs::hard_link(path, &backup) {
+            Ok(()) => return Ok(backup),
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            // File systems without hard links.
+            Err(_) => {
+                let mut copy = File::create_new(&backup)?;
+                copy.write_all(content)?;
+                copy.sync_all()?;
+                return Ok(backup);
+            }
+        }
+    }
+}
+
+/// The path with something added to its file name.
+fn beside(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    PathBuf::from(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{episode, header, write};
+    use super::super::{DemoReader, DemoWriter};
+    use super::*;
+
+    fn seeds(path: &Path) -> Vec<u64> {
+        let episodes = DemoReader::open(path).and_then(DemoReader::read_all).expect("sound");
+        episodes.iter().map(|e| e.level_seed).collect()
+    }
+
+    #[test]
+    fn episodes_behind_the_damage_are_kept() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = write(folder.path(), "a.demo", &[episode(1, 9), episode(2, 9), episode(3, 9)]);
+        let mut bytes = fs::read(&path).expect("read");
+        let second = DemoReader::open(&path).map(|mut r| (r.next().is_some(), r.offset()).1).expect("opens");
+        bytes[second as usize + 30] ^= 0x10;
+        fs::write(&path, &bytes).expect("damaged");
+        let out = folder.path().join("b.demo");
+        let report = repair(&path, &out).expect("repaired");
+        assert_eq!(seeds(&out), [1, 3]);
+        assert_eq!(fs::read(&path).expect("read"), bytes, "the input is not touched");
+        let frame = frame::encode(&episode(2, 9), &header()).expect("valid").len() as u64;
+        let regions = vec![DroppedRegion { offset: second, bytes: frame }];
+        let expected = RepairReport {
+            kept_episodes: 2,
+            kept_steps: 18,
+            dropped_bytes: frame,
+            dropped_regions: regions,
+            backup: None,
+        };
+        assert_eq!(report, expected);
+        let error = repair(&path, &out).expect_err("the output exists");
+        assert!(matches!(error.fault, DemoFault::Exists), "{error}");
+    }
+
+    #[test]
+    fn repair_in_place_keeps_backups_and_allows_appending() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = write(folder.path(), "a.demo", &[episode(1, 5)]);
+        assert_eq!(repair(&path, &path).expect("nothing to do").backup, None);
+        for round in 1..=2 {
+            let torn = [fs::read(&path).expect("read"), FRAME_MAGIC.to_vec(), vec![9; 7]].concat();
+            fs::write(&path, &torn).expect("torn");
+            let error = DemoWriter::append(&path, &header()).expect_err("torn");
+            assert!(error.is_repairable() && error.to_string().contains("playbot demo repair FILE"), "{error}");
+            let report = repair(&path, &path).expect("repaired");
+            let backup = folder.path().join(if round == 1 { "a.demo.bak" } else { "a.demo.bak2" });
+            assert_eq!((report.kept_episodes, report.dropped_bytes), (round, 11));
+            assert_eq!(report.backup.as_deref(), Some(backup.as_path()));
+            assert_eq!(fs::read(backup).expect("kept"), torn);
+            let mut writer = DemoWriter::append(&path, &header()).expect("sound again");
+            writer.push(&episode(round as u64 + 1, 5)).expect("written");
+        }
+        assert_eq!(seeds(&path), [1, 2, 3]);
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 3, "no temporary file is left");
+    }
+
+    #[test]
+    fn a_lost_header_can_be_replaced() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = write(folder.path(), "a.demo", &[episode(1, 5), episode(2, 5)]);
+        let mut bytes = fs::read(&path).expect("read");
+        bytes[..20].fill(0);
+        fs::write(&path, &bytes).expect("damaged");
+        let out = folder.path().join("b.demo");
+        assert!(matches!(repair(&path, &out).expect_err("no header").fault, DemoFault::NotADemo { .. }));
+        let report = repair_with_header(&path, &out, &header()).expect("repaired");
+        assert_eq!((report.kept_episodes, report.dropped_regions.len()), (2, 1));
+        assert_eq!(seeds(&out), [1, 2]);
+    }
+}

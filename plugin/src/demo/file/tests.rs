@@ -1,0 +1,293 @@
+//! Whole files: round trips, cuts at every byte, flips of every bit, hostile lengths.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use proptest::prelude::*;
+
+use super::testing::{episode, header, write};
+use super::*;
+
+fn three(folder: &Path) -> (PathBuf, Vec<u8>, Vec<DemoEpisode>, Vec<u64>) {
+    let episodes = vec![episode(1, 6), episode(2, 1), episode(3, 9)];
+    let path = write(folder, "three.demo", &episodes);
+    let mut reader = DemoReader::open(&path).expect("sound");
+    let mut boundaries = vec![reader.offset()];
+    while reader.next().is_some_and(|e| e.is_ok()) {
+        boundaries.push(reader.offset());
+    }
+    let bytes = fs::read(&path).expect("read");
+    assert_eq!(boundaries.last(), Some(&(bytes.len() as u64)));
+    (path, bytes, episodes, boundaries)
+}
+
+/// Writes a file anew: some file systems wait for the disk when a file is overwritten.
+fn put(path: &Path, bytes: &[u8]) {
+    let _ = fs::remove_file(path);
+    fs::write(path, bytes).expect("written");
+}
+
+/// What `repair` writes and reports, without waiting for the disk.
+fn repair_in_memory(bytes: &[u8]) -> (Vec<u8>, RepairReport) {
+    let (header, start) = super::preamble::decode(bytes).expect("the header is sound");
+    let mut output = bytes[..start as usize].to_vec();
+    let report = super::repair::salvage(bytes, start as usize, &header, &mut output);
+    (output, report)
+}
+
+/// All whole episodes and, if there is one, the error behind them.
+fn read_lenient(path: &Path) -> Result<(Vec<DemoEpisode>, Option<DemoFileError>), DemoFileError> {
+    let (mut episodes, mut error) = (Vec::new(), None);
+    for item in DemoReader::open(path)? {
+        match item {
+            Ok(episode) => episodes.push(episode),
+            Err(e) => error = Some(e),
+        }
+    }
+    Ok((episodes, error))
+}
+
+#[test]
+fn a_cut_at_any_byte_costs_at_most_the_last_episode() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (_, bytes, episodes, boundaries) = three(folder.path());
+    let path = folder.path().join("cut.demo");
+    for cut in 0..bytes.len() {
+        put(&path, &bytes[..cut]);
+        let whole = boundaries.iter().filter(|&&b| b <= cut as u64).count();
+        let out = folder.path().join("repaired.demo");
+        if whole == 0 {
+            let error = read_lenient(&path).expect_err("no header");
+            assert!(matches!(error.fault, DemoFault::TruncatedHeader { length } if length == cut as u64), "{error}");
+            assert!(repair(&path, &out).is_err());
+            continue;
+        }
+        let (read, error) = read_lenient(&path).expect("the header is whole");
+        assert_eq!(read, episodes[..whole - 1], "cut at {cut}");
+        let torn = cut as u64 - boundaries[whole - 1];
+        match error.map(|e| e.fault) {
+            None => assert_eq!(torn, 0),
+            Some(DemoFault::TruncatedFrame { offset, episode, missing }) => {
+                assert_eq!((offset, episode), (boundaries[whole - 1], whole - 1));
+                // Until the length is on the disk, the file can only promise the smallest frame.
+                let expected = if torn < 8 { 12 - torn } else { boundaries[whole] - cut as u64 };
+                assert_eq!(missing, expected);
+            }
+            Some(other) => panic!("cut at {cut}: {other}"),
+        }
+        let (output, report) = repair_in_memory(&bytes[..cut]);
+        assert_eq!((report.kept_episodes, report.dropped_bytes), (whole - 1, torn));
+        assert_eq!(output, bytes[..boundaries[whole - 1] as usize]);
+        if cut % 50 == 0 {
+            assert_eq!(repair(&path, &out).expect("repaired"), report);
+            assert_eq!(fs::read(&out).expect("read"), output);
+            fs::remove_file(&out).expect("removed");
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_is_never_believed() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (_, bytes, episodes, boundaries) = three(folder.path());
+    let path = folder.path().join("flipped.demo");
+    let masks = [1u8, 2, 4, 8, 16, 32, 64, 128, 0xff];
+    for at in 0..bytes.len() {
+        let hit = boundaries.iter().filter(|&&b| b <= at as u64).count();
+        for mask in masks {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= mask;
+            put(&path, &flipped);
+            match read_lenient(&path) {
+                Err(error) => assert!(hit == 0 && !error.is_repairable(), "byte {at}: {error}"),
+                Ok((read, error)) => {
+                    let error = error.expect("damage is reported");
+                    assert!(hit > 0 && error.is_repairable(), "byte {at}: {error}");
+                    assert_eq!(read, episodes[..hit - 1], "byte {at}");
+                }
+            }
+            if hit > 0 && mask == 0xff {
+                let (output, report) = repair_in_memory(&flipped);
+                assert_eq!(report.kept_episodes, 2, "byte {at}");
+                put(&path, &output);
+                let (read, error) = read_lenient(&path).expect("sound");
+                assert!(error.is_none() && read.iter().all(|e| episodes.contains(e)), "byte {at}");
+            }
+        }
+    }
+}
+
+/// A frame with a sound checksum around any payload.
+fn sealed(payload: &[u8]) -> Vec<u8> {
+    let mut bytes = frame::FRAME_MAGIC.to_vec();
+    bytes.extend_from_slice(&(payload.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(payload);
+    let crc = crc32fast::hash(&bytes[4..]);
+    bytes.extend_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn hostile_lengths_and_values_are_errors() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (_, bytes, _, boundaries) = three(folder.path());
+    let preamble = &bytes[..boundaries[0] as usize];
+    let sound = &bytes[boundaries[0] as usize + 8..boundaries[1] as usize - 4];
+    let with = |at: usize, patch: &[u8]| {
+        let mut payload = sound.to_vec();
+        payload[at..at + patch.len()].copy_from_slice(patch);
+        sealed(&payload)
+    };
+    let path = folder.path().join("hostile.demo");
+    let end = 4 + 6 * 4 + 8;
+    let nan = f32::NAN.to_le_bytes();
+    let last = sound.len() - 4;
+    for (frame, words) in [
+        ([&frame::FRAME_MAGIC[..], &[0xff; 4], &[0; 64]].concat(), "is cut off"),
+        (sealed(&[0xff; 4]), "it ends inside state hashes"),
+        (sealed(&[]), "it ends inside the number of steps"),
+        (with(0, &u32::MAX.to_le_bytes()), "it ends inside state hashes"),
+        (with(end, &[9]), "unknown end reason 9"),
+        (with(end + 1, &[3]), "unknown kind of actions 3"),
+        (with(end + 1, &[0, 0xff, 0xff, 0xff, 0xff]), "it ends inside action values"),
+        (with(end + 2, &[7]), "unknown coding 7 of actions"),
+        (with(end + 3, &[4]), "action 4 at step 0 is out of range"),
+        (with(last, &nan), "an observation value at step 5 is NaN"),
+        (with(last - 4 * 12, &[0xff; 4]), "it ends inside observation values"),
+        (with(last - 4 * 12, &[1, 0, 0, 0]), "24 bytes after the last field"),
+        (sealed(&[sound, &[0]].concat()), "1 bytes after the last field"),
+    ] {
+        fs::write(&path, [preamble, &frame].concat()).expect("written");
+        let (read, error) = read_lenient(&path).expect("the header is sound");
+        let error = error.expect(words).to_string();
+        assert!(read.is_empty() && error.contains(words), "{error} should say: {words}");
+        assert!(error.contains("episode 0"), "{error}");
+        let out = folder.path().join("repaired.demo");
+        assert_eq!(repair(&path, &out).expect("repaired").kept_episodes, 0);
+        fs::remove_file(out).expect("removed");
+    }
+}
+
+#[test]
+fn appending_goes_on_where_the_file_ended() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = write(folder.path(), "a.demo", &[episode(1, 3)]);
+    let exists = DemoWriter::create(&path, header()).expect_err("exists");
+    assert!(matches!(exists.fault, DemoFault::Exists), "{exists}");
+    {
+        let mut writer = DemoWriter::append(&path, &header()).expect("opened");
+        assert_eq!(writer.episodes(), 1);
+        let busy = DemoWriter::append(&path, &header()).expect_err("locked");
+        assert!(matches!(busy.fault, DemoFault::Locked), "{busy}");
+        assert!(matches!(DemoWriter::replace(&path, header()).expect_err("locked").fault, DemoFault::Locked));
+        writer.push(&episode(2, 3)).expect("written");
+        assert_eq!(writer.bytes(), fs::metadata(&path).expect("exists").len());
+    }
+    let other = DemoHeader { game_version: 9, ..header() };
+    let error = DemoWriter::append(&path, &other).expect_err("another version");
+    assert!(error.to_string().ends_with("`game_version` is 2 in the file, but 9 is being recorded"), "{error}");
+    assert_eq!(read_lenient(&path).expect("sound").0, [episode(1, 3), episode(2, 3)]);
+    drop(DemoWriter::replace(&path, header()).expect("replaced"));
+    assert!(read_lenient(&path).expect("sound").0.is_empty());
+    let foreign = DemoReader::open_for_game(&path, "coinrun", 2, None).expect_err("another game");
+    assert!(foreign.to_string().contains("a.demo: a recording of the game `walk`, not of `coinrun`"), "{foreign}");
+    assert!(DemoReader::open_for_game(&path, "walk", 2, Some("easy")).is_ok());
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let missing = folder.path().join("missing").join("a.demo");
+    let error = DemoWriter::create(&missing, header()).expect_err("no folder");
+    assert!(error.to_string().contains("a.demo: cannot create the file: "), "{error}");
+    let error = DemoWriter::append(&missing, &header()).expect_err("no file");
+    assert!(matches!(error.fault, DemoFault::Io { action: "open the file", .. }), "{error}");
+    assert!(DemoReader::open(folder.path()).is_err(), "a folder is not a file");
+    let file = write(folder.path(), "a.demo", &[]);
+    assert!(DemoWriter::create(file.join("b.demo"), header()).is_err());
+    assert!(repair(&file, missing).is_err());
+}
+
+#[test]
+fn a_tick_takes_about_five_bytes() {
+    let steps = 1000;
+    let header = DemoHeader::new("coinrun", 1, "easy", 60.0, DemoActions::Discrete(15));
+    let mut bytes = 0;
+    for seed in 0..100 {
+        let mut one = episode(seed, steps);
+        one.actions =
+            EpisodeActions::Discrete((0..steps as u32).map(|t| t.wrapping_mul(2_654_435_761) >> 7 & 7).collect());
+        one.observations.clear();
+        bytes += frame::encode(&one, &header).expect("valid").len();
+    }
+    assert!(bytes <= 510_000, "100,000 steps take {bytes} bytes");
+}
+
+prop_compose! {
+    fn any_episode(actions: DemoActions, width: usize)(steps in 0usize..40)(
+        level_seed in any::<u64>(),
+        discrete in prop::collection::vec(0..actions.count().min(u32::MAX as usize) as u32, steps),
+        values in prop::collection::vec(-1e6f32..1e6, steps * actions.count().min(8)),
+        rewards in prop::collection::vec(prop_oneof![4 => Just(0.0f32), 1 => any::<f32>().prop_filter("finite", |v| v.is_finite())], steps),
+        state_hashes in prop::collection::vec(any::<u32>(), steps),
+        deciders in prop::collection::vec(prop_oneof![
+            Just(Decider::Human), Just(Decider::Bot), Just(Decider::Policy), Just(Decider::Replay), Just(Decider::Idle)
+        ], steps),
+        end in prop_oneof![
+            any::<bool>().prop_map(|success| DemoEnd::Terminated { success }), Just(DemoEnd::Truncated), Just(DemoEnd::Aborted)
+        ],
+        observations in prop::collection::vec(-1e6f32..1e6, steps * width),
+    ) -> DemoEpisode {
+        let actions = match actions {
+            DemoActions::Discrete(_) => EpisodeActions::Discrete(discrete),
+            DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values },
+        };
+        DemoEpisode { level_seed, actions, rewards, state_hashes, deciders, end, observations }
+    }
+}
+
+fn any_recording() -> impl Strategy<Value = (DemoHeader, Vec<DemoEpisode>)> {
+    let kinds = prop_oneof![
+        (1usize..300).prop_map(DemoActions::Discrete),
+        (65_000usize..66_000).prop_map(DemoActions::Discrete),
+        (1usize..4).prop_map(DemoActions::Continuous),
+    ];
+    (kinds, 0usize..3, ".{1,12}", any::<u32>(), 1e-3f64..1e4, ".{0,20}").prop_flat_map(
+        |(actions, width, game, game_version, tick_hz, note)| {
+            let header = DemoHeader {
+                observation_names: (0..width).map(|i| format!("{note} {i}")).collect(),
+                note,
+                ..DemoHeader::new(&game, game_version, "any \"mode\"", tick_hz, actions)
+            };
+            (Just(header), prop::collection::vec(any_episode(actions, width), 0..4))
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn what_is_written_reads_back((header, episodes) in any_recording()) {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("any.demo");
+        let mut writer = DemoWriter::create(&path, header.clone()).expect("created");
+        for episode in &episodes {
+            writer.push(episode).expect("written");
+        }
+        let reader = DemoReader::open(&path).expect("sound");
+        prop_assert_eq!(reader.header(), &header);
+        prop_assert_eq!(reader.read_all().expect("sound"), episodes);
+    }
+
+    #[test]
+    fn arbitrary_payloads_never_panic(payload in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = super::payload::decode(&payload, &header());
+    }
+
+    #[test]
+    fn arbitrary_files_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = super::preamble::decode(bytes.as_slice());
+        let _ = super::preamble::decode([DEMO_MAGIC.as_bytes(), &bytes].concat().as_slice());
+    }
+}

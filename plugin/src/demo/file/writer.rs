@@ -1,0 +1,250 @@
+//! Writing demonstration files, one whole episode at a time.
+
+use std::fs::OpenOptions;
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use super::episode::DemoEpisode;
+use super::error::{DemoFault, DemoFileError};
+use super::header::DemoHeader;
+use super::reader::DemoReader;
+use super::store::{Store, lock};
+use super::{frame, preamble};
+
+/// Appends episodes to a demonstration file.
+///
+/// Each [`push`](Self::push) writes one frame with a single write and waits until it is on the disk: a
+/// crash costs at most the episode that is being written. While a writer lives, the file is locked
+/// against other writers.
+pub struct DemoWriter {
+    path: PathBuf,
+    header: DemoHeader,
+    store: Box<dyn Store>,
+    /// Length of the file up to the last whole frame.
+    length: u64,
+    episodes: usize,
+    torn: bool,
+}
+
+impl std::fmt::Debug for DemoWriter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("DemoWriter")
+            .field("path", &self.path)
+            .field("length", &self.length)
+            .field("episodes", &self.episodes)
+            .finish_non_exhaustive()
+    }
+}
+
+impl DemoWriter {
+    /// Creates a file and writes its header.
+    ///
+    /// # Errors
+    ///
+    /// [`DemoFault::Exists`] when there is a file already (it is left alone), [`DemoFault::HeaderValue`]
+    /// for a header that could not be read back, or [`DemoFault::Io`].
+    pub fn create(path: impl AsRef<Path>, header: DemoHeader) -> Result<Self, DemoFileError> {
+        let path = path.as_ref();
+        Self::start(path, header, OpenOptions::new().write(true).create_new(true)).inspect_err(|error| {
+            // A file without a header would be in the way of the next attempt.
+            if matches!(error.fault, DemoFault::Io { action: "write the header", .. }) {
+                let _ = std::fs::remove_file(path);
+            }
+        })
+    }
+
+    /// Like [`create`](Self::create), but replaces a file that exists: its episodes are lost.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`create`](Self::create) except [`DemoFault::Exists`], and [`DemoFault::Locked`] while
+    /// another program records to the file.
+    pub fn replace(path: impl AsRef<Path>, header: DemoHeader) -> Result<Self, DemoFileError> {
+        // The old content goes only once the file is known to be ours: see `start`.
+        Self::start(path.as_ref(), header, OpenOptions::new().write(true).create(true).truncate(false))
+    }
+
+    fn start(path: &Path, header: DemoHeader, options: &OpenOptions) -> Result<Self, DemoFileError> {
+        let attempt = || {
+            let bytes = preamble::encode(&header)?;
+            let mut file = options.open(path).map_err(|source| match source.kind() {
+                io::ErrorKind::AlreadyExists => DemoFault::Exists,
+                _ => DemoFault::Io { action: "create the file", source },
+            })?;
+            lock(&file)?;
+            if file.metadata().is_ok_and(|m| m.len() > 0) {
+                file.set_len(0).map_err(DemoFault::io("empty the file"))?;
+            }
+            file.write_all(&bytes).and_then(|()| file.sync()).map_err(DemoFault::io("write the header"))?;
+            Ok((file, bytes.len() as u64))
+        };
+        let (file, length) = attempt().map_err(|fault: DemoFault| DemoFileError::new(path, fault))?;
+        Ok(Self { path: path.to_owned(), header, store: Box::new(file), length, episodes: 0, torn: false })
+    }
+
+    /// Opens an existing file to record more episodes under the same conditions.
+    ///
+    /// The whole file is read and checked first. The header of the file stays as it is.
+    ///
+    /// # Errors
+    ///
+    /// [`DemoFault::HeaderDiffers`] when `header` is not that of the file (only the note may differ),
+    /// [`DemoFault::Locked`], or what [`DemoReader`] finds: a damaged file is repaired first, see
+    /// [`repair`](super::repair::repair).
+    pub fn append(path: impl AsRef<Path>, header: &DemoHeader) -> Result<Self, DemoFileError> {
+        let path = path.as_ref();
+        let fault = |fault| DemoFileError::new(path, fault);
+        let open = || {
+            let file = OpenOptions::new().read(true).write(true).open(path);
+            let file = file.map_err(DemoFault::io("open the file"))?;
+            lock(&file)?;
+            let same_file = file.try_clone().map_err(DemoFault::io("open the file"))?;
+            Ok((file, DemoReader::from_file(path, same_file)?))
+        };
+        // The reader shares the handle: a lock may keep others from reading.
+        let (mut file, mut reader) = open().map_err(fault)?;
+        reader.header().check_append(header).map_err(fault)?;
+        for episode in reader.by_ref() {
+            episode?;
+        }
+        file.seek(SeekFrom::Start(reader.offset())).map_err(|source| fault(DemoFault::io("open the file")(source)))?;
+        Ok(Self {
+            path: path.to_owned(),
+            header: reader.header().clone(),
+            store: Box::new(file),
+            length: reader.offset(),
+            episodes: reader.episodes_read(),
+            torn: false,
+        })
+    }
+
+    /// Appends one episode and waits until it is on the disk.
+    ///
+    /// # Errors
+    ///
+    /// [`DemoFault::RefusedEpisode`] when [`DemoEpisode::check`] fails (nothing is written);
+    /// [`DemoFault::PushFailed`] when the disk is full or fails: the file then ends with the episode
+    /// before this one, and `push` may be tried again; [`DemoFault::PushTorn`] when not even that could
+    /// be restored, and [`DemoFault::Torn`] from then on.
+    pub fn push(&mut self, episode: &DemoEpisode) -> Result<(), DemoFileError> {
+        self.push_inner(episode).map_err(|fault| DemoFileError::new(&self.path, fault))
+    }
+
+    fn push_inner(&mut self, episode: &DemoEpisode) -> Result<(), DemoFault> {
+        if self.torn {
+            return Err(DemoFault::Torn);
+        }
+        let bytes = frame::encode(episode, &self.header).map_err(DemoFault::RefusedEpisode)?;
+        let written = self.store.write_all(&bytes).and_then(|()| self.store.sync());
+        let Err(source) = written else {
+            self.length += bytes.len() as u64;
+            self.episodes += 1;
+            return Ok(());
+        };
+        let episode = self.episodes;
+        match self.store.cut(self.length) {
+            Ok(()) => Err(DemoFault::PushFailed { episode, source }),
+            Err(cleanup) => {
+                self.torn = true;
+                Err(DemoFault::PushTorn { episode, source, cleanup })
+            }
+        }
+    }
+
+    /// The header of the file.
+    pub fn header(&self) -> &DemoHeader {
+        &self.header
+    }
+
+    /// The path of the file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Number of episodes in the file.
+    pub fn episodes(&self) -> usize {
+        self.episodes
+    }
+
+    /// Length of the file in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.length
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::super::header::DemoActions;
+    use super::super::store::tests::SmallDisk;
+    use super::super::testing::{episode, header};
+    use super::*;
+
+    fn on_small_disk(can_cut: bool) -> (DemoWriter, Arc<Mutex<Vec<u8>>>) {
+        let preamble = preamble::encode(&header()).expect("valid");
+        let length = preamble.len() as u64;
+        let frame = frame::encode(&episode(1, 20), &header()).expect("valid").len();
+        let disk =
+            SmallDisk { room: preamble.len() + frame + frame / 2, bytes: Arc::new(Mutex::new(preamble)), can_cut };
+        let bytes = disk.bytes.clone();
+        let path = PathBuf::from("small.demo");
+        let writer = DemoWriter { path, header: header(), store: Box::new(disk), length, episodes: 0, torn: false };
+        (writer, bytes)
+    }
+
+    #[test]
+    fn a_full_disk_keeps_the_episodes_before() {
+        let (mut writer, bytes) = on_small_disk(true);
+        writer.push(&episode(1, 20)).expect("room for one");
+        let error = writer.push(&episode(2, 20)).expect_err("full");
+        assert!(matches!(error.fault, DemoFault::PushFailed { episode: 1, .. }), "{error}");
+        assert!(error.to_string().contains("the 1 episodes before it are kept"), "{error}");
+        assert_eq!(bytes.lock().expect("one thread").len() as u64, writer.bytes());
+        // A shorter episode still fits.
+        writer.push(&episode(3, 2)).expect("room for a short one");
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("small.demo");
+        std::fs::write(&path, &*bytes.lock().expect("one thread")).expect("written");
+        let seeds: Vec<u64> = DemoReader::open(&path)
+            .and_then(DemoReader::read_all)
+            .expect("sound")
+            .iter()
+            .map(|e| e.level_seed)
+            .collect();
+        assert_eq!(seeds, [1, 3]);
+    }
+
+    #[test]
+    fn remains_that_stay_stop_the_writer() {
+        let (mut writer, _) = on_small_disk(false);
+        writer.push(&episode(1, 20)).expect("room for one");
+        let error = writer.push(&episode(2, 20)).expect_err("full");
+        assert!(matches!(error.fault, DemoFault::PushTorn { episode: 1, .. }), "{error}");
+        assert!(error.to_string().contains("playbot demo repair FILE"), "{error}");
+        assert!(matches!(writer.push(&episode(3, 2)), Err(DemoFileError { fault: DemoFault::Torn, .. })));
+    }
+
+    #[test]
+    fn a_refused_episode_leaves_no_trace() {
+        let (mut writer, bytes) = on_small_disk(true);
+        let mut bad = episode(1, 3);
+        bad.rewards[1] = f32::NAN;
+        assert!(matches!(writer.push(&bad), Err(DemoFileError { fault: DemoFault::RefusedEpisode(_), .. })));
+        assert_eq!(bytes.lock().expect("one thread").len() as u64, writer.bytes());
+        let foreign = DemoEpisode::new(1, DemoActions::Continuous(2));
+        assert!(writer.push(&foreign).is_err());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn dev_full_is_a_full_disk() {
+        let error = DemoWriter::replace("/dev/full", header()).expect_err("full");
+        assert!(error.to_string().contains("cannot write the header: No space left on device"), "{error}");
+        assert!(Path::new("/dev/full").exists());
+        let (mut writer, _) = on_small_disk(true);
+        writer.store = Box::new(OpenOptions::new().write(true).open("/dev/full").expect("opens"));
+        let error = writer.push(&episode(1, 5)).expect_err("full");
+        assert!(error.to_string().contains("No space left on device"), "{error}");
+    }
+}

@@ -1,0 +1,7 @@
+//! Demonstrations: recording what an agent does, checking recordings by replay, and reading them back for learning.
+
+pub mod dataset;
+pub mod file;
+pub mod recorder;
+pub mod replay;
+pub mod verify;

@@ -1,0 +1,148 @@
+//! Writing down what agents do, whoever decides.
+
+use bevy::prelude::*;
+
+use super::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoFileError, DemoWriter, EpisodeActions};
+use crate::{
+    action::{Action, ActionSpace, ActionValue},
+    agent::{Agent, AgentOrder},
+    control::Control,
+    episode::{Episode, EpisodeEnd},
+    fault::Faults,
+    observation::Observation,
+    reward::Reward,
+    state_hash::StateHash,
+};
+
+/// Where finished episodes go. Insert it, and add [`Recording`] to the agents that shall be recorded.
+///
+/// Each episode is on disk as soon as it has ended.
+#[derive(Resource)]
+pub struct Recorder {
+    writer: DemoWriter,
+    keep_observations: bool,
+    steps: u64,
+    episodes: u64,
+    limit: Option<u64>,
+}
+
+impl Recorder {
+    /// Records into `writer`; observations are kept if the file's header names them.
+    pub fn new(writer: DemoWriter) -> Self {
+        let keep_observations = !writer.header().observation_names.is_empty();
+        Self { writer, keep_observations, steps: 0, episodes: 0, limit: None }
+    }
+
+    /// Ends the running episode as aborted once this many ticks are on disk, so that a recording has an exact size.
+    pub fn with_step_limit(mut self, steps: u64) -> Self {
+        self.limit = Some(steps);
+        self
+    }
+
+    /// Ticks on disk.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Episodes on disk.
+    pub fn episodes(&self) -> u64 {
+        self.episodes
+    }
+
+    fn push(&mut self, episode: &DemoEpisode) -> Result<(), DemoFileError> {
+        self.writer.push(episode)?;
+        self.steps += episode.len() as u64;
+        self.episodes += 1;
+        Ok(())
+    }
+}
+
+/// The episode of this agent as recorded so far.
+#[derive(Component, Default, Debug)]
+pub struct Recording {
+    episode: Option<DemoEpisode>,
+}
+
+/// The kind of actions as a recording's header has it.
+pub fn demo_actions(space: &ActionSpace) -> DemoActions {
+    match space {
+        ActionSpace::Discrete(n) => DemoActions::Discrete(*n),
+        ActionSpace::Continuous(n) => DemoActions::Continuous(*n),
+    }
+}
+
+fn decider(control: Control) -> Decider {
+    match control {
+        Control::Human => Decider::Human,
+        Control::Bot => Decider::Bot,
+        Control::Policy => Decider::Policy,
+        Control::Replay => Decider::Replay,
+        Control::Idle => Decider::Idle,
+    }
+}
+
+fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
+    match (actions, action) {
+        (EpisodeActions::Discrete(list), ActionValue::Discrete(index)) => list.push(*index),
+        (EpisodeActions::Continuous { values, .. }, ActionValue::Continuous(row)) => values.extend_from_slice(row),
+        // Actions that do not fit their space were reported before the game saw them.
+        _ => {}
+    }
+}
+
+/// Appends this tick to each recorded agent's episode; an ended episode goes to disk.
+pub(crate) fn record_ticks(
+    recorder: Option<ResMut<Recorder>>,
+    order: Res<AgentOrder>,
+    mut agents: Query<(&Agent, &Control, &Action, &Reward, &StateHash, &Observation, &Episode, &mut Recording)>,
+    mut faults: ResMut<Faults>,
+) {
+    let Some(mut recorder) = recorder else { return };
+    for &entity in order.entities() {
+        let Ok((agent, control, action, reward, hash, observation, episode, mut recording)) = agents.get_mut(entity)
+        else {
+            continue;
+        };
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        let demo = recording
+            .episode
+            .get_or_insert_with(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+        push_action(&mut demo.actions, &action.0);
+        demo.rewards.push(reward.get());
+        demo.state_hashes.push(hash.folded());
+        demo.deciders.push(decider(*control));
+        if recorder.keep_observations {
+            demo.observations.extend_from_slice(&observation.vector);
+        }
+        let full = recorder.limit.is_some_and(|limit| recorder.steps + demo.len() as u64 >= limit);
+        demo.end = match episode.end() {
+            Some(EpisodeEnd::Terminated { success }) => DemoEnd::Terminated { success },
+            Some(EpisodeEnd::Truncated) => DemoEnd::Truncated,
+            None if full => DemoEnd::Aborted,
+            None => continue,
+        };
+        if let Some(finished) = recording.episode.take()
+            && let Err(error) = recorder.push(&finished)
+        {
+            faults.report(error.to_string());
+        }
+    }
+}
+
+/// Writes down the unfinished episodes of a World, as aborted: for the moment before a recording stops.
+///
+/// # Errors
+///
+/// The file could not be written.
+pub fn flush_unfinished(world: &mut World) -> Result<(), DemoFileError> {
+    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    for entity in entities {
+        let episode = world.get_mut::<Recording>(entity).and_then(|mut recording| recording.episode.take());
+        if let (Some(episode), Some(mut recorder)) = (episode, world.get_resource_mut::<Recorder>()) {
+            recorder.push(&episode)?;
+        }
+    }
+    Ok(())
+}

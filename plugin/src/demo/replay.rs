@@ -1,0 +1,120 @@
+//! Playing a recording back, and finding the first tick at which it is no longer the same game.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use thiserror::Error;
+
+use super::file::{DemoEnd, DemoEpisode, EpisodeActions};
+use crate::{
+    action::{Action, ActionValue},
+    control::Control,
+    episode::{Episode, EpisodeEnd},
+    reward::Reward,
+    state_hash::StateHash,
+};
+
+/// The recorded episode that drives an agent under [`Control::Replay`].
+#[derive(Component, Clone, Debug)]
+pub struct Replay {
+    episode: Arc<DemoEpisode>,
+    divergence: Option<Divergence>,
+    finished: bool,
+}
+
+/// Where a replay stopped being the recorded game.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("level {level}, tick {tick}: {what}")]
+pub struct Divergence {
+    /// The level.
+    pub level: u64,
+    /// The tick, from 0.
+    pub tick: u32,
+    /// What differs.
+    pub what: String,
+}
+
+impl Replay {
+    /// A replay of this episode. The agent's level queue must give the episode's level.
+    pub fn new(episode: Arc<DemoEpisode>) -> Self {
+        Self { episode, divergence: None, finished: false }
+    }
+
+    /// The first difference between the recording and the game, if one has been met.
+    pub fn divergence(&self) -> Option<&Divergence> {
+        self.divergence.as_ref()
+    }
+
+    /// Whether the last recorded tick has been played, or the game ended before it.
+    pub fn is_finished(&self) -> bool {
+        self.finished
+    }
+
+    /// The recorded episode.
+    pub fn episode(&self) -> &DemoEpisode {
+        &self.episode
+    }
+}
+
+/// The action of one tick of a recording.
+pub fn recorded_action(actions: &EpisodeActions, tick: usize) -> Option<ActionValue> {
+    match actions {
+        EpisodeActions::Discrete(list) => list.get(tick).map(|index| ActionValue::Discrete(*index)),
+        EpisodeActions::Continuous { dim, values } => {
+            values.get(tick * dim..(tick + 1) * dim).map(|row| ActionValue::Continuous(row.to_vec()))
+        }
+    }
+}
+
+pub(crate) fn run_replays(mut agents: Query<(&Control, &Episode, &mut Replay, &mut Action)>) {
+    for (control, episode, mut replay, mut action) in &mut agents {
+        if *control != Control::Replay || !episode.is_running() {
+            continue;
+        }
+        match recorded_action(&replay.episode.actions, episode.tick as usize) {
+            Some(value) => action.0 = value,
+            None => replay.finished = true,
+        }
+    }
+}
+
+pub(crate) fn check_replays(mut agents: Query<(&Control, &Episode, &Reward, &StateHash, &mut Replay)>) {
+    for (control, episode, reward, hash, mut replay) in &mut agents {
+        if *control != Control::Replay || !episode.is_running() || replay.finished {
+            continue;
+        }
+        // Judge has counted this tick already.
+        let tick = episode.tick.saturating_sub(1);
+        let what = difference(&replay.episode, tick as usize, reward.get(), hash.folded(), episode.end());
+        if replay.divergence.is_none()
+            && let Some(what) = what
+        {
+            replay.divergence = Some(Divergence { level: episode.level, tick, what });
+        }
+        replay.finished = episode.end().is_some() || tick as usize + 1 >= replay.episode.len();
+    }
+}
+
+/// What is not as recorded in this tick.
+fn difference(demo: &DemoEpisode, tick: usize, reward: f32, hash: u32, end: Option<EpisodeEnd>) -> Option<String> {
+    let (recorded_hash, recorded_reward) = (*demo.state_hashes.get(tick)?, *demo.rewards.get(tick)?);
+    let recorded_end = if tick + 1 < demo.len() {
+        None
+    } else {
+        match demo.end {
+            DemoEnd::Terminated { success } => Some(EpisodeEnd::Terminated { success }),
+            DemoEnd::Truncated => Some(EpisodeEnd::Truncated),
+            // An aborted recording says nothing about how the game would have gone on.
+            DemoEnd::Aborted => end,
+        }
+    };
+    if recorded_hash != hash {
+        Some(format!("the state hash is {hash:08x}, recorded was {recorded_hash:08x}"))
+    } else if recorded_reward.to_bits() != reward.to_bits() {
+        Some(format!("the reward is {reward}, recorded was {recorded_reward}"))
+    } else if recorded_end != end {
+        Some(format!("the episode's end is {end:?}, recorded was {recorded_end:?}"))
+    } else {
+        None
+    }
+}

@@ -1,0 +1,115 @@
+//! Proving a recording: it is played again, and each tick must come out as recorded.
+
+use std::{path::Path, sync::Arc};
+
+use bevy::prelude::*;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::{
+    file::{DemoEpisode, DemoFileError, DemoReader},
+    replay::{Divergence, Replay},
+};
+use crate::{
+    control::Control,
+    episode::Episode,
+    fault::Fault,
+    game::{Game, build_world},
+    headless::tick_world,
+    level::LevelQueue,
+    policy::AgentStreams,
+};
+
+/// What a check by replay found.
+#[derive(Clone, Debug, Serialize)]
+pub struct VerifyReport {
+    /// Episodes replayed.
+    pub episodes: u64,
+    /// Ticks replayed.
+    pub ticks: u64,
+    /// First divergence of each episode that diverged: index of the episode, and where.
+    pub divergences: Vec<(u64, String)>,
+}
+
+/// A recording could not be checked.
+#[derive(Debug, Error)]
+pub enum VerifyError {
+    /// The file cannot be read, or belongs to another game.
+    #[error(transparent)]
+    File(#[from] DemoFileError),
+    /// The game broke its contract while it was replayed.
+    #[error("while replaying: {0}")]
+    Fault(#[from] Fault),
+    /// The recordings do not make a data set.
+    #[error(transparent)]
+    Data(#[from] playbot_learner::LearnError),
+}
+
+/// Replays every episode of a file; `progress` hears the number of episodes done.
+///
+/// # Errors
+///
+/// [`VerifyError`] if the file cannot be read to its end. Divergences are no errors: they are the report.
+pub fn verify_file(
+    game: &dyn Game,
+    path: &Path,
+    mut progress: impl FnMut(u64),
+) -> Result<VerifyReport, VerifyError> {
+    let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
+    let mode = reader.header().mode.clone();
+    let mut stage = ReplayStage::new(game, &mode);
+    let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
+    for episode in reader {
+        let episode = Arc::new(episode?);
+        if let Some(divergence) = stage.play(episode.clone(), |_, _| {})? {
+            report.divergences.push((report.episodes, divergence.to_string()));
+        }
+        report.episodes += 1;
+        report.ticks += episode.len() as u64;
+        progress(report.episodes);
+    }
+    Ok(report)
+}
+
+/// A World with one agent on which recordings are played.
+pub struct ReplayStage {
+    world: World,
+    agent: Entity,
+}
+
+impl ReplayStage {
+    /// Builds the game in a mode it has.
+    pub fn new(game: &dyn Game, mode: &str) -> Self {
+        let (world, agents) = build_world(game, mode, 0, 0, 1);
+        Self { world, agent: agents[0] }
+    }
+
+    /// Plays one episode and calls `after_tick` with the World and the agent after each tick.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract.
+    pub fn play(
+        &mut self,
+        episode: Arc<DemoEpisode>,
+        mut after_tick: impl FnMut(&World, Entity),
+    ) -> Result<Option<Divergence>, Fault> {
+        if episode.is_empty() {
+            return Ok(None);
+        }
+        let mut agent = self.world.entity_mut(self.agent);
+        agent.insert((Control::Replay, LevelQueue::Always(episode.level_seed), Replay::new(episode)));
+        if let Some(mut running) = agent.get_mut::<Episode>() {
+            running.abandon();
+        }
+        agent.insert(AgentStreams::new(0, 0));
+        loop {
+            tick_world(&mut self.world)?;
+            after_tick(&self.world, self.agent);
+            let replay = self.world.get::<Replay>(self.agent);
+            if let Some(replay) = replay.filter(|replay| replay.is_finished()) {
+                return Ok(replay.divergence().cloned());
+            }
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Episodes: their start, their end and what they brought.
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    agent::Agent, control::Control, fault::Faults, level::LevelQueue, policy::AgentStreams, reward::Reward,
+    skill_prior::ActiveSkill,
+};
+
+/// How an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
+pub enum EpisodeEnd {
+    /// The game is over; no reward could follow.
+    Terminated {
+        /// Whether the agent reached what the level asks for.
+        success: bool,
+    },
+    /// Time is up; the game could have gone on.
+    Truncated,
+}
+
+impl EpisodeEnd {
+    /// Whether the level's aim was reached.
+    pub fn is_success(self) -> bool {
+        matches!(self, Self::Terminated { success: true })
+    }
+}
+
+/// The running episode of an agent.
+#[derive(Component, Clone, Debug, Default)]
+pub struct Episode {
+    /// Level that is played.
+    pub level: u64,
+    /// Ticks played so far; 0 while the first observation is made.
+    pub tick: u32,
+    /// Sum of rewards so far, undiscounted.
+    pub total_reward: f64,
+    state: EpisodeState,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum EpisodeState {
+    #[default]
+    Waiting,
+    Running,
+    Ended(EpisodeEnd),
+}
+
+impl Episode {
+    /// The game is over. The first call in a tick decides, and termination outranks truncation.
+    pub fn terminate(&mut self, success: bool) {
+        if !matches!(self.end(), Some(EpisodeEnd::Terminated { .. })) {
+            self.state = EpisodeState::Ended(EpisodeEnd::Terminated { success });
+        }
+    }
+
+    /// Time is up.
+    pub fn truncate(&mut self) {
+        if self.end().is_none() {
+            self.state = EpisodeState::Ended(EpisodeEnd::Truncated);
+        }
+    }
+
+    /// The end, in the tick in which it came.
+    pub fn end(&self) -> Option<EpisodeEnd> {
+        match self.state {
+            EpisodeState::Ended(end) => Some(end),
+            _ => None,
+        }
+    }
+
+    /// Whether a level is being played, the tick of its end included.
+    pub fn is_running(&self) -> bool {
+        self.state != EpisodeState::Waiting
+    }
+
+    /// Leaves the level at once, without a result; the next one starts with the next tick.
+    pub fn abandon(&mut self) {
+        self.state = EpisodeState::Waiting;
+    }
+}
+
+/// Build level `level` for agent `entity`, now: triggered by the plugin, observed by the game.
+#[derive(EntityEvent, Clone, Copy, Debug)]
+pub struct StartEpisode {
+    /// The agent.
+    pub entity: Entity,
+    /// Number of the level; for generated levels the seed.
+    pub level: u64,
+}
+
+/// An episode has ended: triggered by the plugin after the tick was recorded and before the next level starts.
+#[derive(EntityEvent, Clone, Copy, Debug)]
+pub struct EpisodeEnded {
+    /// The agent.
+    pub entity: Entity,
+    /// Level that was played.
+    pub level: u64,
+    /// How it ended.
+    pub end: EpisodeEnd,
+    /// Length in ticks.
+    pub ticks: u32,
+    /// Sum of rewards, undiscounted.
+    pub total_reward: f64,
+}
+
+/// Totals of an agent over all its finished episodes.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub struct EpisodeCount {
+    /// Finished episodes.
+    pub finished: u64,
+    /// Those that reached the level's aim.
+    pub successes: u64,
+}
+
+/// Starts an episode for every agent that waits for one and is not idle.
+pub(crate) fn begin_episodes(
+    mut agents: Query<
+        (Entity, &mut Control, &mut Episode, &mut ActiveSkill, &mut LevelQueue, &mut AgentStreams),
+        With<Agent>,
+    >,
+    mut commands: Commands,
+) {
+    for (entity, mut control, mut episode, mut skill, mut queue, mut streams) in &mut agents {
+        if episode.is_running() || !control.is_active() {
+            continue;
+        }
+        let Some(level) = queue.next_level(&mut streams.level) else {
+            *control = Control::Idle;
+            continue;
+        };
+        skill.ticks_left = 0;
+        *episode = Episode { level, state: EpisodeState::Running, ..default() };
+        commands.trigger(StartEpisode { entity, level });
+    }
+}
+
+/// Counts the tick and its reward.
+pub(crate) fn judge(
+    mut agents: Query<(&Agent, &Control, &Reward, &mut Episode)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, control, reward, mut episode) in &mut agents {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        if !reward.get().is_finite() {
+            faults.report(format!(
+                "agent {}, level {}, tick {}: the reward is {}; the game must not produce it",
+                agent.index,
+                episode.level,
+                episode.tick,
+                reward.get()
+            ));
+        }
+        episode.tick += 1;
+        episode.total_reward += f64::from(reward.get());
+    }
+}
+
+/// Announces ended episodes and frees their agents for the next level.
+pub(crate) fn end_episodes(
+    mut agents: Query<(Entity, &mut Episode, &mut EpisodeCount), With<Agent>>,
+    mut commands: Commands,
+) {
+    for (entity, mut episode, mut count) in &mut agents {
+        let Some(end) = episode.end() else { continue };
+        count.finished += 1;
+        count.successes += u64::from(end.is_success());
+        commands.trigger(EpisodeEnded {
+            entity,
+            level: episode.level,
+            end,
+            ticks: episode.tick,
+            total_reward: episode.total_reward,
+        });
+        episode.abandon();
+    }
+}

@@ -1,0 +1,192 @@
+//! Measuring: each level equally often, every episode counted once.
+
+use bevy::prelude::*;
+use playbot_learner::Policy;
+use serde::Serialize;
+
+use crate::{
+    agent::Agent,
+    bot::BlindBot,
+    control::Control,
+    episode::{EpisodeEnd, EpisodeEnded},
+    fault::Fault,
+    game::{Game, build_world},
+    headless::tick_world,
+    level::LevelQueue,
+    policy::{ActionDraw, ActivePolicy},
+    skill_prior::SkillPrior,
+    split::LevelSplit,
+    train::worlds::on_threads,
+};
+
+/// Who is measured.
+#[derive(Clone)]
+pub enum Player {
+    /// A learned policy, with its skills if it has any.
+    Policy {
+        /// The policy.
+        policy: Policy,
+        /// Where its skills come from.
+        prior: Option<SkillPrior>,
+        /// How actions are drawn.
+        draw: ActionDraw,
+    },
+    /// A bot that does not look.
+    Blind(BlindBot),
+    /// The game's own demonstrator, without noise.
+    Demonstrator,
+}
+
+/// How to measure.
+#[derive(Clone, Debug)]
+pub struct EvalPlan {
+    /// Levels.
+    pub split: LevelSplit,
+    /// Episodes on each level.
+    pub episodes_per_level: u32,
+    /// Seed of the players' random streams.
+    pub seed: u64,
+    /// Arenas, spread evenly over the Worlds.
+    pub arenas: u32,
+    /// Worlds: part of the plan, as in training.
+    pub worlds: u32,
+    /// Threads: not part of the result.
+    pub threads: usize,
+}
+
+/// One measured episode.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EpisodeResult {
+    /// The level.
+    pub level: u64,
+    /// How it ended.
+    pub end: EpisodeEnd,
+    /// Length, ticks.
+    pub ticks: u32,
+    /// Sum of rewards.
+    pub total_reward: f64,
+}
+
+/// The summary of a measurement: one row of a result table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EvalSummary {
+    /// Name of the player.
+    pub method: String,
+    /// Levels, as `mode:first..last`.
+    pub split: String,
+    /// Episodes.
+    pub episodes: u64,
+    /// Mean return.
+    pub return_mean: f64,
+    /// Standard error of the mean over episodes, taken as independent.
+    pub return_se: f64,
+    /// Share of episodes that reached the level's aim.
+    pub success: f64,
+    /// Mean length, ticks.
+    pub length_mean: f64,
+}
+
+#[derive(Resource, Default)]
+struct Results(Vec<EpisodeResult>);
+
+fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
+    results.0.push(EpisodeResult {
+        level: event.level,
+        end: event.end,
+        ticks: event.ticks,
+        total_reward: event.total_reward,
+    });
+}
+
+/// Plays every level of the plan and returns all episodes, sorted by level. `progress` hears each finished episode; it
+/// is called from several threads.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub fn evaluate(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<EpisodeResult>, Fault> {
+    let mut worlds: Vec<_> = (0..plan.worlds).map(|world| stage(game, player, plan, world)).collect();
+    let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, &progress));
+    let mut results = Vec::new();
+    for part in parts {
+        results.extend(part?);
+    }
+    results.sort_by_key(|result| result.level);
+    Ok(results)
+}
+
+/// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
+fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) -> World {
+    let per_world = (plan.arenas / plan.worlds).max(1);
+    let total = (per_world * plan.worlds) as usize;
+    let first = world_index * per_world;
+    let (mut world, agents) = build_world(game, &plan.split.mode, plan.seed, first, per_world);
+    world.init_resource::<Results>();
+    world.add_observer(note_result);
+    let all: Vec<u64> =
+        (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
+    for (offset, &agent) in agents.iter().enumerate() {
+        let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
+        world.entity_mut(agent).insert(LevelQueue::list(levels));
+        hand_over(game, &mut world, agent, player);
+    }
+    if let Player::Policy { policy, prior, draw } = player {
+        world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
+        if let Some(prior) = prior {
+            world.insert_resource(prior.clone());
+        }
+    }
+    world
+}
+
+fn hand_over(game: &dyn Game, world: &mut World, agent: Entity, player: &Player) {
+    match player {
+        Player::Policy { .. } => {
+            world.entity_mut(agent).insert(Control::Policy);
+        }
+        Player::Blind(bot) => {
+            world.entity_mut(agent).insert((Control::Bot, bot.clone()));
+        }
+        Player::Demonstrator => {
+            game.arm_demonstrator(world, agent, 0.0);
+            world.entity_mut(agent).insert(Control::Bot);
+        }
+    }
+}
+
+/// Ticks until every agent has played its list.
+fn play_out(world: &mut World, progress: &(impl Fn(u64) + Sync)) -> Result<Vec<EpisodeResult>, Fault> {
+    let mut agents = world.query_filtered::<&Control, With<Agent>>();
+    let mut known = 0;
+    while agents.iter(world).any(|control| control.is_active()) {
+        tick_world(world)?;
+        let done = world.resource::<Results>().0.len() as u64;
+        if done > known {
+            progress(done - known);
+            known = done;
+        }
+    }
+    Ok(std::mem::take(&mut world.resource_mut::<Results>().0))
+}
+
+/// Sums up the episodes of one player on one split.
+pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) -> EvalSummary {
+    let n = results.len() as f64;
+    let mean = |value: &dyn Fn(&EpisodeResult) -> f64| results.iter().map(value).sum::<f64>() / n;
+    let return_mean = mean(&|result| result.total_reward);
+    let squares = results.iter().map(|result| (result.total_reward - return_mean).powi(2)).sum::<f64>();
+    EvalSummary {
+        method: method.to_owned(),
+        split: split.to_string(),
+        episodes: results.len() as u64,
+        return_mean,
+        return_se: if n > 1.0 { (squares / (n - 1.0) / n).sqrt() } else { 0.0 },
+        success: mean(&|result| f64::from(u8::from(result.end.is_success()))),
+        length_mean: mean(&|result| f64::from(result.ticks)),
+    }
+}

@@ -1,0 +1,112 @@
+//! What the plugin needs to know of a game in order to build it headless, many arenas at a time.
+
+use bevy::prelude::*;
+use thiserror::Error;
+
+use crate::{action::ActionSpace, bot::BlindBot, observation::ObservationSpace};
+
+/// A game that can be trained on and tested without a window.
+///
+/// The plugin itself knows no game: the trainer, the evaluation and the replay are handed one of these.
+pub trait Game: Send + Sync {
+    /// Name in files and on the command line.
+    fn name(&self) -> &'static str;
+
+    /// Version of the rules; raise it whenever an old recording would no longer replay.
+    fn version(&self) -> u32;
+
+    /// Modes, such as difficulties. At least one.
+    fn modes(&self) -> &'static [&'static str];
+
+    /// Fixed ticks per second of game time.
+    fn tick_hz(&self) -> f64;
+
+    /// Actions of every agent.
+    fn actions(&self) -> ActionSpace;
+
+    /// Observation of every agent.
+    fn observation(&self) -> ObservationSpace;
+
+    /// Adds the game's plugins to a headless app, in a mode from [`modes`](Self::modes).
+    fn build(&self, app: &mut App, mode: &str);
+
+    /// Adds one arena with one agent, which must carry [`Agent`](crate::agent::Agent) with this number and its sensor,
+    /// under [`Control::Idle`](crate::control::Control::Idle).
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity;
+
+    /// Bots that every learner is compared with, by name.
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        vec![("random", BlindBot::Uniform)]
+    }
+
+    /// The seeing bot that demonstrates the game, if there is one: its name.
+    fn demonstrator(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Hands an agent over to the demonstrator. `noise` is the probability with which an action is replaced by a
+    /// uniformly random one.
+    fn arm_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
+}
+
+/// The name is none of those that exist.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[error("unknown {what} `{name}`{}; valid: {}", hint(.near), .valid.join(", "))]
+pub struct UnknownName {
+    /// What was named: `game`, `mode`, `method`.
+    pub what: &'static str,
+    /// The name that was given.
+    pub name: String,
+    /// The valid name nearest to it.
+    pub near: Option<String>,
+    /// All valid names.
+    pub valid: Vec<String>,
+}
+
+fn hint(near: &Option<String>) -> String {
+    near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+}
+
+impl UnknownName {
+    /// The error for `name`, which is not among `valid`.
+    pub fn new(what: &'static str, name: &str, valid: &[&str]) -> Self {
+        Self {
+            what,
+            name: name.to_owned(),
+            near: nearest(name, valid).map(str::to_owned),
+            valid: valid.iter().map(|name| (*name).to_owned()).collect(),
+        }
+    }
+}
+
+/// The candidate most like `name`, if one is like it at all.
+pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    candidates
+        .iter()
+        .map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// Checks that a mode is one of the game's.
+///
+/// # Errors
+///
+/// [`UnknownName`] with the valid modes.
+pub fn check_mode(game: &dyn Game, mode: &str) -> Result<(), UnknownName> {
+    if game.modes().contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, game.modes())) }
+}
+
+/// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread.
+///
+/// Returns the World and its agents in the order of their numbers.
+pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u32) -> (World, Vec<Entity>) {
+    let mut app = crate::headless::headless_app();
+    crate::headless::set_tick_rate(&mut app, game.tick_hz());
+    app.insert_resource(crate::policy::PlaybotSeed(seed));
+    game.build(&mut app, mode);
+    let mut world = crate::headless::into_world(app);
+    let agents = (first..first + count).map(|index| game.spawn_agent(&mut world, index)).collect();
+    (world, agents)
+}

@@ -1,0 +1,71 @@
+//! Which level an agent plays next.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use rand::{Rng, RngExt};
+
+/// Source of level numbers for one agent.
+#[derive(Component, Clone, Debug)]
+pub enum LevelQueue {
+    /// The same level for ever.
+    Always(u64),
+    /// These levels, each once, in order; the agent idles afterwards.
+    List {
+        /// What is left to play is `levels[next..]`.
+        levels: Arc<[u64]>,
+        /// Index of the next level.
+        next: usize,
+    },
+    /// Levels `first..=last`, uniformly and with replacement, from the agent's own stream of random numbers.
+    Uniform {
+        /// Lowest level.
+        first: u64,
+        /// Highest level, included.
+        last: u64,
+    },
+    /// A rule of the game.
+    Custom(Box<dyn LevelSource>),
+}
+
+impl Default for LevelQueue {
+    fn default() -> Self {
+        Self::Always(0)
+    }
+}
+
+impl LevelQueue {
+    /// A queue over a list of levels, each played once.
+    pub fn list(levels: impl Into<Arc<[u64]>>) -> Self {
+        Self::List { levels: levels.into(), next: 0 }
+    }
+
+    /// The next level, or `None` when there is none left.
+    pub fn next_level(&mut self, rng: &mut impl Rng) -> Option<u64> {
+        match self {
+            Self::Always(level) => Some(*level),
+            Self::List { levels, next } => {
+                let level = levels.get(*next).copied();
+                *next += usize::from(level.is_some());
+                level
+            }
+            Self::Uniform { first, last } => Some(rng.random_range(*first..=*last)),
+            Self::Custom(source) => source.next_level(),
+        }
+    }
+}
+
+/// A game's own way of choosing levels.
+pub trait LevelSource: Send + Sync + std::fmt::Debug {
+    /// The next level, or `None` when there is none left.
+    fn next_level(&mut self) -> Option<u64>;
+
+    /// A copy with the same future.
+    fn clone_box(&self) -> Box<dyn LevelSource>;
+}
+
+impl Clone for Box<dyn LevelSource> {
+    fn clone(&self) -> Self {
+        self.clone_box()
+    }
+}

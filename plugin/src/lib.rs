@@ -1,0 +1,105 @@
+//! Gameplay-testing agents for [Bevy](https://bevyengine.org).
+//!
+//! # Concepts
+//!
+//! - An [`Agent`](agent::Agent) is an entity that acts in the game. Each fixed tick its sensors fill an
+//!   [`Observation`](observation::Observation), whoever holds its [`Control`](control::Control) writes its
+//!   [`Action`](action::Action), and the game answers with a [`Reward`](reward::Reward) and, sooner or later, with the
+//!   end of the [`Episode`](episode::Episode).
+//! - A *level* is named by a number. The plugin picks it from the agent's [`LevelQueue`](level::LevelQueue) and triggers
+//!   [`StartEpisode`](episode::StartEpisode); the game builds the level in an observer.
+//! - An episode ends as [`Terminated`](episode::EpisodeEnd::Terminated) (the game is over: won or lost) or
+//!   [`Truncated`](episode::EpisodeEnd::Truncated) (time is up). The two are never merged, because only the first one
+//!   says that nothing was to be had afterwards.
+//! - A [`SkillPrior`](skill_prior::SkillPrior) draws a skill z for each agent every T ticks; a policy decodes it into
+//!   actions together with the observation.
+//! - [`demo`] records who did what, and replays it to the bit. [`train`] learns from recordings and from play, headless,
+//!   over many levels. [`eval`] measures.
+//!
+//! # One tick
+//!
+//! ```text
+//! FixedPreUpdate   PlaybotSystems::Begin → Observe → Decide → Act
+//! FixedUpdate      the game
+//! FixedPostUpdate  PlaybotSystems::Judge → Record → Reset
+//! ```
+//!
+//! # A game in thirty lines
+//!
+//! The agent stands on a line and must walk five steps to the right.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! #[derive(Component, Default)]
+//! struct Position(i32);
+//!
+//! fn restart(event: On<StartEpisode>, mut positions: Query<&mut Position>) {
+//!     if let Ok(mut position) = positions.get_mut(event.entity) {
+//!         position.0 = 0;
+//!     }
+//! }
+//!
+//! fn see(mut agents: Query<(&Position, &mut Observation)>) {
+//!     for (position, mut observation) in &mut agents {
+//!         observation.set([position.0 as f32]);
+//!     }
+//! }
+//!
+//! fn walk(mut agents: Query<(&Action, &mut Position, &mut Reward, &mut Episode)>) {
+//!     for (action, mut position, mut reward, mut episode) in &mut agents {
+//!         position.0 += if action.discrete() == Some(1) { 1 } else { -1 };
+//!         if position.0 == 5 {
+//!             reward.add(1.0);
+//!             episode.terminate(true);
+//!         }
+//!     }
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_observer(restart)
+//!     .add_systems(ObserveSchedule, see)
+//!     .add_systems(FixedUpdate, walk);
+//! let agent = app
+//!     .world_mut()
+//!     .spawn((
+//!         Agent::new(0, ActionSpace::Discrete(2)),
+//!         VectorSensor::new(["position"]),
+//!         Control::Bot,
+//!         BlindBot::Constant(ActionValue::Discrete(1)),
+//!         Position::default(),
+//!     ))
+//!     .id();
+//! app.ticks(5).expect("no agent broke its contract");
+//! let finished = app.world().get::<EpisodeCount>(agent).expect("required by Agent");
+//! assert_eq!(finished.finished, 1);
+//! assert_eq!(finished.successes, 1);
+//! ```
+
+pub mod action;
+pub mod agent;
+pub mod bot;
+pub mod control;
+pub mod demo;
+pub mod episode;
+pub mod eval;
+pub mod fault;
+pub mod game;
+pub mod headless;
+pub mod level;
+pub mod observation;
+pub mod plugin;
+pub mod policy;
+pub mod prelude;
+pub mod report;
+pub mod reward;
+pub mod skill_prior;
+pub mod split;
+pub mod state_hash;
+pub mod systems;
+pub mod test_app;
+pub mod train;
+
+pub use playbot_learner as learner;
+pub use plugin::PlaybotPlugin;

@@ -1,0 +1,101 @@
+//! What an agent sees.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::fault::Faults;
+use crate::{agent::Agent, episode::Episode};
+
+/// Names and number of the values of a vector observation, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ObservationSpace {
+    /// One name per value.
+    pub names: Vec<String>,
+}
+
+impl ObservationSpace {
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Whether there are no values.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+}
+
+/// The game fills a named vector: its names are the contract, and each tick is checked against it.
+///
+/// Fill [`Observation`] in a system of [`ObserveSchedule`](crate::systems::ObserveSchedule).
+#[derive(Component, Clone, Debug)]
+pub struct VectorSensor {
+    space: Arc<ObservationSpace>,
+}
+
+impl VectorSensor {
+    /// A sensor with one value per name.
+    pub fn new(names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        Self::from_space(Arc::new(ObservationSpace { names: names.into_iter().map(Into::into).collect() }))
+    }
+
+    /// A sensor that shares its names with others: cheap for many agents of one kind.
+    pub fn from_space(space: Arc<ObservationSpace>) -> Self {
+        Self { space }
+    }
+
+    /// Names of the values.
+    pub fn space(&self) -> &ObservationSpace {
+        &self.space
+    }
+}
+
+/// The observation of the current tick.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct Observation {
+    /// Values in the order of the sensor's names.
+    pub vector: Vec<f32>,
+}
+
+impl Observation {
+    /// Replaces the values, keeping the allocation.
+    pub fn set(&mut self, values: impl IntoIterator<Item = f32>) {
+        self.vector.clear();
+        self.vector.extend(values);
+    }
+}
+
+/// Reports observations of the wrong length or with values that are not numbers, with agent, tick and name.
+pub(crate) fn check_observations(
+    agents: Query<(&Agent, &VectorSensor, &Observation, &Episode)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, sensor, observation, episode) in &agents {
+        if !episode.is_running() {
+            continue;
+        }
+        let (expected, got) = (sensor.space.len(), observation.vector.len());
+        let at = || format!("agent {}, level {}, tick {}", agent.index, episode.level, episode.tick);
+        if got != expected {
+            faults.report(format!(
+                "{}: the observation has {got} values, its sensor names {expected}; fill every value each tick",
+                at()
+            ));
+        } else if let Some(bad) = first_non_finite(&observation.vector) {
+            faults.report(format!(
+                "{}: observation `{}` is {}; the game must not produce it",
+                at(),
+                sensor.space.names[bad],
+                observation.vector[bad]
+            ));
+        }
+    }
+}
+
+/// Index of the first value that is NaN or infinite. Sums first, since almost all vectors are sound.
+fn first_non_finite(values: &[f32]) -> Option<usize> {
+    let sum: f32 = values.iter().map(|value| value * 0.0).sum();
+    if sum == 0.0 { None } else { values.iter().position(|value| !value.is_finite()) }
+}

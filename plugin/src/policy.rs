@@ -1,0 +1,175 @@
+//! Agents that are driven by a learned policy.
+
+use bevy::prelude::*;
+use playbot_learner::{Policy, Streams};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::{
+    action::Action,
+    agent::{Agent, AgentOrder},
+    control::Control,
+    episode::Episode,
+    fault::Faults,
+    observation::Observation,
+    skill_prior::ActiveSkill,
+};
+
+/// Seed from which all streams of random numbers of this World come.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PlaybotSeed(pub u64);
+
+/// An agent's own streams of random numbers: which other agents share its World changes nothing for it.
+#[derive(Component, Clone, Debug)]
+pub struct AgentStreams {
+    /// For the choice of levels.
+    pub level: ChaCha8Rng,
+    /// For the draw of actions.
+    pub action: ChaCha8Rng,
+    /// For the draw of skills.
+    pub skill: ChaCha8Rng,
+    seeded: bool,
+}
+
+impl Default for AgentStreams {
+    fn default() -> Self {
+        let unseeded = ChaCha8Rng::seed_from_u64(0);
+        Self { level: unseeded.clone(), action: unseeded.clone(), skill: unseeded, seeded: false }
+    }
+}
+
+impl AgentStreams {
+    /// The streams of agent `index` under `seed`.
+    pub fn new(seed: u64, index: u32) -> Self {
+        let streams = Streams::new(seed);
+        let stream = |name| streams.stream(name, u64::from(index));
+        Self { level: stream("level"), action: stream("action"), skill: stream("skill"), seeded: true }
+    }
+
+    /// Streams in the middle of their run, as a checkpoint keeps them.
+    pub fn restored(level: ChaCha8Rng, action: ChaCha8Rng, skill: ChaCha8Rng) -> Self {
+        Self { level, action, skill, seeded: true }
+    }
+}
+
+/// Gives agents their streams, unless they brought their own.
+pub(crate) fn seed_streams(seed: Res<PlaybotSeed>, mut added: Query<(&Agent, &mut AgentStreams), Added<Agent>>) {
+    for (agent, mut streams) in &mut added {
+        if !streams.seeded {
+            *streams = AgentStreams::new(seed.0, agent.index);
+        }
+    }
+}
+
+/// How an action is taken from the policy's distribution.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ActionDraw {
+    /// A random draw.
+    #[default]
+    Sample,
+    /// The most probable action.
+    Greedy,
+}
+
+/// The policy that drives every agent under [`Control::Policy`].
+#[derive(Resource, Clone)]
+pub struct ActivePolicy {
+    /// Actor and critic.
+    pub policy: Policy,
+    /// How actions are drawn.
+    pub draw: ActionDraw,
+}
+
+/// What the policy thought when it chose the action of this tick.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Decision {
+    /// Natural logarithm of the action's probability (density for continuous actions).
+    pub log_prob: f32,
+    /// Value estimate of the observed state.
+    pub value: f32,
+}
+
+/// Reused memory of [`run_policy`]: the rows of one batch.
+#[derive(Default)]
+pub(crate) struct Batch {
+    entities: Vec<Entity>,
+    observations: Vec<f32>,
+    skills: Vec<f32>,
+}
+
+/// Decides for all agents under [`Control::Policy`] in one batched forward pass.
+pub(crate) fn run_policy(
+    active: Res<ActivePolicy>,
+    order: Res<AgentOrder>,
+    mut agents: Query<(
+        &Agent,
+        &Control,
+        &Episode,
+        &Observation,
+        &ActiveSkill,
+        &mut AgentStreams,
+        &mut Action,
+        &mut Decision,
+    )>,
+    mut faults: ResMut<Faults>,
+    mut batch: Local<Batch>,
+) {
+    let Batch { entities, observations, skills } = &mut *batch;
+    entities.clear();
+    observations.clear();
+    skills.clear();
+    for &entity in order.entities() {
+        let Ok((agent, control, episode, observation, skill, ..)) = agents.get(entity) else { continue };
+        if *control != Control::Policy || !episode.is_running() {
+            continue;
+        }
+        if let Some(why) = misfit(&active.policy, agent, observation, skill) {
+            faults.report(why);
+            return;
+        }
+        entities.push(entity);
+        observations.extend_from_slice(&observation.vector);
+        skills.extend_from_slice(&skill.z);
+    }
+    if entities.is_empty() {
+        return;
+    }
+    let output = match active.policy.forward(skills, observations, entities.len()) {
+        Ok(output) => output,
+        Err(error) => return faults.report(format!("the policy cannot decide: {error}")),
+    };
+    for (row, &entity) in entities.iter().enumerate() {
+        let Ok((.., mut streams, mut action, mut decision)) = agents.get_mut(entity) else { continue };
+        let (chosen, log_prob) = match active.draw {
+            ActionDraw::Sample => output.sample(row, &mut streams.action),
+            ActionDraw::Greedy => {
+                let greedy = output.greedy(row);
+                let log_prob = output.log_prob(row, &greedy).unwrap_or(0.0);
+                (greedy, log_prob)
+            }
+        };
+        action.0 = chosen;
+        *decision = Decision { log_prob, value: output.values[row] };
+    }
+}
+
+/// Why the policy cannot decide for this agent.
+fn misfit(policy: &Policy, agent: &Agent, observation: &Observation, skill: &ActiveSkill) -> Option<String> {
+    let spaces = (policy.obs_dim(), policy.latent(), policy.action_space());
+    // A policy without skills does not mind that a prior draws some.
+    let skills_fit = spaces.1 == 0 || spaces.1 == skill.z.len();
+    if skills_fit && (spaces.0, spaces.2) == (observation.vector.len(), agent.actions) {
+        return None;
+    }
+    Some(format!(
+        "agent {}: the policy was made for {} observation values, {} skill values and {:?}, but the game gives {}, {} \
+         and {:?}; load a policy that was trained for this game",
+        agent.index,
+        spaces.0,
+        spaces.1,
+        spaces.2,
+        observation.vector.len(),
+        skill.z.len(),
+        agent.actions
+    ))
+}

@@ -1,0 +1,21 @@
+//! What almost every game with agents needs.
+
+pub use crate::{
+    action::{Action, ActionSpace, ActionValue},
+    agent::Agent,
+    bot::BlindBot,
+    control::Control,
+    demo::{recorder::{Recorder, Recording}, replay::Replay},
+    episode::{Episode, EpisodeCount, EpisodeEnd, EpisodeEnded, StartEpisode},
+    game::Game,
+    headless::{PlaybotAppExt, headless_app},
+    level::{LevelQueue, LevelSource},
+    observation::{Observation, ObservationSpace, VectorSensor},
+    plugin::PlaybotPlugin,
+    policy::{ActionDraw, ActivePolicy, PlaybotSeed},
+    reward::Reward,
+    skill_prior::{ActiveSkill, SkillPrior},
+    split::LevelSplit,
+    state_hash::StateHash,
+    systems::{ObserveSchedule, PlaybotSystems},
+};

@@ -1,0 +1,29 @@
+//! Reports: results as a table on the console, curves as SVG, and both in one HTML file.
+//!
+//! - [`Chart`] draws [`Curve`]s as SVG.
+//! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`].
+//! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
+//!   no network. It follows the reader's light or dark setting and prints.
+//!
+//! Everything here is a function of its input: the same data give the same bytes.
+
+mod axis;
+mod chart;
+mod document;
+mod escape;
+mod line;
+mod mark;
+mod number;
+mod result;
+mod svg;
+mod table;
+#[cfg(test)]
+mod tests;
+mod text_table;
+mod text_width;
+
+pub use chart::{Chart, Curve};
+pub use document::{Report, ReportError, Section};
+pub use result::{ResultRow, ResultTable};
+pub use table::{PlainTable, Table};
+pub use text_table::to_text_table;

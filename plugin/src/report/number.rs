@@ -1,0 +1,108 @@
+//! Numbers for people: axis labels, table cells.
+
+/// What stands for a value that is not known.
+pub(super) const UNKNOWN: &str = "–";
+
+/// `value` with a fixed number of decimals, a real minus sign and thousands separated; NaN is unknown.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    if value.is_nan() {
+        return UNKNOWN.to_owned();
+    }
+    if value.abs() >= 1e15 {
+        return format!("{value:.2e}").replace('-', "−");
+    }
+    let text = format!("{:.decimals$}", value.abs());
+    let (whole, fraction) = match text.split_once('.') {
+        Some((whole, fraction)) => (whole, format!(".{fraction}")),
+        None => (text.as_str(), String::new()),
+    };
+    let mut out = String::new();
+    // A value that rounds to zero has no sign.
+    if value < 0.0 && text.chars().any(|c| ('1'..='9').contains(&c)) {
+        out.push('−');
+    }
+    for (i, digit) in whole.chars().enumerate() {
+        if i > 0 && (whole.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out + &fraction
+}
+
+/// A share (0 to 1) in percent with one decimal.
+pub(super) fn percent(share: f64) -> String {
+    if share.is_nan() { UNKNOWN.to_owned() } else { format!("{}%", fixed(share * 100.0, 1)) }
+}
+
+/// Decimals that show at least one digit of every standard error above 0; 2 when there is none.
+pub(super) fn decimals_for(errors: impl Iterator<Item = f64>) -> usize {
+    let smallest = errors.filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { (-smallest.log10().floor()).clamp(0.0, 4.0) as usize } else { 2 }
+}
+
+/// Mean and, where it is known, standard error.
+pub(super) fn mean_and_error(mean: f64, error: f64, decimals: usize) -> String {
+    if mean.is_nan() || error.is_nan() {
+        return fixed(mean, decimals);
+    }
+    format!("{} ± {}", fixed(mean, decimals), fixed(error, decimals))
+}
+
+/// Labels of axis ticks that are `step` apart, all in the same unit (none, k, M, G).
+pub(super) fn tick_labels(ticks: &[f64], step: f64) -> Vec<String> {
+    let largest = ticks.iter().fold(0.0f64, |m, t| m.max(t.abs()));
+    if largest >= 1e13 || (largest > 0.0 && largest < 1e-3) {
+        return ticks.iter().map(|t| scientific(*t)).collect();
+    }
+    let (unit, name) = match largest {
+        l if l >= 1e9 => (1e9, "G"),
+        l if l >= 1e6 => (1e6, "M"),
+        l if l >= 1e4 => (1e3, "k"),
+        _ => (1.0, ""),
+    };
+    // Steps are 1, 2, 2.5 or 5 times a power of ten.
+    let step = step / unit;
+    let decimals = (0..12).find(|&d| (step * 10f64.powi(d)).fract().abs() < 1e-6).unwrap_or(12) as usize;
+    ticks.iter().map(|&t| if t == 0.0 { "0".to_owned() } else { fixed(t / unit, decimals) + name }).collect()
+}
+
+fn scientific(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let text = format!("{value:.2e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+    format!("{mantissa}e{exponent}").replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells() {
+        assert_eq!(fixed(-1234567.891, 1), "−1,234,567.9");
+        assert_eq!(fixed(-0.001, 1), "0.0");
+        assert_eq!(fixed(f64::NAN, 1), "–");
+        assert_eq!(percent(0.9744), "97.4%");
+        assert_eq!(mean_and_error(9.7432, 0.1234, 2), "9.74 ± 0.12");
+        assert_eq!(mean_and_error(1234.5, 45.6, 0), "1,234 ± 46");
+        assert_eq!(mean_and_error(5.0, f64::NAN, 2), "5.00");
+        assert_eq!(mean_and_error(f64::NAN, 1.0, 2), "–");
+        assert_eq!(decimals_for([0.5, 0.08, f64::NAN, 0.0].into_iter()), 2);
+        assert_eq!(decimals_for([45.6].into_iter()), 0);
+        assert_eq!(decimals_for([f64::NAN].into_iter()), 2);
+    }
+
+    #[test]
+    fn ticks_share_a_unit() {
+        assert_eq!(tick_labels(&[0.0, 2e6, 4e6], 2e6), ["0", "2M", "4M"]);
+        assert_eq!(tick_labels(&[0.0, 0.25, 0.5], 0.25), ["0", "0.25", "0.50"]);
+        assert_eq!(tick_labels(&[-500.0, 0.0, 500.0], 500.0), ["−500", "0", "500"]);
+        assert_eq!(tick_labels(&[25_000.0, 50_000.0], 25_000.0), ["25k", "50k"]);
+        assert_eq!(tick_labels(&[5e-5, 1e-4], 5e-5), ["5e−5", "1e−4"]);
+        assert_eq!(tick_labels(&[], 1.0), [] as [&str; 0]);
+    }
+}

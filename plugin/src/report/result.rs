@@ -1,0 +1,137 @@
+//! Results of methods: rows, and which of them is best.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// What one method reached on one set of levels. NaN stands for a value that is not known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResultRow {
+    /// The method: "SCORE-PPO", "PPO", "random", …
+    pub method: String,
+    /// The levels: "train", "held-out", …
+    pub split: String,
+    /// Number of episodes; 0 when not known.
+    pub episodes: usize,
+    /// Mean of the undiscounted returns.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub return_mean: f64,
+    /// Standard error of that mean.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub return_se: f64,
+    /// Share of the episodes that succeeded, 0 to 1.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub success: f64,
+    /// Mean number of ticks of an episode.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub length_mean: f64,
+    /// Environment steps per second of wall-clock time, where it was measured.
+    pub steps_per_s: Option<f64>,
+}
+
+/// JSON has no NaN: it is written as null.
+fn null_is_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// A table of results.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ResultTable {
+    /// What the table shows.
+    pub caption: String,
+    /// The results, in the order they are shown.
+    pub rows: Vec<ResultRow>,
+    /// Figures from elsewhere, such as a paper's, shown below for comparison. They are never the best.
+    pub references: Vec<ResultRow>,
+}
+
+/// How a row compares with the others of its split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rank {
+    /// The highest mean return.
+    Best,
+    /// Below the best, by less than two standard errors of the difference.
+    CloseToBest,
+    /// Clearly below the best, or there is nothing to compare with.
+    Other,
+}
+
+/// Ranks the rows within each split, by mean return. A row alone in its split is not the best of anything.
+pub(super) fn ranks(rows: &[ResultRow]) -> Vec<Rank> {
+    let rank = |row: &ResultRow| {
+        let rivals = || rows.iter().filter(|r| r.split == row.split && !r.return_mean.is_nan());
+        let best = rivals().max_by(|a, b| a.return_mean.total_cmp(&b.return_mean))?;
+        if rivals().count() < 2 || row.return_mean.is_nan() {
+            return None;
+        }
+        let behind = best.return_mean - row.return_mean;
+        let noise = 2.0 * best.return_se.hypot(row.return_se);
+        if row.return_mean >= best.return_mean {
+            Some(Rank::Best)
+        } else if behind < noise {
+            Some(Rank::CloseToBest)
+        } else {
+            None
+        }
+    };
+    rows.iter().map(|row| rank(row).unwrap_or(Rank::Other)).collect()
+}
+
+/// The key to the signs of [`Rank`], for the signs that occur.
+pub(super) fn rank_key(ranks: &[Rank], best: &str, close: &str) -> Option<String> {
+    if !ranks.contains(&Rank::Best) {
+        return None;
+    }
+    let mut key = format!("{best} highest mean return of its split");
+    if ranks.contains(&Rank::CloseToBest) {
+        key += &format!("; {close} within two standard errors of the difference to it");
+    }
+    Some(key)
+}
+
+#[cfg(test)]
+pub(super) fn sample_rows() -> Vec<ResultRow> {
+    let row = |method: &str, split: &str, return_mean, return_se, success, steps_per_s| ResultRow {
+        method: method.into(),
+        split: split.into(),
+        episodes: 500,
+        return_mean,
+        return_se,
+        success,
+        length_mean: 83.25,
+        steps_per_s,
+    };
+    vec![
+        row("SCORE-PPO", "train", 9.61, 0.08, 0.961, Some(12_345.6)),
+        row("PPO", "train", 9.52, 0.09, 0.952, Some(15_001.0)),
+        row("SCORE-PPO", "held-out", 9.14, 0.11, 0.914, None),
+        row("PPO", "held-out", 7.40, 0.19, 0.74, None),
+        row("random", "held-out", -0.31, 0.14, 0.02, None),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_is_best_within_its_split() {
+        use Rank::*;
+        assert_eq!(ranks(&sample_rows()), [Best, CloseToBest, Best, Other, Other]);
+        assert_eq!(ranks(&sample_rows()[..1]), [Other], "alone");
+        let mut rows = sample_rows();
+        rows[0].return_mean = f64::NAN;
+        assert_eq!(ranks(&rows)[..2], [Other, Other]);
+        rows[0].return_mean = rows[1].return_mean;
+        assert_eq!(ranks(&rows)[..2], [Best, Best], "a tie");
+        assert_eq!(ranks(&[]), []);
+    }
+
+    #[test]
+    fn unknown_values_survive_json() {
+        let mut row = sample_rows().remove(0);
+        row.success = f64::NAN;
+        let json = serde_json::to_string(&row).expect("serialises");
+        assert!(json.contains("\"success\":null"), "{json}");
+        let back: ResultRow = serde_json::from_str(&json).expect("reads back");
+        assert!(back.success.is_nan() && back.return_mean == row.return_mean);
+    }
+}

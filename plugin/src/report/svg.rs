@@ -1,0 +1,242 @@
+//! Drawing a chart as SVG.
+
+use std::fmt::Write;
+
+use super::axis::Axis;
+use super::chart::{Chart, is_point};
+use super::escape::escape;
+use super::line::{band_paths, line_path, stretches};
+use super::mark::Mark;
+use super::number::tick_labels;
+use super::text_width::{spread, text_width, wrap};
+
+/// Colours and fonts of a chart, for light and dark surroundings.
+pub(super) const CHART_STYLE: &str = include_str!("chart.css");
+/// Number of line colours in [`CHART_STYLE`].
+const COLOURS: usize = 7;
+/// Width of the drawing in pixels.
+const WIDTH: f64 = 720.0;
+/// Height of the plot without its labels, in pixels.
+const PLOT_HEIGHT: f64 = 250.0;
+/// Font size of labels in pixels.
+const SIZE: f64 = 13.0;
+/// Distance of two lines of text in pixels.
+const LINE: f64 = 17.0;
+/// Length of the piece of line before a label, with its space.
+const KEY: f64 = 26.0;
+
+impl Chart {
+    /// The chart as a complete SVG file: text as text, no fonts or scripts, 720 pixels wide,
+    /// in light or dark colours as the reader prefers.
+    pub fn to_svg(&self) -> String {
+        draw(self, true)
+    }
+}
+
+/// The chart inside a page that holds [`CHART_STYLE`] (`alone` = false), or as a file of its own.
+pub(super) fn draw(chart: &Chart, alone: bool) -> String {
+    let layout = Layout::new(chart);
+    let mut body = String::new();
+    head(chart, &layout, &mut body);
+    axes(chart, &layout, &mut body);
+    marks(&layout, &mut body);
+    lines(chart, &layout, &mut body);
+    labels(chart, &layout, &mut body);
+    foot(chart, &layout, &mut body);
+    let open = format!(
+        "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {h:.0}\" \
+         width=\"{WIDTH:.0}\" height=\"{h:.0}\" role=\"img\" aria-label=\"{label}\">\n",
+        h = layout.height,
+        label = escape(&chart.title),
+    );
+    let style = if alone {
+        format!("<style>\n{CHART_STYLE}</style>\n<rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n")
+    } else {
+        String::new()
+    };
+    format!("{open}{style}{body}</svg>\n")
+}
+
+/// Where things are. All lengths in pixels.
+struct Layout {
+    x: Axis,
+    y: Axis,
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    height: f64,
+    title: Vec<String>,
+    marks: Vec<Mark>,
+    /// Whether the labels stand beside the lines, or below the plot.
+    direct: bool,
+    notes: Vec<String>,
+}
+
+impl Layout {
+    fn new(chart: &Chart) -> Self {
+        let points = || chart.curves.iter().flat_map(|c| c.points.iter().copied()).filter(is_point);
+        let bands = chart.curves.iter().flat_map(|c| c.band.iter().flatten().copied()).filter(is_point);
+        let x = Axis::tight(points().map(|p| p.0).chain(chart.marks.iter().map(|m| m.1)), 6);
+        let y = Axis::rounded(points().map(|p| p.1).chain(bands.flat_map(|b| [b.0, b.1])), 5);
+
+        let drawn = || chart.curves.iter().filter(|c| !c.is_blank() && !c.label.is_empty());
+        let label = drawn().map(|c| text_width(&c.label, SIZE)).fold(0.0, f64::max);
+        let direct = label <= 170.0 && drawn().count() as f64 * LINE <= PLOT_HEIGHT;
+        let ticks = tick_labels(&y.ticks, y.step).iter().map(|t| text_width(t, SIZE)).fold(0.0, f64::max);
+        let left = ticks + 12.0;
+        let right = if direct && label > 0.0 { WIDTH - label - KEY - 12.0 } else { WIDTH - 16.0 };
+
+        let title = wrap(&chart.title, WIDTH - 10.0, 16.0);
+        let mut top = 6.0 + 20.0 * title.len() as f64;
+        if !chart.y_label.is_empty() {
+            top += LINE;
+        }
+        let marks = Mark::place(&chart.marks, WIDTH, SIZE, |v| left + x.place(v) * (right - left));
+        let rows = marks.iter().map(|m| m.row + 1).max().unwrap_or(0);
+        top += 10.0 + LINE * rows as f64;
+        let bottom = top + PLOT_HEIGHT;
+
+        let notes: Vec<String> = chart.footnotes().iter().flat_map(|n| wrap(n, WIDTH - 10.0, SIZE)).collect();
+        let legend = if direct { 0 } else { drawn().count() };
+        let x_label = usize::from(!chart.x_label.is_empty());
+        let height = bottom + 24.0 + LINE * (x_label + legend + notes.len()) as f64 + 8.0;
+        Self { x, y, left, right, top, bottom, height, title, marks, direct, notes }
+    }
+
+    fn px(&self, x: f64) -> f64 {
+        self.left + self.x.place(x) * (self.right - self.left)
+    }
+
+    fn py(&self, y: f64) -> f64 {
+        self.bottom - self.y.place(y) * (self.bottom - self.top)
+    }
+}
+
+fn text(out: &mut String, class: &str, x: f64, y: f64, anchor: &str, content: &str) {
+    let content = escape(content);
+    let _ =
+        writeln!(out, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{content}</text>");
+}
+
+fn rule(out: &mut String, class: &str, from: (f64, f64), to: (f64, f64)) {
+    let _ = writeln!(
+        out,
+        "<line class=\"{class}\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>",
+        from.0, from.1, to.0, to.1
+    );
+}
+
+fn head(chart: &Chart, at: &Layout, out: &mut String) {
+    for (i, line) in at.title.iter().enumerate() {
+        text(out, "title", 0.0, 17.0 + 20.0 * i as f64, "start", line);
+    }
+    let y = 6.0 + 20.0 * at.title.len() as f64 + 13.0;
+    if !chart.y_label.is_empty() {
+        text(out, "quiet", 0.0, y, "start", &chart.y_label);
+    }
+}
+
+fn axes(chart: &Chart, at: &Layout, out: &mut String) {
+    for (tick, label) in at.y.ticks.iter().zip(tick_labels(&at.y.ticks, at.y.step)) {
+        let y = at.py(*tick);
+        let class = if *tick == 0.0 || y >= at.bottom - 0.5 { "base" } else { "grid" };
+        rule(out, class, (at.left, y), (at.right, y));
+        text(out, "quiet", at.left - 8.0, y + 4.5, "end", &label);
+    }
+    for (tick, label) in at.x.ticks.iter().zip(tick_labels(&at.x.ticks, at.x.step)) {
+        let x = at.px(*tick);
+        rule(out, "base", (x, at.bottom), (x, at.bottom + 5.0));
+        text(out, "quiet", x, at.bottom + 19.0, "middle", &label);
+    }
+    if !chart.x_label.is_empty() {
+        text(out, "quiet", at.right, at.bottom + 19.0 + LINE, "end", &chart.x_label);
+    }
+}
+
+fn marks(at: &Layout, out: &mut String) {
+    let y = |mark: &Mark| at.top - 8.0 - LINE * mark.row as f64;
+    for mark in &at.marks {
+        rule(out, "mark", (mark.x, y(mark) - 11.0), (mark.x, at.bottom));
+    }
+    for mark in &at.marks {
+        let (x, anchor) = if mark.label_left { (mark.x - 4.0, "end") } else { (mark.x + 4.0, "start") };
+        text(out, "quiet halo", x, y(mark), anchor, &mark.label);
+    }
+}
+
+/// The classes that give a line its colour and, from the second round of colours on, its dashes.
+fn line_class(index: usize) -> String {
+    format!("c{} d{}", index % COLOURS, (index / COLOURS).min(2))
+}
+
+fn lines(chart: &Chart, at: &Layout, out: &mut String) {
+    let parts: Vec<_> = chart.curves.iter().map(|c| stretches(c, |x| at.px(x), |y| at.py(y))).collect();
+    // All bands lie below all lines.
+    for (i, part) in parts.iter().enumerate() {
+        for path in part.iter().flat_map(|dots| band_paths(dots)) {
+            let _ = writeln!(out, "<path class=\"band {}\" d=\"{path}\"/>", line_class(i));
+        }
+    }
+    // The first curve is the subject: it is drawn last, above the others.
+    for (i, part) in parts.iter().enumerate().rev() {
+        let class = line_class(i);
+        for dots in part {
+            if let [dot] = dots.as_slice() {
+                if let Some((low, high)) = dot.band {
+                    rule(out, &format!("line {class}"), (dot.x, low), (dot.x, high));
+                }
+                let _ =
+                    writeln!(out, "<circle class=\"dot {class}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\"/>", dot.x, dot.y);
+            } else {
+                let _ = writeln!(out, "<path class=\"line {class}\" d=\"{}\"/>", line_path(dots));
+            }
+        }
+    }
+    if chart.curves.iter().all(|c| c.is_blank()) {
+        let (x, y) = ((at.left + at.right) / 2.0, (at.top + at.bottom) / 2.0);
+        text(out, "quiet", x, y, "middle", "no data");
+    }
+}
+
+/// The names of the lines: at the right of the plot, at the height where each line ends, or below it.
+fn labels(chart: &Chart, at: &Layout, out: &mut String) {
+    let named: Vec<(usize, &str, (f64, f64))> = chart
+        .curves
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| !c.label.is_empty())
+        .filter_map(|(i, c)| Some((i, c.label.as_str(), *c.points.iter().rfind(|p| is_point(p))?)))
+        .collect();
+    if !at.direct {
+        let mut y = at.bottom + 19.0 + if chart.x_label.is_empty() { 0.0 } else { LINE };
+        for (i, label, _) in &named {
+            y += LINE;
+            rule(out, &format!("line {}", line_class(*i)), (at.left, y - 4.5), (at.left + 18.0, y - 4.5));
+            text(out, "label", at.left + KEY, y, "start", label);
+        }
+        return;
+    }
+    let wanted: Vec<f64> = named.iter().map(|(_, _, end)| at.py(end.1)).collect();
+    let placed = spread(&wanted, LINE, at.top, at.bottom);
+    for ((i, label, end), (y, wanted)) in named.iter().zip(placed.iter().zip(&wanted)) {
+        let class = line_class(*i);
+        let key = at.right + 12.0;
+        // A thin line leads from the end of the curve to its label, if the curve reaches the margin.
+        if at.px(end.0) > at.right - 1.0 {
+            rule(out, &format!("leader {class}"), (at.right + 2.0, *wanted), (key, *y));
+        }
+        rule(out, &format!("line {class}"), (key, *y), (key + 12.0, *y));
+        text(out, "label", at.right + KEY + 3.0, y + 4.5, "start", label);
+    }
+}
+
+fn foot(chart: &Chart, at: &Layout, out: &mut String) {
+    let x_label = usize::from(!chart.x_label.is_empty());
+    let legend =
+        if at.direct { 0 } else { chart.curves.iter().filter(|c| !c.is_blank() && !c.label.is_empty()).count() };
+    for (i, note) in at.notes.iter().enumerate() {
+        let y = at.bottom + 24.0 + LINE * (x_label + legend + i) as f64 + 12.0;
+        text(out, "note", 0.0, y, "start", note);
+    }
+}

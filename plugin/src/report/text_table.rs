@@ -1,0 +1,116 @@
+//! Results for the console.
+
+use super::escape::one_line;
+use super::number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent};
+use super::result::{Rank, ResultRow, ResultTable, rank_key, ranks};
+
+const HEADINGS: [&str; 7] = ["method", "split", "episodes", "return", "success", "length", "steps/s"];
+/// The first columns are words, the others numbers.
+const WORDS: usize = 2;
+
+/// The rows as an aligned table for the console: the best row of each split is marked with `*`, those
+/// that are not clearly worse with `~`. A column that is unknown in all rows is left out.
+///
+/// Ends with a line feed; without rows it says so.
+pub fn to_text_table(rows: &[ResultRow]) -> String {
+    render(rows, &[])
+}
+
+impl ResultTable {
+    /// The table for the console, see [`to_text_table`]: caption, results, then the references.
+    pub fn to_text(&self) -> String {
+        let table = render(&self.rows, &self.references);
+        if self.caption.is_empty() { table } else { format!("{}\n{table}", one_line(&self.caption)) }
+    }
+}
+
+fn render(rows: &[ResultRow], references: &[ResultRow]) -> String {
+    if rows.is_empty() && references.is_empty() {
+        return "no results\n".to_owned();
+    }
+    let ranks = ranks(rows);
+    let all = || rows.iter().chain(references);
+    let decimals = decimals_for(all().map(|r| r.return_se));
+    let cells: Vec<[String; 7]> = all().map(|row| cells(row, decimals)).collect();
+    let shown: Vec<usize> =
+        (0..HEADINGS.len()).filter(|&c| c < WORDS || cells.iter().any(|row| row[c] != UNKNOWN)).collect();
+    let width = |c: usize| cells.iter().map(|row| row[c].chars().count()).fold(HEADINGS[c].len(), usize::max);
+    let line = |sign: char, cell: &dyn Fn(usize) -> String| {
+        let mut line = format!("{sign} ");
+        for &c in &shown {
+            let (text, width) = (cell(c), width(c));
+            line += &if c < WORDS { format!("{text:<width$}  ") } else { format!("{text:>width$}  ") };
+        }
+        line.trim_end().to_owned() + "\n"
+    };
+    let mut out = line(' ', &|c| HEADINGS[c].to_owned());
+    out += &line(' ', &|c| "-".repeat(width(c)));
+    for (i, row) in cells.iter().enumerate() {
+        let sign = match ranks.get(i) {
+            Some(Rank::Best) => '*',
+            Some(Rank::CloseToBest) => '~',
+            Some(Rank::Other) => ' ',
+            None => '>',
+        };
+        out += &line(sign, &|c| row[c].clone());
+    }
+    let mut key = rank_key(&ranks, "*", "~").into_iter().collect::<Vec<_>>();
+    if !references.is_empty() {
+        key.push("> reference, not measured here".to_owned());
+    }
+    if !key.is_empty() {
+        out += &format!("{}\n", key.join("; "));
+    }
+    out
+}
+
+fn cells(row: &ResultRow, decimals: usize) -> [String; 7] {
+    [
+        one_line(&row.method),
+        one_line(&row.split),
+        if row.episodes == 0 { UNKNOWN.to_owned() } else { fixed(row.episodes as f64, 0) },
+        mean_and_error(row.return_mean, row.return_se, decimals),
+        percent(row.success),
+        fixed(row.length_mean, 1),
+        row.steps_per_s.map_or(UNKNOWN.to_owned(), |s| fixed(s, 0)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::result::sample_rows;
+    use super::*;
+
+    #[test]
+    fn columns_are_aligned_and_the_best_is_marked() {
+        let expected = [
+            "  method     split     episodes        return  success  length  steps/s",
+            "  ---------  --------  --------  ------------  -------  ------  -------",
+            "* SCORE-PPO  train          500   9.61 ± 0.08    96.1%    83.2   12,346",
+            "~ PPO        train          500   9.52 ± 0.09    95.2%    83.2   15,001",
+            "* SCORE-PPO  held-out       500   9.14 ± 0.11    91.4%    83.2        –",
+            "  PPO        held-out       500   7.40 ± 0.19    74.0%    83.2        –",
+            "  random     held-out       500  −0.31 ± 0.14     2.0%    83.2        –",
+            "* highest mean return of its split; ~ within two standard errors of the difference to it",
+            "",
+        ]
+        .join("\n");
+        assert_eq!(to_text_table(&sample_rows()), expected);
+    }
+
+    #[test]
+    fn unknown_columns_are_left_out_and_references_set_apart() {
+        let mut rows = sample_rows();
+        rows.truncate(2);
+        for row in &mut rows {
+            row.steps_per_s = None;
+            row.success = f64::NAN;
+        }
+        let table = ResultTable { caption: "CoinRun".into(), references: vec![rows.remove(1)], rows };
+        let text = table.to_text();
+        assert!(text.starts_with("CoinRun\n  method"), "{text}");
+        assert!(!text.contains("steps/s") && !text.contains("success"), "{text}");
+        assert!(text.contains("\n> PPO") && text.ends_with("> reference, not measured here\n"), "{text}");
+        assert_eq!(to_text_table(&[]), "no results\n");
+    }
+}

@@ -1,0 +1,78 @@
+//! Skills: what the policy is asked to do for the next few ticks.
+
+use bevy::prelude::*;
+use playbot_learner::{Prior, SkillDraw};
+
+use crate::{
+    agent::{Agent, AgentOrder},
+    control::Control,
+    episode::Episode,
+    fault::Faults,
+    observation::Observation,
+    policy::AgentStreams,
+};
+
+/// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every `horizon` fixed ticks
+/// (the paper's T), each agent on its own count.
+#[derive(Resource, Clone)]
+pub struct SkillPrior {
+    /// Distribution of skills: learned, or standard normal.
+    pub prior: Prior,
+    /// Ticks for which a skill is held.
+    pub horizon: u32,
+    /// A random draw, or the mean.
+    pub draw: SkillDraw,
+}
+
+/// The skill an agent is following.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct ActiveSkill {
+    /// The skill as the policy sees it; empty without a [`SkillPrior`].
+    pub z: Vec<f32>,
+    /// Ticks until the next draw, this one included; 0 asks for a draw.
+    pub ticks_left: u32,
+}
+
+/// Draws for the agents whose skill has run out, in one batch.
+pub(crate) fn draw_skills(
+    prior: Res<SkillPrior>,
+    order: Res<AgentOrder>,
+    mut agents: Query<(&Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams), With<Agent>>,
+    mut faults: ResMut<Faults>,
+) {
+    let (mut batch, mut drawing) = (Vec::new(), Vec::new());
+    for &entity in order.entities() {
+        let Ok((control, episode, observation, skill, _)) = agents.get(entity) else { continue };
+        if *control == Control::Policy && episode.is_running() && skill.ticks_left == 0 {
+            batch.extend_from_slice(&observation.vector);
+            drawing.push(entity);
+        }
+    }
+    if drawing.is_empty() {
+        return;
+    }
+    let mut normal = |row: usize| match agents.get_mut(drawing[row]) {
+        Ok((.., mut streams)) => playbot_learner::rng::normal(&mut streams.skill),
+        Err(_) => 0.0,
+    };
+    let skills = match prior.prior.sample(&batch, drawing.len(), prior.draw, &mut normal) {
+        Ok(skills) => skills,
+        Err(error) => return faults.report(format!("the skill prior cannot draw: {error}")),
+    };
+    let latent = skills.len() / drawing.len();
+    for (row, &entity) in drawing.iter().enumerate() {
+        let Ok((.., mut skill, _)) = agents.get_mut(entity) else { continue };
+        skill.z.clear();
+        skill.z.extend_from_slice(&skills[row * latent..(row + 1) * latent]);
+        skill.ticks_left = prior.horizon;
+    }
+}
+
+/// One tick of every held skill is over.
+pub(crate) fn count_down_skills(mut agents: Query<(&Control, &Episode, &mut ActiveSkill)>) {
+    for (control, episode, mut skill) in &mut agents {
+        if control.is_active() && episode.is_running() && skill.ticks_left > 0 {
+            skill.ticks_left -= 1;
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Named ranges of levels, so that training levels and held-out levels are never mixed up.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Levels `first..=last` of one mode of a game. Written `hard:64..127`, both ends included.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct LevelSplit {
+    /// Mode of the game, such as `easy` or `hard`.
+    pub mode: String,
+    /// First level.
+    pub first: u64,
+    /// Last level, included.
+    pub last: u64,
+}
+
+impl LevelSplit {
+    /// Number of levels; at least 1.
+    pub fn len(&self) -> u64 {
+        self.last - self.first + 1
+    }
+
+    /// Never true: a split has at least one level.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// All levels, in order.
+    pub fn levels(&self) -> impl Iterator<Item = u64> + use<> {
+        self.first..=self.last
+    }
+
+    /// Whether some level belongs to both.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.mode == other.mode && self.first <= other.last && other.first <= self.last
+    }
+}
+
+impl fmt::Display for LevelSplit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}..{}", self.mode, self.first, self.last)
+    }
+}
+
+/// The text is not a split.
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error("`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127")]
+pub struct SplitError(String);
+
+impl FromStr for LevelSplit {
+    type Err = SplitError;
+
+    fn from_str(text: &str) -> Result<Self, SplitError> {
+        let parse = || {
+            let (mode, range) = text.split_once(':')?;
+            let (first, last) = range.split_once("..").unwrap_or((range, range));
+            let (first, last) = (first.parse().ok()?, last.parse().ok()?);
+            (!mode.is_empty() && first <= last).then(|| Self { mode: mode.to_owned(), first, last })
+        };
+        parse().ok_or_else(|| SplitError(text.to_owned()))
+    }
+}
+
+impl TryFrom<String> for LevelSplit {
+    type Error = SplitError;
+
+    fn try_from(text: String) -> Result<Self, SplitError> {
+        text.parse()
+    }
+}
+
+impl From<LevelSplit> for String {
+    fn from(split: LevelSplit) -> Self {
+        split.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_form_reads_back() {
+        let split: LevelSplit = "hard:64..127".parse().expect("a split");
+        assert_eq!((split.first, split.last, split.len()), (64, 127, 64));
+        assert_eq!(split.to_string(), "hard:64..127");
+        assert_eq!("easy:7".parse::<LevelSplit>().expect("one level").len(), 1);
+        for bad in ["", "hard", "hard:9..3", ":1..2", "hard:a..b", "hard:-1..2"] {
+            assert!(bad.parse::<LevelSplit>().is_err(), "{bad} was taken");
+        }
+    }
+
+    #[test]
+    fn overlap_needs_the_same_mode() {
+        let split = |text: &str| text.parse::<LevelSplit>().expect("a split");
+        assert!(split("hard:0..63").overlaps(&split("hard:63..80")));
+        assert!(!split("hard:0..63").overlaps(&split("hard:64..127")));
+        assert!(!split("hard:0..63").overlaps(&split("easy:0..63")));
+    }
+}

@@ -1,0 +1,31 @@
+//! When the plugin does what.
+
+use bevy::{ecs::schedule::ScheduleLabel, prelude::*};
+
+/// Parts of a tick, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PlaybotSystems {
+    /// `FixedPreUpdate`: agents without a level get one.
+    Begin,
+    /// `FixedPreUpdate`: [`ObserveSchedule`] fills the observations.
+    Observe,
+    /// `FixedPreUpdate`: whoever holds the control writes the action.
+    Decide,
+    /// `FixedPreUpdate`: actions are checked and handed to the game's input.
+    Act,
+    /// `FixedPostUpdate`: reward and length are counted.
+    Judge,
+    /// `FixedPostUpdate`: the tick is written down, for demonstrations and for the learner.
+    Record,
+    /// `FixedPostUpdate`: ended episodes are announced.
+    Reset,
+}
+
+/// The game's sensors. Runs in [`PlaybotSystems::Observe`], and once more after a tick that truncated an episode, since
+/// the learner needs the value of the state in which the clock stopped.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ObserveSchedule;
+
+pub(crate) fn run_observe_schedule(world: &mut World) {
+    world.run_schedule(ObserveSchedule);
+}

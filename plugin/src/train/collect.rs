@@ -1,0 +1,273 @@
+//! One World that plays with the current policy and keeps what the learner needs.
+
+use bevy::prelude::*;
+use playbot_learner::{Actions, LearnError, Policy, Rollout, RolloutStep};
+
+use crate::{
+    action::Action,
+    agent::{Agent, AgentOrder},
+    control::Control,
+    demo::recorder,
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    fault::{Fault, Faults},
+    game::{Game, build_world},
+    headless::tick_world,
+    level::LevelQueue,
+    observation::Observation,
+    policy::{ActionDraw, ActivePolicy, Decision},
+    reward::Reward,
+    skill_prior::{ActiveSkill, SkillPrior, draw_skills},
+    split::LevelSplit,
+    systems::{ObserveSchedule, PlaybotSystems},
+    train::arena_state::ActionLog,
+};
+
+/// A World of arenas that fills rollouts.
+pub struct Collector {
+    world: World,
+    agents: Vec<Entity>,
+}
+
+/// Rows of the rollout that is being filled.
+#[derive(Resource)]
+struct Collecting {
+    rollout: Rollout,
+    obs_dim: usize,
+}
+
+/// Episodes that ended during the rollout, in the order of ticks and agents.
+#[derive(Resource, Default)]
+struct Finished(Vec<EpisodeEnded>);
+
+fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {
+    finished.0.push(*event);
+}
+
+impl Collector {
+    /// Agents `first..first + count` on the levels of a split, with skills if there is a prior.
+    pub fn new(
+        game: &dyn Game,
+        split: &LevelSplit,
+        seed: u64,
+        first: u32,
+        count: u32,
+        prior: Option<SkillPrior>,
+    ) -> Self {
+        let (mut world, agents) = build_world(game, &split.mode, seed, first, count);
+        let obs_dim = game.observation().len();
+        world.init_resource::<Finished>();
+        world.add_observer(note_finished);
+        world.insert_resource(Collecting { rollout: Rollout::new(0, obs_dim, 0, &game.actions()), obs_dim });
+        if let Some(prior) = prior {
+            world.insert_resource(prior);
+        }
+        world.schedule_scope(FixedPostUpdate, |_, schedule| {
+            schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
+        });
+        for &agent in &agents {
+            world.entity_mut(agent).insert((
+                Control::Policy,
+                LevelQueue::Uniform { first: split.first, last: split.last },
+                ActionLog::default(),
+            ));
+        }
+        Self { world, agents }
+    }
+
+    /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for none.
+    ///
+    /// Returns the rollout, `[steps, agents]`, and the episodes that ended in it.
+    ///
+    /// # Errors
+    ///
+    /// The first breach of contract of the game, with agent, level and tick.
+    pub fn collect(
+        &mut self,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let world = &mut self.world;
+        world.insert_resource(ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample });
+        let obs_dim = world.resource::<Collecting>().obs_dim;
+        let empty = Rollout::new(self.agents.len(), obs_dim, latent, &policy.action_space());
+        world.resource_mut::<Collecting>().rollout = empty.clone();
+        for _ in 0..steps {
+            tick_world(world)?;
+        }
+        let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
+        rollout.next_values = peek_values(world, policy).map_err(|error| Fault(error.to_string()))?;
+        world.resource_mut::<Faults>().take()?;
+        Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
+    }
+
+    /// The World, for saving and restoring its arenas.
+    pub(crate) fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// The agents, in the order of their numbers.
+    pub fn agents(&self) -> &[Entity] {
+        &self.agents
+    }
+}
+
+/// Values of the states in which the rollout stopped, under the skills that will be active there. Agents between two
+/// episodes have no such state; their entry is 0 and is never used, since their last row ended an episode.
+fn peek_values(world: &mut World, policy: &Policy) -> Result<Vec<f32>, LearnError> {
+    world.run_schedule(ObserveSchedule);
+    if world.contains_resource::<SkillPrior>()
+        && let Err(error) = world.run_system_cached(draw_skills)
+    {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    let running: Vec<_> = (0..entities.len())
+        .filter(|&row| world.get::<Episode>(entities[row]).is_some_and(Episode::is_running))
+        .collect();
+    let (mut skills, mut observations) = (Vec::new(), Vec::new());
+    for &row in &running {
+        push_state(world, entities[row], &mut skills, &mut observations);
+    }
+    let values = policy.values(&skills, &observations, running.len())?;
+    let mut all = vec![0.0; entities.len()];
+    for (&row, value) in running.iter().zip(values) {
+        all[row] = value;
+    }
+    Ok(all)
+}
+
+fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Vec<f32>) {
+    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
+        skills.extend_from_slice(&skill.z);
+        observations.extend_from_slice(&observation.vector);
+    }
+}
+
+/// One tick of all agents, before it becomes part of the rollout.
+struct Rows {
+    obs: Vec<f32>,
+    z: Vec<f32>,
+    actions: Actions,
+    log_probs: Vec<f32>,
+    values: Vec<f32>,
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+}
+
+impl Rows {
+    fn new(policy: &Policy) -> Self {
+        let empty = Vec::new;
+        Self {
+            obs: empty(),
+            z: empty(),
+            actions: Actions::empty(&policy.action_space()),
+            log_probs: empty(),
+            values: empty(),
+            rewards: empty(),
+            terminated: Vec::new(),
+            truncated: Vec::new(),
+        }
+    }
+
+    fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
+        RolloutStep {
+            obs: &self.obs,
+            z: &self.z,
+            actions: &self.actions,
+            log_probs: &self.log_probs,
+            values: &self.values,
+            rewards: &self.rewards,
+            terminated: &self.terminated,
+            truncated: &self.truncated,
+            final_values,
+        }
+    }
+}
+
+/// Appends one row per agent to the rollout.
+fn collect_tick(world: &mut World) {
+    let mut query = world.query_filtered::<(
+        &Observation,
+        &ActiveSkill,
+        &Action,
+        &Decision,
+        &Reward,
+        &Episode,
+        &mut ActionLog,
+    ), With<Agent>>();
+    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    let policy = world.resource::<ActivePolicy>().policy.clone();
+    let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
+    if collecting.rollout.envs != entities.len() {
+        // Arenas are being restored, not played.
+        world.insert_resource(collecting);
+        return;
+    }
+    let final_values = final_values(world, &entities, &policy).unwrap_or_else(|error| {
+        world.resource_mut::<Faults>().report(error.to_string());
+        vec![0.0; entities.len()]
+    });
+    let mut rows = Rows::new(&policy);
+    for &entity in &entities {
+        let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
+            continue;
+        };
+        rows.obs.extend_from_slice(&observation.vector);
+        rows.z.extend_from_slice(&skill.z);
+        if let Err(error) = rows.actions.push(&action.0) {
+            return world.resource_mut::<Faults>().report(error.to_string());
+        }
+        rows.log_probs.push(decision.log_prob);
+        rows.values.push(decision.value);
+        rows.rewards.push(reward.get());
+        rows.terminated.push(matches!(episode.end(), Some(EpisodeEnd::Terminated { .. })));
+        rows.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
+        log.note(episode, &action.0);
+    }
+    if let Err(error) = collecting.rollout.push_step(rows.as_step(&final_values)) {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+    world.insert_resource(collecting);
+}
+
+/// Value of the last state of each episode that ran out of time in this tick; 0 elsewhere.
+///
+/// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
+/// episode.
+fn final_values(world: &mut World, entities: &[Entity], policy: &Policy) -> Result<Vec<f32>, LearnError> {
+    let mut values = vec![0.0; entities.len()];
+    let truncated: Vec<_> = (0..entities.len())
+        .filter(|&row| {
+            world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
+        })
+        .collect();
+    if truncated.is_empty() {
+        return Ok(values);
+    }
+    let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
+    world.run_schedule(ObserveSchedule);
+    let (mut skills, mut observations) = (Vec::new(), Vec::new());
+    for &row in &truncated {
+        let from = observations.len();
+        let skill_from = skills.len();
+        push_state(world, entities[row], &mut skills, &mut observations);
+        let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
+        if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
+            let mean = prior.prior.sample(&observations[from..], 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
+            skills.truncate(skill_from);
+            skills.extend(mean);
+        }
+    }
+    for (row, value) in truncated.iter().zip(policy.values(&skills, &observations, truncated.len())?) {
+        values[*row] = value;
+    }
+    // The row that is being written belongs to the state before the action.
+    for (&entity, before) in entities.iter().zip(before) {
+        if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
+            *observation = before;
+        }
+    }
+    Ok(values)
+}

@@ -1,0 +1,292 @@
+//! The folder of a run: configuration, metrics, checkpoints, report.
+//!
+//! ```text
+//! runs/<id>/experiment.ron     the experiment with all defaults filled in
+//! runs/<id>/run.json           algorithm, seed, version
+//! runs/<id>/metrics.jsonl      one line per update; the same bytes for the same seed
+//! runs/<id>/timing.jsonl       seconds and steps per second of each update
+//! runs/<id>/checkpoint/        learner.safetensors, arenas.json
+//! ```
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+};
+
+use playbot_learner::{DeviceKind, FileError, PpoLearner};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use thiserror::Error;
+
+use super::{
+    arena_state::{ArenaState, restore_arenas, save_arenas},
+    config::{Algorithm, Experiment},
+    config_file::{ConfigError, read_experiment},
+    trainer::{Progress, TrainError, Trainer, UpdateReport},
+};
+use crate::game::Game;
+
+const CHECKPOINT: &str = "checkpoint";
+const LEARNER: &str = "learner.safetensors";
+const ARENAS: &str = "arenas.json";
+
+/// A run's folder cannot be used.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The folder exists already.
+    #[error("{} exists already: choose another --run, go on with --resume, or overwrite with --force", .0.display())]
+    Exists(PathBuf),
+    /// There is nothing to go on with.
+    #[error("{} has no checkpoint to resume from", .0.display())]
+    NothingToResume(PathBuf),
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A file of the run is damaged.
+    #[error("{}: {message}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The learner's file cannot be read or written.
+    #[error(transparent)]
+    Learner(#[from] FileError),
+    /// The saved experiment cannot be read.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The saved training does not fit the game.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+}
+
+fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
+    move |source| RunError::Io { action, path: path.into(), source }
+}
+
+/// Writes a file under a temporary name, flushes it to the disk and renames it: the old content or the new, never half.
+///
+/// # Errors
+///
+/// [`RunError::Io`].
+pub fn write_atomically(path: &Path, content: &[u8]) -> Result<(), RunError> {
+    let temporary = path.with_extension("tmp");
+    let write = || -> io::Result<()> {
+        let mut file = File::create(&temporary)?;
+        file.write_all(content)?;
+        file.sync_all()
+    };
+    write().map_err(io_error("write", &temporary))?;
+    fs::rename(&temporary, path).map_err(io_error("write", path))
+}
+
+/// What `run.json` says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunInfo {
+    /// The algorithm.
+    pub algorithm: Algorithm,
+    /// The seed.
+    pub seed: u64,
+    /// Version of this crate.
+    pub version: String,
+    /// Revision of the code, where it is known.
+    pub revision: String,
+}
+
+/// The saved state of a training besides the learner.
+#[derive(Serialize, Deserialize)]
+struct TrainState {
+    progress: Progress,
+    arenas: Vec<Vec<ArenaState>>,
+}
+
+/// An open folder of a run.
+pub struct RunDir {
+    path: PathBuf,
+}
+
+impl RunDir {
+    /// Makes the folder and writes what the run is.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Exists`] unless `force`, which empties the folder; [`RunError::Io`] if it cannot be written.
+    pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
+        if path.exists() {
+            if !force {
+                return Err(RunError::Exists(path.into()));
+            }
+            fs::remove_dir_all(path).map_err(io_error("empty", path))?;
+        }
+        fs::create_dir_all(path).map_err(io_error("create", path))?;
+        let text = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
+            .map_err(|error| damaged(path, &error))?;
+        write_atomically(&path.join("experiment.ron"), text.as_bytes())?;
+        write_atomically(&path.join("run.json"), json!(info).to_string().as_bytes())?;
+        Ok(Self { path: path.into() })
+    }
+
+    /// Opens the folder of a run that exists.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if its files are missing or damaged.
+    pub fn open(path: &Path) -> Result<(Self, Experiment, RunInfo), RunError> {
+        let experiment = read_experiment(&path.join("experiment.ron"))?;
+        let info_path = path.join("run.json");
+        let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;
+        let info = serde_json::from_str(&text).map_err(|error| damaged(&info_path, &error))?;
+        Ok((Self { path: path.into() }, experiment, info))
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The learner's file of the last checkpoint: the policy, its prior and all that training needs.
+    pub fn learner_file(&self) -> PathBuf {
+        self.path.join(CHECKPOINT).join(LEARNER)
+    }
+
+    /// Appends an update to `metrics.jsonl` and `timing.jsonl`.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Io`].
+    pub fn log(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
+        append_line(&self.path.join("metrics.jsonl"), &metrics_line(report))?;
+        let timing = report.timing;
+        let sps = steps_per_update as f64 / (timing.collect_s + timing.learn_s);
+        let line = json!({
+            "step": report.step, "charts/SPS": sps, "collect_s": timing.collect_s, "learn_s": timing.learn_s,
+        });
+        append_line(&self.path.join("timing.jsonl"), &line)
+    }
+
+    /// Saves learner and arenas. The previous checkpoint stays until the new one is whole.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`]; the previous checkpoint is still there.
+    pub fn save(&self, trainer: &mut Trainer) -> Result<(), RunError> {
+        let (fresh, old) = (self.path.join("checkpoint.new"), self.path.join("checkpoint.old"));
+        let current = self.path.join(CHECKPOINT);
+        remove_if_there(&fresh)?;
+        fs::create_dir_all(&fresh).map_err(io_error("create", &fresh))?;
+        trainer.learner.save(&fresh.join(LEARNER))?;
+        let state = TrainState {
+            progress: trainer.progress.clone(),
+            arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
+        };
+        write_atomically(&fresh.join(ARENAS), json!(state).to_string().as_bytes())?;
+        remove_if_there(&old)?;
+        if current.exists() {
+            fs::rename(&current, &old).map_err(io_error("move", &current))?;
+        }
+        fs::rename(&fresh, &current).map_err(io_error("move", &fresh))?;
+        remove_if_there(&old)
+    }
+
+    /// Brings a training back from its last checkpoint, and drops metrics that were logged after it.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if there is no checkpoint, it is damaged, or it does not fit the game.
+    pub fn resume(
+        &self,
+        game: &dyn Game,
+        experiment: &Experiment,
+        info: &RunInfo,
+        device: DeviceKind,
+        threads: usize,
+    ) -> Result<Trainer, RunError> {
+        let mut folder = self.path.join(CHECKPOINT);
+        if !folder.exists() {
+            // The moment between two renames in `save`.
+            folder = self.path.join("checkpoint.old");
+        }
+        if !folder.exists() {
+            return Err(RunError::NothingToResume(self.path.clone()));
+        }
+        let learner = PpoLearner::load(&folder.join(LEARNER), device)?;
+        let arenas = folder.join(ARENAS);
+        let text = fs::read_to_string(&arenas).map_err(io_error("read", &arenas))?;
+        let state: TrainState = serde_json::from_str(&text).map_err(|error| damaged(&arenas, &error))?;
+        let mut trainer = Trainer::with_learner(game, experiment, info.algorithm, learner, threads)?;
+        for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
+            restore_arenas(collector, saved).map_err(TrainError::from)?;
+        }
+        trainer.progress = state.progress;
+        for name in ["metrics.jsonl", "timing.jsonl"] {
+            drop_lines_after(&self.path.join(name), trainer.progress.steps)?;
+        }
+        Ok(trainer)
+    }
+}
+
+fn damaged(path: &Path, error: &impl ToString) -> RunError {
+    RunError::Damaged { path: path.into(), message: error.to_string() }
+}
+
+fn remove_if_there(folder: &Path) -> Result<(), RunError> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", folder)(error)),
+        _ => Ok(()),
+    }
+}
+
+fn append_line(path: &Path, line: &serde_json::Value) -> Result<(), RunError> {
+    let mut file =
+        OpenOptions::new().create(true).append(true).open(path).map_err(io_error("write", path))?;
+    file.write_all(format!("{line}\n").as_bytes()).map_err(io_error("write", path))
+}
+
+/// One update under the names that TensorBoard users know.
+fn metrics_line(report: &UpdateReport) -> serde_json::Value {
+    let learner = &report.learner;
+    let mut line = json!({
+        "step": report.step,
+        "update": report.update,
+        "charts/episodic_return": report.episodic_return,
+        "charts/episodic_length": report.episodic_length,
+        "charts/success_rate": report.success_rate,
+        "charts/learning_rate": learner.lr,
+        "losses/policy_loss": learner.policy_loss,
+        "losses/value_loss": learner.value_loss,
+        "losses/entropy": learner.entropy,
+        "losses/approx_kl": learner.approx_kl,
+        "losses/clip_fraction": learner.clip_fraction,
+        "losses/explained_variance": learner.explained_variance,
+        "losses/grad_norm": learner.grad_norm,
+        "score/decoder_kl": learner.decoder_kl,
+        "score/alpha_mean": learner.alpha_mean,
+    });
+    if let Some(kl) = report.initial_kl {
+        line["score/initial_kl"] = json!(kl);
+    }
+    line
+}
+
+fn drop_lines_after(path: &Path, step: u64) -> Result<(), RunError> {
+    let Ok(file) = File::open(path) else { return Ok(()) };
+    let mut kept = String::new();
+    for line in BufReader::new(file).lines() {
+        let line = line.map_err(io_error("read", path))?;
+        let parsed: Option<serde_json::Value> = serde_json::from_str(&line).ok();
+        if parsed.and_then(|value| value["step"].as_u64()).is_some_and(|at| at <= step) {
+            kept.push_str(&line);
+            kept.push('\n');
+        }
+    }
+    write_atomically(path, kept.as_bytes())
+}

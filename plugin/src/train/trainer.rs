@@ -1,0 +1,304 @@
+//! The training loop, one update at a time: the caller owns the progress bar and decides when to stop.
+
+use std::{collections::VecDeque, time::Instant};
+
+use playbot_learner::{
+    DeviceKind, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SkillModel, UpdateMetrics,
+};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{
+    arena_state::RestoreError,
+    collect::Collector,
+    config::{Algorithm, Experiment, ExperimentError},
+    worlds::on_threads,
+};
+use crate::{
+    episode::EpisodeEnded,
+    fault::Fault,
+    game::{Game, UnknownName, check_mode},
+    skill_prior::SkillPrior,
+};
+
+/// Episodes over which the current return, length and success rate are averaged.
+const RECENT: usize = 100;
+
+/// Rows on which the first policy is compared with the decoder.
+const INITIAL_KL_ROWS: usize = 1024;
+
+/// Training cannot go on.
+#[derive(Debug, Error)]
+pub enum TrainError {
+    /// The experiment makes no sense.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// The game has no such mode.
+    #[error(transparent)]
+    Mode(#[from] UnknownName),
+    /// The algorithm needs a skill model.
+    #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
+    NoSkills(Algorithm),
+    /// The skill model was learned for another game.
+    #[error(
+        "the skill model was learned for {model_obs} observation values and {model_actions:?}, but `{game}` has \
+         {game_obs} and {game_actions:?}: learn one from demonstrations of this game"
+    )]
+    ForeignSkills {
+        /// The game.
+        game: String,
+        /// Observation values of the model.
+        model_obs: usize,
+        /// Actions of the model.
+        model_actions: playbot_learner::ActionSpace,
+        /// Observation values of the game.
+        game_obs: usize,
+        /// Actions of the game.
+        game_actions: playbot_learner::ActionSpace,
+    },
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The learner cannot go on, for instance because a loss is not a number.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A checkpoint could not be brought back.
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
+}
+
+/// A finished episode as the moving averages keep it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RecentEpisode {
+    total_reward: f64,
+    ticks: u32,
+    success: bool,
+}
+
+/// What one update brought. Everything in it is the same in every run with the same seed, except `timing`.
+#[derive(Clone, Debug)]
+pub struct UpdateReport {
+    /// Updates done, this one included.
+    pub update: u64,
+    /// Environment steps done, over all arenas together.
+    pub step: u64,
+    /// Mean return of the last 100 episodes; `None` before the first has ended.
+    pub episodic_return: Option<f64>,
+    /// Mean length of the last 100 episodes, ticks.
+    pub episodic_length: Option<f64>,
+    /// Success rate of the last 100 episodes.
+    pub success_rate: Option<f64>,
+    /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
+    pub initial_kl: Option<f32>,
+    /// What the learner reports.
+    pub learner: UpdateMetrics,
+    /// Where the time went.
+    pub timing: Timing,
+}
+
+/// Wall-clock seconds of one update.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Timing {
+    /// Simulating, observing and deciding.
+    pub collect_s: f64,
+    /// Learning.
+    pub learn_s: f64,
+}
+
+/// One algorithm being trained on one experiment.
+pub struct Trainer {
+    experiment: Experiment,
+    algorithm: Algorithm,
+    threads: usize,
+    pub(crate) learner: PpoLearner,
+    pub(crate) collectors: Vec<Collector>,
+    pub(crate) progress: Progress,
+}
+
+/// How far the training is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Progress {
+    pub(crate) updates: u64,
+    pub(crate) steps: u64,
+    pub(crate) recent: VecDeque<RecentEpisode>,
+}
+
+impl Trainer {
+    /// A trainer at its first step.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError`] if experiment, game and skill model do not go together.
+    pub fn new(
+        game: &dyn Game,
+        experiment: &Experiment,
+        algorithm: Algorithm,
+        skills: Option<&SkillModel>,
+        device: DeviceKind,
+        threads: usize,
+    ) -> Result<Self, TrainError> {
+        let learner = new_learner(game, experiment, algorithm, skills, device)?;
+        Self::with_learner(game, experiment, algorithm, learner, threads)
+    }
+
+    /// A trainer around a learner that exists already.
+    pub(crate) fn with_learner(
+        game: &dyn Game,
+        experiment: &Experiment,
+        algorithm: Algorithm,
+        learner: PpoLearner,
+        threads: usize,
+    ) -> Result<Self, TrainError> {
+        experiment.check()?;
+        check_mode(game, &experiment.train.mode)?;
+        check_mode(game, &experiment.test.mode)?;
+        let prior = skill_prior(experiment, &learner);
+        let share = experiment.arenas / experiment.worlds;
+        let collectors = (0..experiment.worlds)
+            .map(|world| {
+                Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone())
+            })
+            .collect();
+        Ok(Self {
+            experiment: experiment.clone(),
+            algorithm,
+            threads,
+            learner,
+            collectors,
+            progress: Progress::default(),
+        })
+    }
+
+    /// Plays one rollout in every arena and learns from it.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError`]; what was learned before stays as it was.
+    pub fn update(&mut self) -> Result<UpdateReport, TrainError> {
+        let start = Instant::now();
+        let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
+        let steps = self.experiment.ppo.num_steps;
+        let collected = on_threads(&mut self.collectors, self.threads, |world| world.collect(&policy, latent, steps));
+        let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
+        for part in collected {
+            let (rollout, ended) = part?;
+            rollouts.push(rollout);
+            finished.extend(ended);
+        }
+        let rollout = Rollout::join(&rollouts)?;
+        let collect_s = start.elapsed().as_secs_f64();
+        let initial_kl = self.initial_kl(&rollout)?;
+        let learner = self.learner.update(&rollout)?;
+        self.progress.note(&finished);
+        self.progress.updates += 1;
+        self.progress.steps += self.experiment.steps_per_update();
+        let timing = Timing { collect_s, learn_s: start.elapsed().as_secs_f64() - collect_s };
+        Ok(self.progress.report(learner, initial_kl, timing))
+    }
+
+    /// Before the first update of SCORE, the policy must be the decoder, to the bit.
+    fn initial_kl(&self, rollout: &Rollout) -> Result<Option<f32>, LearnError> {
+        let copied = self.algorithm.needs_skills() && self.experiment.score.init_from_decoder;
+        if self.progress.updates > 0 || !copied {
+            return Ok(None);
+        }
+        let rows = INITIAL_KL_ROWS.min(rollout.steps * rollout.envs);
+        let (z, obs) = (&rollout.z[..rows * rollout.latent], &rollout.obs[..rows * rollout.obs_dim]);
+        self.learner.initial_kl(z, obs, rows)
+    }
+
+    /// Whether all steps of the experiment are done.
+    pub fn is_done(&self) -> bool {
+        self.progress.steps >= self.experiment.steps
+    }
+
+    /// Environment steps done.
+    pub fn steps(&self) -> u64 {
+        self.progress.steps
+    }
+
+    /// Updates done.
+    pub fn updates(&self) -> u64 {
+        self.progress.updates
+    }
+
+    /// The experiment.
+    pub fn experiment(&self) -> &Experiment {
+        &self.experiment
+    }
+
+    /// The algorithm.
+    pub fn algorithm(&self) -> Algorithm {
+        self.algorithm
+    }
+
+    /// The policy as it is now.
+    pub fn policy(&self) -> Policy {
+        self.learner.policy()
+    }
+
+    /// Where the policy's skills come from, if it has any.
+    pub fn skill_prior(&self) -> Option<SkillPrior> {
+        skill_prior(&self.experiment, &self.learner)
+    }
+}
+
+fn new_learner(
+    game: &dyn Game,
+    experiment: &Experiment,
+    algorithm: Algorithm,
+    skills: Option<&SkillModel>,
+    device: DeviceKind,
+) -> Result<PpoLearner, TrainError> {
+    let (obs_dim, action_space) = (game.observation().len(), game.actions());
+    let config = experiment.ppo.clone();
+    if !algorithm.needs_skills() {
+        let spec = PolicySpec { obs_dim, latent: 0, action_space };
+        return Ok(PpoLearner::new(config, spec, experiment.seed, device)?);
+    }
+    let skills = skills.ok_or(TrainError::NoSkills(algorithm))?;
+    if (skills.obs_dim(), skills.action_space()) != (obs_dim, action_space) {
+        return Err(TrainError::ForeignSkills {
+            game: game.name().to_owned(),
+            model_obs: skills.obs_dim(),
+            model_actions: skills.action_space(),
+            game_obs: obs_dim,
+            game_actions: action_space,
+        });
+    }
+    Ok(PpoLearner::with_skill(config, experiment.score.clone(), skills, experiment.seed, device)?)
+}
+
+fn skill_prior(experiment: &Experiment, learner: &PpoLearner) -> Option<SkillPrior> {
+    let (horizon, draw) = (experiment.score.horizon as u32, experiment.score.skill_draw);
+    learner.prior().map(|prior| SkillPrior { prior, horizon, draw })
+}
+
+impl Progress {
+    fn note(&mut self, finished: &[EpisodeEnded]) {
+        self.recent.extend(finished.iter().map(|episode| RecentEpisode {
+            total_reward: episode.total_reward,
+            ticks: episode.ticks,
+            success: episode.end.is_success(),
+        }));
+        let surplus = self.recent.len().saturating_sub(RECENT);
+        self.recent.drain(..surplus);
+    }
+
+    fn report(&self, learner: UpdateMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
+        let mean = |value: fn(&RecentEpisode) -> f64| {
+            let n = self.recent.len();
+            (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
+        };
+        UpdateReport {
+            update: self.updates,
+            step: self.steps,
+            episodic_return: mean(|episode| episode.total_reward),
+            episodic_length: mean(|episode| f64::from(episode.ticks)),
+            success_rate: mean(|episode| f64::from(u8::from(episode.success))),
+            initial_kl,
+            learner,
+            timing,
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Recording, replaying, and recordings that do not fit.
+
+use std::{path::Path, sync::Arc};
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    demo::{
+        dataset::load_dataset,
+        file::{DemoEnd, DemoHeader, DemoReader, DemoWriter, Decider, repair},
+        recorder::{demo_actions, flush_unfinished},
+        verify::{ReplayStage, verify_file},
+    },
+    game::build_world,
+    prelude::*,
+};
+use playbot_tests::{Corridor, Drift};
+
+fn header() -> DemoHeader {
+    DemoHeader::new("corridor", 3, "plain", 10.0, demo_actions(&ActionSpace::Discrete(3)))
+}
+
+/// Records a random walker for this many episodes.
+fn record(path: &Path, header: DemoHeader, episodes: u64) {
+    let (mut world, agents) = build_world(&Corridor, "plain", 5, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
+    let levels: Vec<u64> = (0..episodes).collect();
+    world.entity_mut(agents[0]).insert((
+        Control::Bot,
+        BlindBot::Uniform,
+        Recording::default(),
+        LevelQueue::list(levels),
+    ));
+    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+        world.tick().expect("sound");
+    }
+}
+
+#[test]
+fn a_recording_replays_to_the_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("walk.demo");
+    record(&path, header(), 30);
+    let report = verify_file(&Corridor, &path, |_| {}).expect("readable");
+    assert_eq!((report.episodes, report.divergences.len()), (30, 0));
+    let episodes = DemoReader::open(&path).expect("readable").read_all().expect("whole");
+    assert!(episodes.iter().all(|episode| episode.deciders.iter().all(|who| *who == Decider::Bot)));
+    assert!(episodes.iter().any(|episode| episode.is_success()));
+}
+
+#[test]
+fn a_nondeterministic_game_is_found_out_at_the_first_tick_that_differs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("walk.demo");
+    record(&path, header(), 1);
+    let mut episode = DemoReader::open(&path).expect("readable").read_all().expect("whole").remove(0);
+    episode.state_hashes[1] ^= 1;
+    let mut stage = ReplayStage::new(&Corridor, "plain");
+    let divergence = stage.play(Arc::new(episode), |_, _| {}).expect("sound").expect("diverges");
+    assert_eq!((divergence.level, divergence.tick), (0, 1));
+    assert!(divergence.what.contains("state hash"), "{divergence}");
+}
+
+#[test]
+fn hidden_randomness_in_the_game_is_reported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("walk.demo");
+    record(&path, header(), 1);
+    let episode = Arc::new(DemoReader::open(&path).expect("readable").read_all().expect("whole").remove(0));
+    let (mut world, agents) = build_world(&Corridor, "plain", 0, 0, 1);
+    world.insert_resource(Drift(1));
+    world.entity_mut(agents[0]).insert((
+        Control::Replay,
+        LevelQueue::Always(episode.level_seed),
+        bevy_playbot::demo::replay::Replay::new(episode),
+    ));
+    world.tick().expect("sound");
+    let replay = world.get::<bevy_playbot::demo::replay::Replay>(agents[0]).expect("inserted");
+    assert_eq!(replay.divergence().expect("diverges").tick, 0);
+}
+
+#[test]
+fn kept_observations_equal_those_of_a_replay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (bare, full) = (folder.path().join("bare"), folder.path().join("full"));
+    std::fs::create_dir_all(&bare).expect("writable");
+    std::fs::create_dir_all(&full).expect("writable");
+    record(&bare.join("walk.demo"), header(), 10);
+    record(&full.join("walk.demo"), DemoHeader { observation_names: Corridor.observation().names, ..header() }, 10);
+    let load = |path: &Path| load_dataset(&Corridor, path, |_| {}).expect("readable");
+    assert_eq!(load(&bare), load(&full));
+}
+
+#[test]
+fn recordings_of_another_game_or_version_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, other, words) in [
+        ("game", DemoHeader { game: "maze".into(), ..header() }, "`maze`, not of `corridor`"),
+        ("version", DemoHeader { game_version: 2, ..header() }, "version 2 of `corridor`, but this is version 3"),
+    ] {
+        let path = folder.path().join(name);
+        record(&path, other, 1);
+        let error = verify_file(&Corridor, &path, |_| {}).expect_err("foreign").to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn a_torn_recording_loses_its_last_episode_only() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, mended) = (folder.path().join("walk.demo"), folder.path().join("mended.demo"));
+    record(&path, header(), 5);
+    let bytes = std::fs::read(&path).expect("readable");
+    std::fs::write(&path, &bytes[..bytes.len() - 3]).expect("writable");
+    let error = verify_file(&Corridor, &path, |_| {}).expect_err("torn").to_string();
+    assert!(error.contains("playbot demo repair"), "{error}");
+    assert_eq!(repair(&path, &mended).expect("repairable").kept_episodes, 4);
+    assert_eq!(verify_file(&Corridor, &mended, |_| {}).expect("whole").divergences.len(), 0);
+}
+
+#[test]
+fn a_recording_has_exactly_the_steps_that_were_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("walk.demo");
+    let (mut world, agents) = build_world(&Corridor, "plain", 5, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(&path, header()).expect("fresh")).with_step_limit(27));
+    world.entity_mut(agents[0]).insert((
+        Control::Bot,
+        BlindBot::Constant(ActionValue::Discrete(2)),
+        Recording::default(),
+    ));
+    while world.resource::<Recorder>().steps() < 27 {
+        world.tick().expect("sound");
+    }
+    flush_unfinished(&mut world).expect("writable");
+    let episodes = DemoReader::open(&path).expect("readable").read_all().expect("whole");
+    let lengths: Vec<_> = episodes.iter().map(|episode| (episode.len(), episode.end)).collect();
+    assert_eq!(lengths, [(20, DemoEnd::Truncated), (7, DemoEnd::Aborted)]);
+}

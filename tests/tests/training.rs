@@ -1,0 +1,189 @@
+//! Training: the same bytes for the same seed, on any number of threads, in one go or in two.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::{
+    bot::BlindBot,
+    demo::{
+        dataset::load_dataset,
+        file::{DemoHeader, DemoWriter},
+        recorder::demo_actions,
+    },
+    game::build_world,
+    learner::{DeviceKind, SkillModel, SkillTrainer},
+    prelude::*,
+    train::{
+        Algorithm, Experiment, Trainer,
+        config_file::parse_experiment,
+        run_dir::{RunDir, RunError, RunInfo},
+        trainer::TrainError,
+    },
+};
+use playbot_tests::Corridor;
+
+const EXPERIMENT: &str = r#"(
+    game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused",
+    steps: 2048, arenas: 8, worlds: 2,
+    skills: (window: 3, epochs: 4, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2, lr: 0.003),
+    ppo: (num_steps: 32, minibatches: 4, hidden: [16, 16], lr: 0.003),
+    score: (horizon: 3),
+)"#;
+
+fn experiment() -> Experiment {
+    parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid")
+}
+
+fn info(algorithm: Algorithm) -> RunInfo {
+    RunInfo { algorithm, seed: 1, version: "test".into(), revision: "test".into() }
+}
+
+/// A skill model from a random walker that is worth copying in half of its steps.
+fn skills(folder: &Path) -> SkillModel {
+    let path = folder.join("walk.demo");
+    let header = DemoHeader::new("corridor", 3, "plain", 10.0, demo_actions(&ActionSpace::Discrete(3)));
+    let (mut world, agents) = build_world(&Corridor, "plain", 5, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(&path, header).expect("fresh")));
+    let levels: Vec<u64> = (0..60).collect();
+    world.entity_mut(agents[0]).insert((
+        Control::Bot,
+        BlindBot::Uniform,
+        Recording::default(),
+        LevelQueue::list(levels),
+    ));
+    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+        world.tick().expect("sound");
+    }
+    let dataset = load_dataset(&Corridor, &path, |_| {}).expect("readable");
+    let config = experiment().skills;
+    let epochs = config.epochs;
+    let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");
+    for _ in 0..epochs {
+        trainer.train_epoch(&mut |_| std::ops::ControlFlow::Continue(())).expect("learns");
+    }
+    trainer.into_model()
+}
+
+fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer {
+    let skills = algorithm.needs_skills().then_some(skills);
+    Trainer::new(&Corridor, &experiment(), algorithm, skills, DeviceKind::Flex, threads).expect("fits")
+}
+
+/// Trains to the end in `folder` and returns the bytes of metrics and checkpoint.
+fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
+    let run = RunDir::create(folder, trainer.experiment(), &info(trainer.algorithm()), false)
+        .or_else(|error| match error {
+            RunError::Exists(_) => RunDir::open(folder).map(|(run, ..)| run),
+            other => Err(other),
+        })
+        .expect("writable");
+    while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
+        let report = trainer.update().expect("learns");
+        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
+    }
+    run.save(&mut trainer).expect("writable");
+    trainer
+}
+
+fn bytes(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    ["metrics.jsonl", "checkpoint/learner.safetensors", "checkpoint/arenas.json"]
+        .into_iter()
+        .map(|name| (name.into(), std::fs::read(folder.join(name)).expect("written")))
+        .collect()
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_one_and_on_two_threads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let skills = skills(folder.path());
+    for algorithm in Algorithm::ALL {
+        let results: Vec<_> = [1, 2, 2]
+            .into_iter()
+            .enumerate()
+            .map(|(index, threads)| {
+                let run = folder.path().join(format!("{algorithm}-{index}"));
+                train(&run, trainer(algorithm, &skills, threads), None);
+                bytes(&run)
+            })
+            .collect();
+        assert!(results[0] == results[1], "{algorithm}: one thread and two threads differ");
+        assert!(results[1] == results[2], "{algorithm}: two runs with the same seed differ");
+    }
+}
+
+#[test]
+fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let skills = skills(folder.path());
+    for algorithm in Algorithm::ALL {
+        let (whole, halved) = (folder.path().join(format!("{algorithm}-w")), folder.path().join(format!("{algorithm}-h")));
+        train(&whole, trainer(algorithm, &skills, 2), None);
+        train(&halved, trainer(algorithm, &skills, 2), Some(3));
+        let (run, experiment, info) = RunDir::open(&halved).expect("readable");
+        let resumed = run.resume(&Corridor, &experiment, &info, DeviceKind::Flex, 2).expect("a checkpoint");
+        assert_eq!(resumed.updates(), 3);
+        train(&halved, resumed, None);
+        assert!(bytes(&whole) == bytes(&halved), "{algorithm}: stopping in the middle changed the result");
+    }
+}
+
+#[test]
+fn the_first_policy_of_score_is_the_decoder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let skills = skills(folder.path());
+    let mut trainer = trainer(Algorithm::ScorePpo, &skills, 1);
+    assert_eq!(trainer.update().expect("learns").initial_kl, Some(0.0));
+    assert_eq!(trainer.update().expect("learns").initial_kl, None, "it is checked once");
+}
+
+#[test]
+fn ppo_learns_the_corridor() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let skills = skills(folder.path());
+    let mut experiment = experiment();
+    experiment.steps = 8192;
+    let mut trainer =
+        Trainer::new(&Corridor, &experiment, Algorithm::Ppo, None, DeviceKind::Flex, 2).expect("fits");
+    let mut last = None;
+    while !trainer.is_done() {
+        last = trainer.update().expect("learns").success_rate;
+    }
+    assert!(last.expect("episodes ended") > 0.9, "success rate {last:?}; a random walker has about 0.3");
+    drop(skills);
+}
+
+#[test]
+fn skills_are_asked_for_and_must_fit() {
+    let refuse = |experiment: &Experiment, skills: Option<&SkillModel>| {
+        let made = Trainer::new(&Corridor, experiment, Algorithm::ScorePpo, skills, DeviceKind::Flex, 1);
+        made.err().expect("must be refused")
+    };
+    assert!(matches!(refuse(&experiment(), None), TrainError::NoSkills(_)));
+    let mut overlapping = experiment();
+    overlapping.test.first = 3;
+    assert!(refuse(&overlapping, None).to_string().contains("overlap"));
+}
+
+#[test]
+fn an_existing_run_is_not_overwritten() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run");
+    RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), false).expect("fresh");
+    let error = RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), false).err().expect("exists");
+    let text = error.to_string();
+    assert!(text.contains("--resume") && text.contains("--force"), "{text}");
+    RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), true).expect("forced");
+    let nothing = RunDir::open(&path).expect("readable").0;
+    let resumed =
+        nothing.resume(&Corridor, &experiment(), &info(Algorithm::Ppo), DeviceKind::Flex, 1).err().expect("empty");
+    assert!(matches!(resumed, RunError::NothingToResume(_)), "{resumed}");
+}
+
+#[test]
+fn an_unwritable_folder_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, b"in the way").expect("writable");
+    let path = file.join("run");
+    let error = RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), false).err().expect("a file in the way");
+    assert!(error.to_string().contains(&path.display().to_string()), "{error}");
+}
