@@ -61,7 +61,8 @@ fn an_unknown_key_names_file_line_and_neighbour() {
 fn traces_stop_at_the_end_and_read_back_exactly() {
     let folder = tempfile::tempdir().expect("a folder");
     let actions = vec!["8"; 200].join(",");
-    let output = playbot(folder.path(), &["trace", "coinrun", "--mode", "hard", "--seed", "0", "--actions", &actions, "--json"]);
+    let output =
+        playbot(folder.path(), &["trace", "coinrun", "--mode", "hard", "--seed", "0", "--actions", &actions, "--json"]);
     let steps = lines(&output);
     assert_eq!(steps.len(), 63);
     assert_eq!(steps[0], serde_json::json!([1.5999999, 3.0787, 0.1, 1.5, 0, 0]));
@@ -81,8 +82,16 @@ fn blind_bots_score_what_they_score_in_the_original() {
     let output = playbot(
         folder.path(),
         &[
-            "eval", "--bot", "right-jump", "--episodes-per-level", "1", "--levels", "hard:64..127", "--levels",
-            "hard:0..63", "--json",
+            "eval",
+            "--bot",
+            "right-jump",
+            "--episodes-per-level",
+            "1",
+            "--levels",
+            "hard:64..127",
+            "--levels",
+            "hard:0..63",
+            "--json",
         ],
     );
     let rows = lines(&output);
@@ -148,7 +157,8 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     assert_eq!(code(&again), 3);
     assert!(errors(&again).contains("--force"), "{}", errors(&again));
     ok(run(&["train", "--run", "runs/a", "--resume", "--steps", "1024"]));
-    let rows = lines(&ok(run(&["eval", "--run", "runs/a", "--skills", "skills.safetensors", "--bot", "random", "--json"])));
+    let rows =
+        lines(&ok(run(&["eval", "--run", "runs/a", "--skills", "skills.safetensors", "--bot", "random", "--json"])));
     let methods: Vec<_> = rows.iter().filter_map(|row| row["method"].as_str()).collect();
     assert_eq!(methods, ["score-ppo", "bc", "random"]);
     assert!(rows.iter().all(|row| row["split"] == "hard:64..65" && row["episodes"] == 2));

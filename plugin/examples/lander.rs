@@ -3,6 +3,8 @@
 //! It brings its own rules, says what the agent sees and does, and gets recording, replay and measurement for it.
 //! Run it with `cargo run --release -p bevy_playbot --example lander`.
 
+#![allow(clippy::print_stdout, reason = "an example shows its results")]
+
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{

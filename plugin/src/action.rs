@@ -53,10 +53,7 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
 }
 
 /// Reports actions that do not belong to their agent's space, with agent and tick.
-pub(crate) fn check_actions(
-    agents: Query<(&Agent, &Action, &Episode)>,
-    mut faults: ResMut<Faults>,
-) {
+pub(crate) fn check_actions(agents: Query<(&Agent, &Action, &Episode)>, mut faults: ResMut<Faults>) {
     for (agent, action, episode) in &agents {
         if !episode.is_running() {
             continue;

@@ -33,8 +33,6 @@ pub(crate) fn run_blind_bots(
 pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     match space {
         ActionSpace::Discrete(n) => ActionValue::Discrete(rng.random_range(0..*n as u32)),
-        ActionSpace::Continuous(n) => {
-            ActionValue::Continuous((0..*n).map(|_| rng.random_range(-1.0..=1.0)).collect())
-        }
+        ActionSpace::Continuous(n) => ActionValue::Continuous((0..*n).map(|_| rng.random_range(-1.0..=1.0)).collect()),
     }
 }

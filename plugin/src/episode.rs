@@ -137,10 +137,7 @@ pub(crate) fn begin_episodes(
 }
 
 /// Counts the tick and its reward.
-pub(crate) fn judge(
-    mut agents: Query<(&Agent, &Control, &Reward, &mut Episode)>,
-    mut faults: ResMut<Faults>,
-) {
+pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &Reward, &mut Episode)>, mut faults: ResMut<Faults>) {
     for (agent, control, reward, mut episode) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;

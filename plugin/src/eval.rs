@@ -21,6 +21,7 @@ use crate::{
 
 /// Who is measured.
 #[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "one per measurement")]
 pub enum Player {
     /// A learned policy, with its skills if it has any.
     Policy {
@@ -128,8 +129,7 @@ fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) ->
     let (mut world, agents) = build_world(game, &plan.split.mode, plan.seed, first, per_world);
     world.init_resource::<Results>();
     world.add_observer(note_result);
-    let all: Vec<u64> =
-        (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
+    let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
         world.entity_mut(agent).insert(LevelQueue::list(levels));

@@ -101,4 +101,3 @@ impl PlaybotAppExt for World {
         tick_world(self)
     }
 }
-

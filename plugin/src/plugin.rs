@@ -3,7 +3,9 @@
 use bevy::prelude::*;
 
 use crate::{
-    action, agent, bot, demo, episode, fault::Faults, headless, observation, policy, reward, skill_prior,
+    action, agent, bot, demo, episode,
+    fault::Faults,
+    headless, observation, policy, reward, skill_prior,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -35,25 +37,24 @@ impl Plugin for PlaybotPlugin {
 
 /// Everything up to the action.
 fn add_decision_systems(app: &mut App) {
-    app.add_systems(FixedFirst, headless::count_tick)
-        .add_systems(
-            FixedPreUpdate,
+    app.add_systems(FixedFirst, headless::count_tick).add_systems(
+        FixedPreUpdate,
+        (
+            (policy::seed_streams, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
+                .chain()
+                .in_set(PlaybotSystems::Begin),
+            (run_observe_schedule, observation::check_observations).chain().in_set(PlaybotSystems::Observe),
             (
-                (policy::seed_streams, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
-                    .chain()
-                    .in_set(PlaybotSystems::Begin),
-                (run_observe_schedule, observation::check_observations).chain().in_set(PlaybotSystems::Observe),
-                (
-                    bot::run_blind_bots,
-                    demo::replay::run_replays,
-                    skill_prior::draw_skills.run_if(resource_exists::<skill_prior::SkillPrior>),
-                    policy::run_policy.run_if(resource_exists::<policy::ActivePolicy>),
-                )
-                    .chain()
-                    .in_set(PlaybotSystems::Decide),
-                action::check_actions.in_set(PlaybotSystems::Act),
-            ),
-        );
+                bot::run_blind_bots,
+                demo::replay::run_replays,
+                skill_prior::draw_skills.run_if(resource_exists::<skill_prior::SkillPrior>),
+                policy::run_policy.run_if(resource_exists::<policy::ActivePolicy>),
+            )
+                .chain()
+                .in_set(PlaybotSystems::Decide),
+            action::check_actions.in_set(PlaybotSystems::Act),
+        ),
+    );
 }
 
 /// Everything after the game has answered.

@@ -5,7 +5,10 @@ pub use crate::{
     agent::Agent,
     bot::BlindBot,
     control::Control,
-    demo::{recorder::{Recorder, Recording}, replay::Replay},
+    demo::{
+        recorder::{Recorder, Recording},
+        replay::Replay,
+    },
     episode::{Episode, EpisodeCount, EpisodeEnd, EpisodeEnded, StartEpisode},
     game::Game,
     headless::{PlaybotAppExt, headless_app},

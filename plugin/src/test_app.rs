@@ -1,7 +1,10 @@
 //! Helpers for tests of games that use the plugin. Plain functions and an extension trait, no macros: they work in any
 //! test harness.
 
-use bevy::{ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel}, prelude::*};
+use bevy::{
+    ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel},
+    prelude::*,
+};
 
 use crate::{
     agent::AgentOrder,
@@ -25,7 +28,6 @@ pub fn test_app() -> App {
     app
 }
 
-
 /// Questions that tests ask of an app with agents.
 pub trait PlaybotTestExt {
     /// Ticks until every agent has finished at least `episodes` episodes or is idle.
@@ -48,9 +50,7 @@ impl PlaybotTestExt for App {
         for tick in 0..limit {
             self.tick()?;
             let mut agents = self.world_mut().query::<(&Control, &EpisodeCount)>();
-            let done = |(control, count): (&Control, &EpisodeCount)| {
-                count.finished >= episodes || !control.is_active()
-            };
+            let done = |(control, count): (&Control, &EpisodeCount)| count.finished >= episodes || !control.is_active();
             if agents.iter(self.world()).all(done) {
                 return Ok(tick + 1);
             }

@@ -63,9 +63,7 @@ pub fn corridor_plugin(app: &mut App) {
 
 /// Spawns an agent of the corridor.
 pub fn spawn_walker(world: &mut World, index: u32) -> Entity {
-    world
-        .spawn((Agent::new(index, ActionSpace::Discrete(3)), VectorSensor::new(["x", "time"]), Cell::default()))
-        .id()
+    world.spawn((Agent::new(index, ActionSpace::Discrete(3)), VectorSensor::new(["x", "time"]), Cell::default())).id()
 }
 
 impl Game for Corridor {

@@ -1,7 +1,10 @@
 //! Episodes: start, end, counting, and who decides.
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, test_app::{PlaybotTestExt, test_app}};
+use bevy_playbot::{
+    prelude::*,
+    test_app::{PlaybotTestExt, test_app},
+};
 use playbot_tests::{Cell, PoisonAt, corridor_plugin, spawn_walker};
 
 #[derive(Resource, Default)]

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
         dataset::load_dataset,
-        file::{DemoEnd, DemoHeader, DemoReader, DemoWriter, Decider, repair},
+        file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
         recorder::{demo_actions, flush_unfinished},
         verify::{ReplayStage, verify_file},
     },

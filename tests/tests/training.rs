@@ -115,7 +115,8 @@ fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let skills = skills(folder.path());
     for algorithm in Algorithm::ALL {
-        let (whole, halved) = (folder.path().join(format!("{algorithm}-w")), folder.path().join(format!("{algorithm}-h")));
+        let (whole, halved) =
+            (folder.path().join(format!("{algorithm}-w")), folder.path().join(format!("{algorithm}-h")));
         train(&whole, trainer(algorithm, &skills, 2), None);
         train(&halved, trainer(algorithm, &skills, 2), Some(3));
         let (run, experiment, info) = RunDir::open(&halved).expect("readable");
@@ -141,8 +142,7 @@ fn ppo_learns_the_corridor() {
     let skills = skills(folder.path());
     let mut experiment = experiment();
     experiment.steps = 8192;
-    let mut trainer =
-        Trainer::new(&Corridor, &experiment, Algorithm::Ppo, None, DeviceKind::Flex, 2).expect("fits");
+    let mut trainer = Trainer::new(&Corridor, &experiment, Algorithm::Ppo, None, DeviceKind::Flex, 2).expect("fits");
     let mut last = None;
     while !trainer.is_done() {
         last = trainer.update().expect("learns").success_rate;

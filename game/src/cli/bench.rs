@@ -64,7 +64,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         } else {
             print_line(format!(
                 "{name}: {:.0} steps/s with {} arenas on {} threads; peak memory {:.0} MiB; {}",
-                measured.steps_per_s, args.arenas, args.threads, peak_rss_mib(), measured.parts
+                measured.steps_per_s,
+                args.arenas,
+                args.threads,
+                peak_rss_mib(),
+                measured.parts
             ))?;
         }
     }
@@ -122,8 +126,7 @@ fn train(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
     experiment.ppo.num_steps = 256;
     experiment.ppo.epochs = 3;
     experiment.ppo.minibatches = 8;
-    let mut trainer =
-        Trainer::new(game, &experiment, Algorithm::Ppo, None, DeviceKind::default(), args.threads)?;
+    let mut trainer = Trainer::new(game, &experiment, Algorithm::Ppo, None, DeviceKind::default(), args.threads)?;
     trainer.update()?;
     let (start, before) = (Instant::now(), trainer.steps());
     let (mut collect, mut learn) = (0.0, 0.0);

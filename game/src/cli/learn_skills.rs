@@ -61,9 +61,15 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let dataset = read_demos(game, &demos)?;
     interrupt::listen();
     let json = args.json;
-    let model = learn(&experiment, dataset, args.device, |epoch, metrics| {
-        if json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
-    })?;
+    let model =
+        learn(
+            &experiment,
+            dataset,
+            args.device,
+            |epoch, metrics| {
+                if json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
+            },
+        )?;
     model.save(&args.out)?;
     eprintln!("skill model written to {}", args.out.display());
     Ok(Outcome::Pass)

@@ -11,7 +11,9 @@ use crate::{
 
 /// Shows the layout of a level.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  playbot level coinrun --mode hard --seed 7\n  playbot level coinrun --mode easy --seed 0 --json")]
+#[command(
+    after_help = "Examples:\n  playbot level coinrun --mode hard --seed 7\n  playbot level coinrun --mode easy --seed 0 --json"
+)]
 pub struct Args {
     /// Name of the game.
     game: String,

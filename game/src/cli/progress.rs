@@ -7,9 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// A bar with a title, a count, the time left and room for a message.
 pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{eta}} left  {{msg}}");
-    let style = ProgressStyle::with_template(&template)
-        .unwrap_or_else(|_| ProgressStyle::default_bar())
-        .progress_chars("=> ");
+    let style =
+        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ");
     let bar = ProgressBar::new(length).with_style(style);
     bar.enable_steady_tick(Duration::from_millis(250));
     bar

@@ -97,14 +97,12 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
             return Ok(stopped(&args, algorithm));
         }
     }
-    let mut players: Vec<_> =
-        trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
+    let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), cloning(&skills, &experiment, draw)));
     players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let mut rows = Vec::new();
     for (name, player) in &players {
-        let plan =
-            methods::plan(&experiment, &experiment.test, experiment.eval.episodes_per_level, args.threads);
+        let plan = methods::plan(&experiment, &experiment.test, experiment.eval.episodes_per_level, args.threads);
         let measured = methods::measure(game, name, player, &plan)?;
         if args.json {
             methods::print_json(&measured.summary)?;
@@ -160,8 +158,7 @@ fn train_one(
     draw: ActionDraw,
 ) -> Result<Trained, CliError> {
     let skills = algorithm.needs_skills().then_some(skills);
-    let mut trainer =
-        Trainer::new(game, experiment, algorithm, skills, DeviceKind::default(), args.threads)?;
+    let mut trainer = Trainer::new(game, experiment, algorithm, skills, DeviceKind::default(), args.threads)?;
     let run = create_run(&args.run.join(algorithm.name()), experiment, algorithm, true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, u64::MAX, &format!("train {algorithm}"), |report| {

@@ -76,17 +76,16 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 }
 
 fn open_writer(game: &dyn Game, args: &Args) -> Result<DemoWriter, CliError> {
-    let mut header = DemoHeader::new(
-        game.name(),
-        game.version(),
-        &args.levels.mode,
-        game.tick_hz(),
-        demo_actions(&game.actions()),
-    );
+    let mut header =
+        DemoHeader::new(game.name(), game.version(), &args.levels.mode, game.tick_hz(), demo_actions(&game.actions()));
     header.demonstrator = game.demonstrator().unwrap_or("none").to_owned();
     header.action_noise = args.noise;
     if args.observations {
         header.observation_names = game.observation().names;
+    }
+    if let Some(folder) = args.out.parent() {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
     }
     if args.append {
         return Ok(DemoWriter::append(&args.out, &header)?);

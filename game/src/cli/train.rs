@@ -98,12 +98,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 /// # Errors
 ///
 /// It exists and `force` is off, or it cannot be written.
-pub fn create_run(
-    path: &Path,
-    experiment: &Experiment,
-    algorithm: Algorithm,
-    force: bool,
-) -> Result<RunDir, RunError> {
+pub fn create_run(path: &Path, experiment: &Experiment, algorithm: Algorithm, force: bool) -> Result<RunDir, RunError> {
     let info = RunInfo {
         algorithm,
         seed: experiment.seed,

@@ -26,11 +26,7 @@ impl DemonstratorBot {
     }
 }
 
-pub(super) fn start_episode(
-    event: On<StartEpisode>,
-    mode: Res<CoinRunMode>,
-    mut bots: Query<&mut DemonstratorBot>,
-) {
+pub(super) fn start_episode(event: On<StartEpisode>, mode: Res<CoinRunMode>, mut bots: Query<&mut DemonstratorBot>) {
     // Levels that do not exist are reported where the arena is built.
     if let (Ok(mut bot), Ok(seed)) = (bots.get_mut(event.entity), u32::try_from(event.level)) {
         bot.sim = Some(Sim::new(Arc::new(generate(mode.0, seed))));
@@ -39,15 +35,7 @@ pub(super) fn start_episode(
 }
 
 pub(super) fn decide(
-    mut bots: Query<(
-        &Agent,
-        &Control,
-        &Episode,
-        &StateHash,
-        &mut DemonstratorBot,
-        &mut AgentStreams,
-        &mut Action,
-    )>,
+    mut bots: Query<(&Agent, &Control, &Episode, &StateHash, &mut DemonstratorBot, &mut AgentStreams, &mut Action)>,
     mut faults: ResMut<Faults>,
 ) {
     for (agent, control, episode, hash, mut bot, mut streams, mut action) in &mut bots {

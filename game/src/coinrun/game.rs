@@ -71,10 +71,7 @@ impl Game for CoinRun {
     }
 
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
-        vec![
-            ("right-jump", BlindBot::Constant(ActionValue::Discrete(RIGHT_JUMP))),
-            ("random", BlindBot::Uniform),
-        ]
+        vec![("right-jump", BlindBot::Constant(ActionValue::Discrete(RIGHT_JUMP))), ("random", BlindBot::Uniform)]
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

@@ -46,7 +46,11 @@ impl Plugin for CoinRunPhysicsPlugin {
 }
 
 /// A context without gravity for each new arena: nothing falls but by the rules.
-fn add_contexts(arenas: Query<Entity, Added<Arena>>, known: Query<(), With<RapierContextSimulation>>, mut commands: Commands) {
+fn add_contexts(
+    arenas: Query<Entity, Added<Arena>>,
+    known: Query<(), With<RapierContextSimulation>>,
+    mut commands: Commands,
+) {
     for arena in &arenas {
         if !known.contains(arena) {
             let configuration = RapierConfiguration { gravity: Vec2::ZERO, ..RapierConfiguration::new(1.0) };

@@ -5,7 +5,9 @@ use bevy_playbot::prelude::*;
 
 use super::{
     Outcome,
-    components::{Arena, ArenaBody, Crate, Enemy, Inhabitants, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles},
+    components::{
+        Arena, ArenaBody, Crate, Enemy, Inhabitants, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
+    },
     rules::{Body, COIN_REWARD, begin_step, hash_state, move_player, patrol, touch},
 };
 

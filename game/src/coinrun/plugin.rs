@@ -3,11 +3,7 @@
 use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 
-use super::{
-    Mode, arena,
-    components::CoinRunMode,
-    demonstrator_bot, physics::CoinRunPhysicsPlugin, play,
-};
+use super::{Mode, arena, components::CoinRunMode, demonstrator_bot, physics::CoinRunPhysicsPlugin, play};
 
 /// The tick of CoinRun, in `FixedUpdate`. Add what your game adds before or after it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]

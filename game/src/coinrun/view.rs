@@ -1,19 +1,22 @@
-//! What a player sees, as numbers: the 13 × 13 tiles around the player and the player's own motion.
+//! What a player sees, as numbers: the 13 × 13 tiles around the player, the player's own motion, and where it leads.
 //!
 //! | values | name | meaning |
 //! |---|---|---|
-//! | 169 | `wall_r_c` | 1 where the cell is ground (everything outside the level is) |
-//! | 169 | `crate_r_c` | 1 where a crate stands |
-//! | 169 | `danger_r_c` | lava and saws 1; an enemy fills the cells it overlaps by its share of their width |
+//! | 169 | `wall_r_c` | share of the cell that is ground (everything outside the level is) |
+//! | 169 | `crate_r_c` | share of the cell that crates fill |
+//! | 169 | `danger_r_c` | share of the cell that lava, saws and enemies fill |
 //! | 3 | `coin_seen`, `coin_dx`, `coin_dy` | whether the coin is in view, and how far away in half views |
 //! | 9 | `enemy_i_dx`, `_dy`, `_vx` | the 3 nearest enemies in view, nearest first; 0 where there are fewer |
 //! | 8 | `vx`, `vy`, `cell_x`, `cell_y`, `supported`, `rising`, `on_crate`, `faces_left` | the player |
+//! | 36 | `hold_a_dies`, `_coin`, `_lands`, `_steps`, `_dx`, `_dy` | six curved rays: see [`paths`] |
 //!
-//! Rows (r) go up from 6 below the player's cell to 6 above it, columns (c) from 6 to the left to 6 to the right.
-//! Velocities are divided by their largest value, positions inside the cell lie between -0.5 and 0.5.
+//! The cells are centred on the player and so lie across the tiles of the level: a picture with one pixel per tile, with
+//! soft edges. Rows (r) go up from 0 at the bottom to 12, columns (c) from 0 at the left to 12; the player is in the
+//! middle of cell (6, 6). Velocities are divided by their largest value, `cell_x` and `cell_y` place the player in its
+//! tile, from -0.5 to 0.5, and `a` is the number of the action that is held.
 
 use super::{
-    PlayerState, Tile, TileGrid,
+    PlayerState, Tile, TileGrid, paths,
     rules::{Body, ENEMY_SPEED, JUMP_SPEED, WALK_SPEED, is_supported},
 };
 
@@ -25,8 +28,10 @@ pub const SIDE: usize = 13;
 pub const CELLS: usize = SIDE * SIDE;
 /// Enemies that are listed by themselves.
 pub const LISTED_ENEMIES: usize = 3;
+/// Values about the player's motion.
+const MOTION: usize = 8;
 /// Number of values.
-pub const LENGTH: usize = 3 * CELLS + 3 + 3 * LISTED_ENEMIES + 8;
+pub const LENGTH: usize = 3 * CELLS + 3 + 3 * LISTED_ENEMIES + MOTION + paths::HELD.len() * paths::VALUES;
 
 /// An arena at one moment.
 pub struct Scene<'a> {
@@ -58,6 +63,9 @@ pub fn names() -> Vec<String> {
     }
     let motion = ["vx", "vy", "cell_x", "cell_y", "supported", "rising", "on_crate", "faces_left"];
     names.extend(motion.map(String::from));
+    for action in paths::HELD {
+        names.extend(paths::NAMES.map(|part| format!("hold_{action}_{part}")));
+    }
     names
 }
 
@@ -70,51 +78,61 @@ impl Scene<'_> {
         let (crates, rest) = rest.split_at_mut(CELLS);
         let (danger, rest) = rest.split_at_mut(CELLS);
         let (coin, rest) = rest.split_at_mut(3);
-        let (listed, motion) = rest.split_at_mut(3 * LISTED_ENEMIES);
+        let (listed, rest) = rest.split_at_mut(3 * LISTED_ENEMIES);
+        let (motion, rays) = rest.split_at_mut(MOTION);
         self.fill_tiles(walls, danger);
         self.fill_bodies(crates, danger);
         self.fill_coin(coin);
         self.list_enemies(listed);
         self.fill_motion(motion);
+        let around = paths::Surroundings::new(self.player, self.tiles, self.crates, self.saws, self.enemies);
+        for (slot, action) in rays.chunks_exact_mut(paths::VALUES).zip(paths::HELD) {
+            around.follow(self.player, &self.memory, action, slot);
+        }
     }
 
-    /// Bottom left cell of the view.
-    fn corner(&self) -> (i32, i32) {
-        (self.player.x.floor() as i32 - REACH, self.player.y.floor() as i32 - REACH)
+    /// Left and bottom edge of the view.
+    fn corner(&self) -> (f32, f32) {
+        let reach = REACH as f32 + 0.5;
+        (self.player.x - reach, self.player.y - reach)
     }
 
     fn fill_tiles(&self, walls: &mut [f32], danger: &mut [f32]) {
         let (left, bottom) = self.corner();
-        for cell in 0..CELLS {
-            match self.tiles.get(left + (cell % SIDE) as i32, bottom + (cell / SIDE) as i32) {
-                Tile::Wall | Tile::WallTop => walls[cell] = 1.0,
-                Tile::Lava | Tile::LavaTop => danger[cell] = 1.0,
-                Tile::Empty | Tile::Coin | Tile::Barrier => {}
+        // One more than the cells, since the edge of the view cuts through tiles.
+        for row in 0..=SIDE as i32 {
+            for column in 0..=SIDE as i32 {
+                let (x, y) = (left.floor() as i32 + column, bottom.floor() as i32 + row);
+                match self.tiles.get(x, y) {
+                    Tile::Wall | Tile::WallTop => self.cover(x as f32, y as f32, walls),
+                    Tile::Lava | Tile::LavaTop => self.cover(x as f32, y as f32, danger),
+                    Tile::Empty | Tile::Coin | Tile::Barrier => {}
+                }
             }
         }
     }
 
     fn fill_bodies(&self, crates: &mut [f32], danger: &mut [f32]) {
         for body in self.crates {
-            self.cover(body, crates);
+            self.cover(body.x - body.rx, body.y - body.ry, crates);
         }
         for body in self.saws.iter().chain(self.enemies) {
-            self.cover(body, danger);
+            self.cover(body.x - body.rx, body.y - body.ry, danger);
         }
     }
 
-    /// Marks the cells under a body of one tile by the share of their width that it covers.
-    fn cover(&self, body: &Body, plane: &mut [f32]) {
+    /// Adds the square of one tile whose bottom left corner is (x, y) to the up to four cells it lies in, by area.
+    fn cover(&self, x: f32, y: f32, plane: &mut [f32]) {
         let (left, bottom) = self.corner();
-        let row = body.y.floor() as i32 - bottom;
-        let start = body.x - body.rx;
-        let column = start.floor() as i32 - left;
-        let right_share = start - start.floor();
-        for (column, share) in [(column, 1.0 - right_share), (column + 1, right_share)] {
-            let inside = (0..SIDE as i32).contains(&column) && (0..SIDE as i32).contains(&row);
-            if inside && share > 0.0 {
-                let cell = &mut plane[row as usize * SIDE + column as usize];
-                *cell = share.max(*cell);
+        let (column, row) = ((x - left).floor(), (y - bottom).floor());
+        let (right_share, upper_share) = (x - left - column, y - bottom - row);
+        let side = SIDE as i32;
+        for (row, height) in [(row as i32, 1.0 - upper_share), (row as i32 + 1, upper_share)] {
+            for (column, width) in [(column as i32, 1.0 - right_share), (column as i32 + 1, right_share)] {
+                if (0..side).contains(&row) && (0..side).contains(&column) {
+                    let cell = &mut plane[(row * side + column) as usize];
+                    *cell = (*cell + width * height).min(1.0);
+                }
             }
         }
     }
@@ -190,15 +208,16 @@ mod tests {
     #[test]
     fn names_and_values_have_the_documented_length() {
         assert_eq!(names().len(), LENGTH);
-        assert_eq!(LENGTH, 527);
+        assert_eq!(LENGTH, 563);
         assert_eq!(seen(&generate(Mode::Hard, 0), &Body::player()).len(), LENGTH);
     }
 
     #[test]
     fn the_start_looks_as_it_should() {
         let level = generate(Mode::Hard, 0);
-        let values = seen(&level, &Body::player());
-        // The player stands in cell (1, 1), which is row 6, column 6 of the view.
+        // In the middle of tile (1, 1), so that cells and tiles lie on each other: the player is in cell (6, 6).
+        let player = Body { x: 1.5, y: 1.5, ..Body::player() };
+        let values = seen(&level, &player);
         assert_eq!(value(&values, "wall_5_6"), 1.0, "the floor");
         assert_eq!(value(&values, "wall_6_6"), 0.0, "the player's cell");
         assert_eq!(value(&values, "wall_6_5"), 1.0, "the left wall");
@@ -208,7 +227,36 @@ mod tests {
         // The enemy covers x from 5.25 to 6.25: three quarters of one cell, one quarter of the next.
         assert_eq!((value(&values, "danger_6_10"), value(&values, "danger_6_11")), (0.75, 0.25));
         assert_eq!(value(&values, "enemy_0_vx"), -1.0);
-        assert_eq!((value(&values, "supported"), value(&values, "coin_seen")), (1.0, 0.0));
+        assert_eq!(value(&values, "coin_seen"), 0.0);
+    }
+
+    #[test]
+    fn edges_are_soft_where_cells_lie_across_tiles() {
+        let level = generate(Mode::Hard, 0);
+        let values = seen(&level, &Body { x: 1.75, y: 1.5, ..Body::player() });
+        // Cell (6, 5) now covers x from 0.25 to 1.25, of which 0.25 to 1 is the left wall.
+        assert_eq!(value(&values, "wall_6_5"), 0.75);
+    }
+
+    #[test]
+    fn paths_tell_death_from_a_safe_jump() {
+        let level = Level::from_text("#...........C#\n#A.....S.....#\n##############\n").expect("a picture");
+        let mut out = Vec::new();
+        let player = Body { x: 5.0, vx: 0.5, ..Body::player() };
+        let saw = [Body::block([7, 1])];
+        let scene = Scene {
+            tiles: &level.tiles,
+            player: &player,
+            memory: PlayerState::default(),
+            coin: level.coin,
+            crates: &[],
+            saws: &saw,
+            enemies: &[],
+        };
+        scene.fill(&mut out);
+        assert_eq!(value(&out, "hold_7_dies"), 1.0, "walking on meets the saw");
+        assert_eq!(value(&out, "hold_8_dies"), 0.0, "a jump clears it");
+        assert_eq!(value(&out, "hold_1_dies"), 0.0, "turning back is safe");
     }
 
     #[test]

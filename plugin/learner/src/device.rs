@@ -61,10 +61,7 @@ impl FromStr for DeviceKind {
     type Err = UnknownDevice;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == name)
-            .ok_or_else(|| UnknownDevice { name: name.to_owned() })
+        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| UnknownDevice { name: name.to_owned() })
     }
 }
 

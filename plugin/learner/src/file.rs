@@ -1,6 +1,6 @@
 //! Self-describing safetensors files: tensors by name, and a JSON description in the header.
 
-use crate::nn::{ParamVisitor, Parameters, host};
+use crate::nn::{Adam, ParamVisitor, Parameters, host};
 use crate::{FileError, LearnError};
 use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
@@ -51,15 +51,19 @@ impl TensorFile {
     }
 
     /// Adds all parameters of `network`.
-    pub(crate) fn put_network<M: Parameters + Clone>(
-        &mut self,
-        prefix: &str,
-        network: &M,
-    ) -> Result<(), FileError> {
+    pub(crate) fn put_network<M: Parameters + Clone>(&mut self, prefix: &str, network: &M) -> Result<(), FileError> {
         let mut writer = Put { file: self, error: None };
         network.clone().visit(prefix, &mut writer);
         let error = writer.error;
         error.map_or(Ok(()), |source| Err(FileError::Learner { path: self.path.clone(), source }))
+    }
+
+    /// Adds an optimizer's moments, `adam.m.NAME` and `adam.v.NAME`.
+    pub(crate) fn put_adam(&mut self, adam: &Adam) {
+        for (name, moments) in &adam.moments {
+            self.put(&format!("adam.m.{name}"), &moments.shape, &moments.m);
+            self.put(&format!("adam.v.{name}"), &moments.shape, &moments.v);
+        }
     }
 
     /// Writes everything under a temporary name, flushes it to the disk and renames it into place.
@@ -67,24 +71,20 @@ impl TensorFile {
         let views: Result<Vec<_>, _> = self
             .tensors
             .iter()
-            .map(|(name, t)| {
-                TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|view| (name, view))
-            })
+            .map(|(name, t)| TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|view| (name, view)))
             .collect();
         let header = HashMap::from([(DESCRIPTION.to_owned(), self.description.clone())]);
         let bytes = views
             .and_then(|views| safetensors::serialize(views, Some(header)))
             .map_err(|e| self.format(e.to_string()))?;
-        write_atomically(&self.path, &bytes)
-            .map_err(|source| FileError::Io { path: self.path.clone(), source })
+        write_atomically(&self.path, &bytes).map_err(|source| FileError::Io { path: self.path.clone(), source })
     }
 
     /// Reads a whole file.
     pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
         let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
         let bytes = fs::read(path).map_err(|source| FileError::Io { path: path.to_owned(), source })?;
-        let (_, metadata) =
-            SafeTensors::read_metadata(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
         let description = metadata
             .metadata()
             .as_ref()
@@ -94,11 +94,7 @@ impl TensorFile {
         let tensors = views
             .iter()
             .map(|(name, view)| {
-                let stored = Stored {
-                    shape: view.shape().to_vec(),
-                    dtype: view.dtype(),
-                    bytes: view.data().to_vec(),
-                };
+                let stored = Stored { shape: view.shape().to_vec(), dtype: view.dtype(), bytes: view.data().to_vec() };
                 (name.to_owned(), stored)
             })
             .collect();
@@ -107,8 +103,7 @@ impl TensorFile {
 
     /// The description.
     pub(crate) fn description<T: DeserializeOwned>(&self) -> Result<T, FileError> {
-        serde_json::from_str(&self.description)
-            .map_err(|e| self.format(format!("description in the header: {e}")))
+        serde_json::from_str(&self.description).map_err(|e| self.format(format!("description in the header: {e}")))
     }
 
     /// Takes out a single-precision tensor of the given shape.
@@ -136,6 +131,35 @@ impl TensorFile {
         reader.error.map_or(Ok(()), Err)
     }
 
+    /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`.
+    pub(crate) fn take_adam<M: Parameters>(
+        &mut self,
+        adam: &mut Adam,
+        network: &mut M,
+        steps: u64,
+    ) -> Result<(), FileError> {
+        adam.steps = steps;
+        let mut names = Names(Vec::new());
+        if steps > 0 {
+            network.visit("", &mut names);
+        }
+        for (name, shape) in names.0 {
+            let m = self.take(&format!("adam.m.{name}"), &shape)?;
+            let v = self.take(&format!("adam.v.{name}"), &shape)?;
+            adam.restore(name, shape, m, v);
+        }
+        Ok(())
+    }
+
+    /// `Ok` if the file calls itself a `kind` of `version`.
+    pub(crate) fn check_kind(&self, (kind, version): (&str, u32), found: (&str, u32)) -> Result<(), FileError> {
+        if found == (kind, version) {
+            return Ok(());
+        }
+        let (found, other) = found;
+        Err(self.format(format!("is a {found} of version {other}, expected a {kind} of version {version}")))
+    }
+
     /// Fails if any tensor was not taken out.
     pub(crate) fn finish(self) -> Result<(), FileError> {
         match self.tensors.into_keys().next() {
@@ -154,12 +178,7 @@ impl TensorFile {
         FileError::Learner { path: self.path.clone(), source }
     }
 
-    fn take_bytes(
-        &mut self,
-        name: &str,
-        shape: Option<&[usize]>,
-        dtype: Dtype,
-    ) -> Result<Vec<u8>, FileError> {
+    fn take_bytes(&mut self, name: &str, shape: Option<&[usize]>, dtype: Dtype) -> Result<Vec<u8>, FileError> {
         let Some(stored) = self.tensors.remove(name) else {
             return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
         };
@@ -232,5 +251,13 @@ impl ParamVisitor for Take<'_> {
             Ok(values) => *tensor = Tensor::from_data(TensorData::new(values, shape), self.device),
             Err(error) => self.error = Some(error),
         }
+    }
+}
+
+struct Names(Vec<(String, Vec<usize>)>);
+
+impl ParamVisitor for Names {
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
+        self.0.push((name.to_owned(), tensor.dims().to_vec()));
     }
 }

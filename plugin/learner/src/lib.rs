@@ -48,7 +48,7 @@ pub use ppo::{PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit
 pub use rng::{RngState, Streams};
 pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
 pub use skill::{
-    Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
-    SkillProgress, SkillTrainer,
+    Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel, SkillProgress,
+    SkillTrainer,
 };
 pub use space::{Action, ActionSpace, Actions};

@@ -26,15 +26,10 @@ impl ActionSpace {
     /// [`LearnError::Action`] names the first action that does not fit.
     pub fn check(&self, actions: &Actions) -> Result<(), LearnError> {
         match (self, actions) {
-            (Self::Discrete(n), Actions::Discrete(values)) => {
-                match values.iter().position(|&a| a as usize >= *n) {
-                    None => Ok(()),
-                    Some(row) => Err(LearnError::Action(format!(
-                        "row {row} is {} of {n} choices",
-                        values[row]
-                    ))),
-                }
-            }
+            (Self::Discrete(n), Actions::Discrete(values)) => match values.iter().position(|&a| a as usize >= *n) {
+                None => Ok(()),
+                Some(row) => Err(LearnError::Action(format!("row {row} is {} of {n} choices", values[row]))),
+            },
             (Self::Continuous(n), Actions::Continuous { dim, values }) => {
                 if n != dim {
                     return Err(LearnError::Action(format!("width {dim}, expected {n}")));
@@ -106,9 +101,9 @@ impl Actions {
     pub fn get(&self, row: usize) -> Option<Action> {
         match self {
             Self::Discrete(values) => values.get(row).copied().map(Action::Discrete),
-            Self::Continuous { dim, values } => values
-                .get(row * dim..(row + 1) * dim)
-                .map(|v| Action::Continuous(v.to_vec())),
+            Self::Continuous { dim, values } => {
+                values.get(row * dim..(row + 1) * dim).map(|v| Action::Continuous(v.to_vec()))
+            }
         }
     }
 
@@ -136,9 +131,7 @@ impl Actions {
     pub fn extend_rows(&mut self, other: &Self, start: usize, end: usize) -> Result<(), LearnError> {
         match (self, other) {
             (Self::Discrete(to), Self::Discrete(from)) => to.extend_from_slice(&from[start..end]),
-            (Self::Continuous { dim, values }, Self::Continuous { dim: d, values: from })
-                if dim == d =>
-            {
+            (Self::Continuous { dim, values }, Self::Continuous { dim: d, values: from }) if dim == d => {
                 values.extend_from_slice(&from[start * *d..end * *d]);
             }
             (all, other) => {

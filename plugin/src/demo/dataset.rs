@@ -20,11 +20,7 @@ use crate::{game::Game, observation::Observation};
 /// # Errors
 ///
 /// [`VerifyError`] for files that cannot be read or belong to another game or version.
-pub fn load_dataset(
-    game: &dyn Game,
-    path: &Path,
-    mut progress: impl FnMut(u64),
-) -> Result<Dataset, VerifyError> {
+pub fn load_dataset(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<Dataset, VerifyError> {
     let names = game.observation().names;
     let mut episodes = Vec::new();
     let mut steps = 0;

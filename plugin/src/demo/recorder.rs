@@ -106,9 +106,8 @@ pub(crate) fn record_ticks(
         if !control.is_active() || !episode.is_running() {
             continue;
         }
-        let demo = recording
-            .episode
-            .get_or_insert_with(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+        let demo =
+            recording.episode.get_or_insert_with(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
         push_action(&mut demo.actions, &action.0);
         demo.rewards.push(reward.get());
         demo.state_hashes.push(hash.folded());

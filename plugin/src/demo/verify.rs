@@ -50,11 +50,7 @@ pub enum VerifyError {
 /// # Errors
 ///
 /// [`VerifyError`] if the file cannot be read to its end. Divergences are no errors: they are the report.
-pub fn verify_file(
-    game: &dyn Game,
-    path: &Path,
-    mut progress: impl FnMut(u64),
-) -> Result<VerifyReport, VerifyError> {
+pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<VerifyReport, VerifyError> {
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
     let mode = reader.header().mode.clone();
     let mut stage = ReplayStage::new(game, &mode);

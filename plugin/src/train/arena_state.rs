@@ -74,8 +74,7 @@ pub enum RestoreError {
 pub fn save_arenas(collector: &mut Collector) -> Vec<ArenaState> {
     let agents = collector.agents().to_vec();
     let world = collector.world_mut();
-    let mut query =
-        world.query::<(&Agent, &Episode, &ActionLog, &ActiveSkill, &AgentStreams, &StateHash)>();
+    let mut query = world.query::<(&Agent, &Episode, &ActionLog, &ActiveSkill, &AgentStreams, &StateHash)>();
     agents
         .iter()
         .filter_map(|&agent| query.get(world, agent).ok())

@@ -246,8 +246,7 @@ fn remove_if_there(folder: &Path) -> Result<(), RunError> {
 }
 
 fn append_line(path: &Path, line: &serde_json::Value) -> Result<(), RunError> {
-    let mut file =
-        OpenOptions::new().create(true).append(true).open(path).map_err(io_error("write", path))?;
+    let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(io_error("write", path))?;
     file.write_all(format!("{line}\n").as_bytes()).map_err(io_error("write", path))
 }
 

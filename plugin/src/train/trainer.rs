@@ -2,9 +2,7 @@
 
 use std::{collections::VecDeque, time::Instant};
 
-use playbot_learner::{
-    DeviceKind, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SkillModel, UpdateMetrics,
-};
+use playbot_learner::{DeviceKind, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SkillModel, UpdateMetrics};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -155,9 +153,7 @@ impl Trainer {
         let prior = skill_prior(experiment, &learner);
         let share = experiment.arenas / experiment.worlds;
         let collectors = (0..experiment.worlds)
-            .map(|world| {
-                Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone())
-            })
+            .map(|world| Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone()))
             .collect();
         Ok(Self {
             experiment: experiment.clone(),

@@ -9,6 +9,7 @@ const HALF_LN_TAU: f32 = 0.918_938_5;
 
 /// A batch of distributions, one per row.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per batch, and it is never stored")]
 pub enum Dist {
     /// Choices with these normalised log-probabilities, `[n, choices]`.
     Categorical {
@@ -42,9 +43,7 @@ impl ActionRows {
                 let values: Vec<i64> = values.iter().map(|&a| i64::from(a)).collect();
                 Self::Discrete(Tensor::from_data(TensorData::new(values, [n, 1]), device))
             }
-            Actions::Continuous { dim, values } => {
-                Self::Continuous(matrix(values.clone(), n, *dim, device))
-            }
+            Actions::Continuous { dim, values } => Self::Continuous(matrix(values.clone(), n, *dim, device)),
         }
     }
 }
@@ -80,9 +79,7 @@ impl Dist {
                 let terms = log_probs.clone().exp() * log_probs.clone();
                 terms.sum_dim(1).squeeze_dim(1).neg()
             }
-            Self::Gaussian { log_std, .. } => {
-                (log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1)
-            }
+            Self::Gaussian { log_std, .. } => (log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1),
         }
     }
 
@@ -99,10 +96,7 @@ impl Dist {
                 let terms = p.clone().exp() * (p.clone() - q.clone());
                 Ok(terms.sum_dim(1).squeeze_dim(1))
             }
-            (
-                Self::Gaussian { mean: mp, log_std: lp },
-                Self::Gaussian { mean: mq, log_std: lq },
-            ) => {
+            (Self::Gaussian { mean: mp, log_std: lp }, Self::Gaussian { mean: mq, log_std: lq }) => {
                 let ratio = ((lp.clone() - lq.clone()) * 2.0).exp();
                 let distance = ((mp.clone() - mq.clone()) * lq.clone().neg().exp()).square();
                 let terms = (ratio + distance - 1.0) * 0.5 + (lq.clone() - lp.clone());
@@ -116,9 +110,7 @@ impl Dist {
     pub fn detach(self) -> Self {
         match self {
             Self::Categorical { log_probs } => Self::Categorical { log_probs: log_probs.inner() },
-            Self::Gaussian { mean, log_std } => {
-                Self::Gaussian { mean: mean.inner(), log_std: log_std.inner() }
-            }
+            Self::Gaussian { mean, log_std } => Self::Gaussian { mean: mean.inner(), log_std: log_std.inner() },
         }
     }
 

@@ -16,11 +16,7 @@ impl NamedGrads {
     ///
     /// # Errors
     /// [`LearnError::Device`] if a tensor cannot be read.
-    pub fn read<M: Parameters>(
-        network: &mut M,
-        prefix: &str,
-        grads: &Gradients,
-    ) -> Result<Self, LearnError> {
+    pub fn read<M: Parameters>(network: &mut M, prefix: &str, grads: &Gradients) -> Result<Self, LearnError> {
         let mut reader = Reader { grads, entries: Vec::new(), error: None };
         network.visit(prefix, &mut reader);
         match reader.error {

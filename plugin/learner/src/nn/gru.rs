@@ -127,9 +127,7 @@ impl GruLayer {
                 }
                 // From the zero state the recurrent product is its bias.
                 None => {
-                    let rz = sigmoid(
-                        gate(&input, 0, 2) + bias_hh.clone().slice([0..directions, 0..1, 0..2 * hidden]),
-                    );
+                    let rz = sigmoid(gate(&input, 0, 2) + bias_hh.clone().slice([0..directions, 0..1, 0..2 * hidden]));
                     let (r, z) = (gate(&rz, 0, 1), gate(&rz, 1, 2));
                     let bias_n = bias_hh.clone().slice([0..directions, 0..1, 2 * hidden..gates]);
                     let n = (gate(&input, 2, 3) + r * bias_n).tanh();

@@ -16,13 +16,7 @@ pub struct Linear {
 
 impl Linear {
     /// Orthogonal weights times `gain`, zero bias.
-    pub fn new<R: Rng + ?Sized>(
-        inputs: usize,
-        outputs: usize,
-        gain: f64,
-        rng: &mut R,
-        device: &Device,
-    ) -> Self {
+    pub fn new<R: Rng + ?Sized>(inputs: usize, outputs: usize, gain: f64, rng: &mut R, device: &Device) -> Self {
         Self {
             weight: matrix(orthogonal(inputs, outputs, gain, rng), inputs, outputs, device),
             bias: vector(vec![0.0; outputs], device),
@@ -47,9 +41,7 @@ impl Linear {
         if width == 0 {
             return rest;
         }
-        let held = held
-            .matmul(self.weight.clone().slice([0..width, 0..outputs]))
-            .reshape([1, batch, outputs]);
+        let held = held.matmul(self.weight.clone().slice([0..width, 0..outputs])).reshape([1, batch, outputs]);
         (rest.reshape([steps, batch, outputs]) + held).reshape([steps * batch, outputs])
     }
 }

@@ -24,7 +24,7 @@ pub use gru::{Gru, GruLayer};
 pub use init::orthogonal;
 pub use linear::Linear;
 pub use mlp::Mlp;
+pub(crate) use params::path;
 pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
 pub use sample::{argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
-pub(crate) use params::path;
 pub(crate) use tensors::{host, matrix, scalar, vector};

@@ -32,12 +32,7 @@ impl RewardNormalizer {
     ///
     /// # Errors
     /// [`LearnError::Shape`] if `envs` is not what it was in earlier calls, or the lengths differ.
-    pub fn normalize(
-        &mut self,
-        rewards: &[f32],
-        done: &[bool],
-        envs: usize,
-    ) -> Result<Vec<f32>, LearnError> {
+    pub fn normalize(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<Vec<f32>, LearnError> {
         if self.returns.is_empty() {
             self.returns = vec![0.0; envs];
         }

@@ -20,6 +20,7 @@ pub enum StdKind {
 
 /// The part of a Gaussian actor that gives ln σ.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per network")]
 pub enum LogStd {
     /// Discrete actions have none.
     None,
@@ -67,9 +68,7 @@ impl Actor {
         let net = Mlp::new(inputs, &shape.hidden, space.dim(), shape.activation, 0.01, rng, device);
         let log_std = match (space, std) {
             (ActionSpace::Discrete(_), _) => LogStd::None,
-            (ActionSpace::Continuous(n), StdKind::Vector) => {
-                LogStd::Vector(vector(vec![0.0; n], device))
-            }
+            (ActionSpace::Continuous(n), StdKind::Vector) => LogStd::Vector(vector(vec![0.0; n], device)),
             (ActionSpace::Continuous(n), StdKind::State) => {
                 let width = shape.hidden.last().copied().unwrap_or(inputs);
                 LogStd::State(Linear::new(width, n, 0.01, rng, device))
@@ -93,9 +92,7 @@ impl Actor {
         let head = self.net.head.forward(features.clone());
         match &self.log_std {
             LogStd::None => Dist::categorical(head),
-            LogStd::Vector(log_std) => {
-                Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze() }
-            }
+            LogStd::Vector(log_std) => Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze() },
             LogStd::State(layer) => {
                 let (low, high) = LOG_STD_RANGE;
                 Dist::Gaussian { mean: head, log_std: layer.forward(features).clamp(low, high) }

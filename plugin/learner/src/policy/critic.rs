@@ -21,7 +21,11 @@ impl Critic {
 
     /// Values of joined inputs `[z, s]`: `[n, latent + obs_dim]` to `[n]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<1> {
-        self.net.forward(x).squeeze_dim(1)
+        let features = self.net.features(x);
+        let [width, _] = self.net.head.weight.dims();
+        // A product with a single column is summed in an order that depends on the number of rows; this is not.
+        let weight = self.net.head.weight.clone().reshape([1, width]);
+        (features * weight).sum_dim(1).squeeze_dim(1) + self.net.head.bias.clone()
     }
 }
 

@@ -1,8 +1,6 @@
 //! What a policy says about a batch of observations.
 
-use crate::nn::{
-    argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian,
-};
+use crate::nn::{argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
 use crate::{Action, ActionSpace, LearnError};
 use rand::Rng;
 

@@ -1,14 +1,13 @@
 //! A learner's complete state in one file.
 
-use super::learner::FrozenSkill;
+use super::frozen::FrozenSkill;
 use super::{PolicySpec, PpoConfig, PpoLearner};
 use crate::file::TensorFile;
-use crate::nn::{ParamVisitor, Parameters, tracked};
+use crate::nn::tracked;
 use crate::norm::RunningStats;
 use crate::score::ScoreConfig;
 use crate::skill::SkillDescription;
 use crate::{DeviceKind, FileError};
-use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -57,10 +56,7 @@ impl PpoLearner {
             file.put_network("decoder", &skill.decoder)?;
             file.put_network("prior", &skill.prior)?;
         }
-        for (name, moments) in &self.adam.moments {
-            file.put(&format!("adam.m.{name}"), &moments.shape, &moments.m);
-            file.put(&format!("adam.v.{name}"), &moments.shape, &moments.v);
-        }
+        file.put_adam(&self.adam);
         if let Some(normalizer) = &self.observations {
             put_stats(&mut file, "obs_norm", &normalizer.stats);
         }
@@ -78,13 +74,7 @@ impl PpoLearner {
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description()?;
-        if header.kind != KIND || header.version != VERSION {
-            let detail = format!(
-                "is a {} of version {}, expected a {KIND} of version {VERSION}",
-                header.kind, header.version
-            );
-            return Err(file.format(detail));
-        }
+        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
         let skill = match (header.score, header.skill) {
             (Some(config), Some(description)) => {
                 let nets = description.nets(device).map_err(|e| file.learner(e))?;
@@ -92,8 +82,8 @@ impl PpoLearner {
             }
             _ => None,
         };
-        let mut learner = Self::build(header.config, header.spec, skill, header.seed, device)
-            .map_err(|e| file.learner(e))?;
+        let mut learner =
+            Self::build(header.config, header.spec, skill, header.seed, device).map_err(|e| file.learner(e))?;
         let plain = device.plain();
         file.take_network("", &mut learner.nets, &plain)?;
         learner.nets = tracked(&learner.nets);
@@ -109,16 +99,7 @@ impl PpoLearner {
             normalizer.returns = file.take_f64("reward_norm.returns", None)?;
         }
         learner.updates = header.updates;
-        learner.adam.steps = header.adam_steps;
-        if header.adam_steps > 0 {
-            let mut names = Names(Vec::new());
-            learner.nets.visit("", &mut names);
-            for (name, shape) in names.0 {
-                let m = file.take(&format!("adam.m.{name}"), &shape)?;
-                let v = file.take(&format!("adam.v.{name}"), &shape)?;
-                learner.adam.restore(name, shape, m, v);
-            }
-        }
+        file.take_adam(&mut learner.adam, &mut learner.nets, header.adam_steps)?;
         file.finish()?;
         Ok(learner)
     }
@@ -136,12 +117,4 @@ fn take_stats(file: &mut TensorFile, name: &str, stats: &mut RunningStats) -> Re
     stats.var = file.take_f64(&format!("{name}.var"), Some(dim))?;
     stats.count = file.take_f64(&format!("{name}.count"), Some(1))?[0];
     Ok(())
-}
-
-struct Names(Vec<(String, Vec<usize>)>);
-
-impl ParamVisitor for Names {
-    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
-        self.0.push((name.to_owned(), tensor.dims().to_vec()));
-    }
 }

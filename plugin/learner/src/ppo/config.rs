@@ -114,12 +114,8 @@ impl PpoConfig {
         if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
             return bad(format!("ppo {name} must be at least 1"));
         }
-        let positive = [
-            ("lr", self.lr),
-            ("clip", self.clip),
-            ("max_grad_norm", self.max_grad_norm),
-            ("adam_eps", self.adam_eps),
-        ];
+        let positive =
+            [("lr", self.lr), ("clip", self.clip), ("max_grad_norm", self.max_grad_norm), ("adam_eps", self.adam_eps)];
         if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
             return bad(format!("ppo {name} must be positive, not {x}"));
         }

@@ -1,27 +1,16 @@
 //! The learner: PPO, and SCORE-PPO if it is given a skill model.
 
-use super::batch::{DecoderRows, Prepared};
+use super::batch::Prepared;
+use super::frozen::FrozenSkill;
 use super::update::{StepMetrics, gradient_step};
 use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
-use crate::nn::{Adam, AdamConfig, HostDist, matrix, tracked};
+use crate::nn::{Adam, AdamConfig, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, Critic, NetShape, Policy, StdKind, joined_rows};
+use crate::policy::{Actor, Critic, NetShape, Policy, StdKind};
 use crate::rng::{Streams, shuffle};
-use crate::score::{AlphaKind, PriorKind, ScoreConfig, alphas, decoder_kl, own_samples};
-use crate::skill::{Prior, SkillDescription, SkillModel};
+use crate::score::{PriorKind, ScoreConfig};
+use crate::skill::{Prior, SkillModel};
 use crate::{DeviceKind, LearnError};
-
-/// Rows that the frozen decoder reads at a time.
-const DECODER_CHUNK: usize = 2048;
-
-/// A skill model's decoder and prior, which do not learn any more.
-#[derive(Clone, Debug)]
-pub(super) struct FrozenSkill {
-    pub(super) config: ScoreConfig,
-    pub(super) description: SkillDescription,
-    pub(super) decoder: Actor,
-    pub(super) prior: Actor,
-}
 
 /// Improves a policy from rollouts.
 ///
@@ -46,12 +35,7 @@ impl PpoLearner {
     ///
     /// # Errors
     /// [`LearnError::Config`] for settings that cannot work.
-    pub fn new(
-        config: PpoConfig,
-        spec: PolicySpec,
-        seed: u64,
-        device: DeviceKind,
-    ) -> Result<Self, LearnError> {
+    pub fn new(config: PpoConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::build(config, spec, None, seed, device)
     }
 
@@ -103,7 +87,8 @@ impl PpoLearner {
             Some(skill) => {
                 skill.config.validate()?;
                 if skill.config.init_from_decoder && config.norm_obs {
-                    let text = "ppo norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
+                    let text =
+                        "ppo norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
                     return Err(LearnError::Config(text.to_owned()));
                 }
                 if skill.config.init_from_decoder { skill.decoder.clone() } else { fresh() }
@@ -176,43 +161,6 @@ impl PpoLearner {
         Policy::new(actor, critic, stats, self.spec.action_space, widths, self.device.plain())
     }
 
-    /// Mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is still a copy
-    /// of the decoder. `None` without a skill model.
-    ///
-    /// # Errors
-    /// [`LearnError::InitialKl`] if the policy should be a copy (no update was done, and
-    /// [`ScoreConfig::init_from_decoder`]) and the divergence is not exactly 0; [`LearnError::Shape`].
-    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
-        let Some(skill) = &self.skill else { return Ok(None) };
-        if n == 0 {
-            return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
-        }
-        let policy = self.policy();
-        let played = policy.forward(z, obs, n)?;
-        let copy = Policy::new(
-            &skill.decoder,
-            None,
-            None,
-            self.spec.action_space,
-            (self.spec.obs_dim, skill.description.config.latent),
-            self.device.plain(),
-        );
-        let decoded = copy.forward(z, obs, n)?;
-        let device = self.device.plain();
-        let rows: Vec<usize> = (0..n).collect();
-        let dist = |output: crate::PolicyOutput| {
-            let log_std = (!output.log_std.is_empty()).then_some(output.log_std);
-            let host = HostDist { dim: self.spec.action_space.dim(), head: output.head, log_std };
-            host.rows(&rows, &device)
-        };
-        let kl = decoder_kl(&dist(decoded), &dist(played), skill.config.kl_direction)?;
-        let kl = crate::nn::scalar(kl.mean())?;
-        if skill.config.init_from_decoder && self.updates == 0 && kl != 0.0 {
-            return Err(LearnError::InitialKl { kl });
-        }
-        Ok(Some(kl))
-    }
-
     /// Trains on a rollout: epochs × minibatches gradient steps.
     ///
     /// # Errors
@@ -221,9 +169,7 @@ impl PpoLearner {
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
         self.check(rollout)?;
         let rewards = match &mut self.rewards {
-            Some(normalizer) => {
-                normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?
-            }
+            Some(normalizer) => normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?,
             None => rollout.rewards.clone(),
         };
         let config = &self.config;
@@ -270,12 +216,7 @@ impl PpoLearner {
         })
     }
 
-    pub(super) fn step(
-        &mut self,
-        prepared: &Prepared<'_>,
-        rows: &[usize],
-        lr: f64,
-    ) -> Result<StepMetrics, LearnError> {
+    pub(super) fn step(&mut self, prepared: &Prepared<'_>, rows: &[usize], lr: f64) -> Result<StepMetrics, LearnError> {
         let batch = prepared.minibatch(rows, &self.device.plain());
         let score = self.skill.as_ref().map(|skill| &skill.config);
         gradient_step(&mut self.nets, &mut self.adam, &batch, &self.config, score, lr)
@@ -290,44 +231,5 @@ impl PpoLearner {
             return Err(LearnError::Config("the rollout is empty".to_owned()));
         }
         Ok(())
-    }
-
-    /// The decoder's distributions and α for the whole rollout: it is frozen, so once per update is enough.
-    fn decoder_rows(&self, rollout: &Rollout) -> Result<Option<DecoderRows>, LearnError> {
-        let Some(skill) = self.skill.as_ref().filter(|skill| skill.config.kl) else {
-            return Ok(None);
-        };
-        let (n, latent, obs_dim) = (rollout.rows(), rollout.latent, rollout.obs_dim);
-        let device = self.device.plain();
-        let mut dist = HostDist { dim: self.spec.action_space.dim(), head: Vec::new(), log_std: None };
-        for start in (0..n).step_by(DECODER_CHUNK) {
-            let rows = start..(start + DECODER_CHUNK).min(n);
-            let len = rows.len();
-            let inputs = joined_rows(&rollout.z, latent, &rollout.obs, obs_dim, None, rows);
-            let part = skill.decoder.forward(matrix(inputs, len, latent + obs_dim, &device)).to_host()?;
-            dist.head.extend(part.head);
-            if let Some(stds) = part.log_std {
-                dist.log_std.get_or_insert_default().extend(stds);
-            }
-        }
-        let alpha = match skill.config.alpha {
-            AlphaKind::OwnSample => {
-                let mut rng = self.streams.stream("score.own_samples", self.updates);
-                alphas(AlphaKind::OwnSample, &dist, &own_samples(&dist, &mut rng))?
-            }
-            kind => alphas(kind, &dist, &rollout.actions)?,
-        };
-        Ok(Some(DecoderRows { dist, alpha }))
-    }
-}
-
-impl FrozenSkill {
-    /// What a policy tied to this skill model reads and does.
-    pub(super) fn spec(&self) -> PolicySpec {
-        PolicySpec {
-            obs_dim: self.description.obs_dim,
-            latent: if self.config.condition { self.description.config.latent } else { 0 },
-            action_space: self.description.action_space,
-        }
     }
 }

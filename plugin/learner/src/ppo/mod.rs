@@ -3,6 +3,7 @@
 mod batch;
 mod checkpoint;
 mod config;
+mod frozen;
 mod gae;
 mod learner;
 mod loss;

@@ -129,7 +129,10 @@ impl Rollout {
         let Some(first) = parts.first() else {
             return Err(LearnError::Config("no rollouts to join".to_owned()));
         };
-        let mut all = Self { actions: first.actions.clone(), ..Self::new(0, first.obs_dim, first.latent, &ActionSpace::Discrete(0)) };
+        let mut all = Self {
+            actions: first.actions.clone(),
+            ..Self::new(0, first.obs_dim, first.latent, &ActionSpace::Discrete(0))
+        };
         all.actions.clear();
         all.steps = first.steps;
         for part in parts {

@@ -70,8 +70,7 @@ pub fn gradient_step(
         entropy: read("entropy", &loss.entropy, adam)?,
         ..StepMetrics::default()
     };
-    let mut total =
-        loss.policy_loss - loss.entropy * config.ent_coef + loss.value_loss * config.vf_coef;
+    let mut total = loss.policy_loss - loss.entropy * config.ent_coef + loss.value_loss * config.vf_coef;
     if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
         let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
         let penalty = (kl.clone() * decoder.alpha.clone()).mean();

@@ -1,9 +1,7 @@
 //! α: the decoder's confidence in each row.
 
 use super::AlphaKind;
-use crate::nn::{
-    HostDist, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian,
-};
+use crate::nn::{HostDist, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
 use crate::{Actions, LearnError};
 use rand::Rng;
 
@@ -55,8 +53,10 @@ pub fn alphas(kind: AlphaKind, decoder: &HostDist, actions: &Actions) -> Result<
 }
 
 fn score(mean: &[f32], log_std: &[f32], action: &[f32]) -> f32 {
-    let squares = mean.iter().zip(log_std).zip(action).map(|((&m, &s), &a)| {
-        ((f64::from(a) - f64::from(m)) * (-f64::from(s)).exp()).powi(2)
-    });
+    let squares = mean
+        .iter()
+        .zip(log_std)
+        .zip(action)
+        .map(|((&m, &s), &a)| ((f64::from(a) - f64::from(m)) * (-f64::from(s)).exp()).powi(2));
     (-0.5 * squares.sum::<f64>() / mean.len() as f64).exp() as f32
 }

@@ -12,11 +12,7 @@ use burn::tensor::Tensor;
 ///
 /// # Errors
 /// [`LearnError::Action`] if the two act in different kinds of spaces.
-pub fn decoder_kl(
-    decoder: &Dist,
-    policy: &Dist,
-    direction: KlDirection,
-) -> Result<Tensor<1>, LearnError> {
+pub fn decoder_kl(decoder: &Dist, policy: &Dist, direction: KlDirection) -> Result<Tensor<1>, LearnError> {
     match direction {
         KlDirection::DecoderPolicy => decoder.kl(policy),
         KlDirection::PolicyDecoder => policy.kl(decoder),

@@ -51,6 +51,9 @@ pub struct SkillConfig {
     pub prior_std: StdKind,
     /// How the decoder's standard deviation is made; only for continuous actions.
     pub decoder_std: StdKind,
+    /// Share of the demonstrator's discrete actions that were replaced by uniformly random ones, as the recording's
+    /// header says; 0 to imitate the noise too, as the paper does.
+    pub action_noise: f64,
     /// How the terms of the loss are summed.
     pub reduction: Reduction,
 }
@@ -73,6 +76,7 @@ impl Default for SkillConfig {
             latent_reg: 0.0,
             prior_std: StdKind::State,
             decoder_std: StdKind::Vector,
+            action_noise: 0.0,
             reduction: Reduction::Standard,
         }
     }
@@ -99,6 +103,10 @@ impl SkillConfig {
         let positive = [("lr", self.lr), ("max_grad_norm", self.max_grad_norm)];
         if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
             return Err(LearnError::Config(format!("skill {name} must be positive, not {x}")));
+        }
+        if !(0.0..1.0).contains(&self.action_noise) {
+            let found = self.action_noise;
+            return Err(LearnError::Config(format!("skill action_noise must be at least 0 and below 1, not {found}")));
         }
         let weights = [("beta", self.beta), ("latent_reg", self.latent_reg)];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {

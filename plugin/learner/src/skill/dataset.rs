@@ -35,11 +35,7 @@ impl Dataset {
     /// # Errors
     /// [`LearnError::Shape`] if an episode's observations do not match its actions, [`LearnError::Action`] if an
     /// action is outside `space`, [`LearnError::NotFinite`] if an observation is.
-    pub fn new(
-        obs_dim: usize,
-        space: ActionSpace,
-        episodes: Vec<DemoEpisode>,
-    ) -> Result<Self, LearnError> {
+    pub fn new(obs_dim: usize, space: ActionSpace, episodes: Vec<DemoEpisode>) -> Result<Self, LearnError> {
         if obs_dim == 0 || space.dim() == 0 {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
@@ -156,10 +152,8 @@ mod tests {
 
     #[test]
     fn bad_demonstrations_are_refused() {
-        let episode = |n: usize, a: u32| DemoEpisode {
-            observations: vec![0.0; n],
-            actions: Actions::Discrete(vec![a; 3]),
-        };
+        let episode =
+            |n: usize, a: u32| DemoEpisode { observations: vec![0.0; n], actions: Actions::Discrete(vec![a; 3]) };
         let new = |e| Dataset::new(2, ActionSpace::Discrete(2), vec![e]);
         assert!(new(episode(6, 1)).is_ok());
         assert!(matches!(new(episode(5, 1)), Err(LearnError::Shape { .. })));

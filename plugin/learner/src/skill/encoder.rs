@@ -50,14 +50,9 @@ impl Encoder {
         let joined = Tensor::cat(vec![features, actions], 1);
         let [rows, width] = joined.dims();
         let batch = rows / steps.max(1);
-        let sequence = (0..steps)
-            .map(|t| joined.clone().slice([t * batch..(t + 1) * batch, 0..width]))
-            .collect();
+        let sequence = (0..steps).map(|t| joined.clone().slice([t * batch..(t + 1) * batch, 0..width])).collect();
         let summary = self.gru.summary(sequence);
-        Dist::Gaussian {
-            mean: self.mean.forward(summary.clone()),
-            log_std: self.log_std.forward(summary),
-        }
+        Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) }
     }
 }
 

@@ -1,6 +1,7 @@
 //! J = NLL + β KL(q ‖ p), the loss of the skill model.
 
 use super::{Reduction, SkillConfig, SkillForward};
+use crate::nn::Dist;
 use burn::tensor::Tensor;
 
 /// Bound of the legacy clamps.
@@ -22,13 +23,11 @@ pub struct SkillLoss {
 /// Reduces a batch to the loss.
 pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
     let [batch, _] = forward.decoder_latent.dims();
+    let nll_per_step = nll_under_noise(forward, config.action_noise);
     let (nll, kl) = match config.reduction {
-        Reduction::Standard => (
-            forward.nll_per_step.clone().sum() / batch as f32,
-            forward.kl_per_sequence.clone().mean(),
-        ),
+        Reduction::Standard => (nll_per_step.sum() / batch as f32, forward.kl_per_sequence.clone().mean()),
         Reduction::Legacy => (
-            forward.nll_per_step.clone().mean().clamp(-LEGACY_BOUND, LEGACY_BOUND),
+            nll_per_step.mean().clamp(-LEGACY_BOUND, LEGACY_BOUND),
             forward.kl_per_sequence.clone().sum().clamp(-LEGACY_BOUND, LEGACY_BOUND),
         ),
     };
@@ -38,4 +37,18 @@ pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
         total = total + latent_norm.clone() * config.latent_reg;
     }
     SkillLoss { nll, kl, latent_norm, total }
+}
+
+/// Negative log-likelihood of each recorded action when a share ε of discrete actions was replaced by uniformly random
+/// ones: −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns what was meant, not the noise.
+fn nll_under_noise(forward: &SkillForward, noise: f64) -> Tensor<1> {
+    let nll = forward.nll_per_step.clone();
+    match &forward.decoded {
+        Dist::Categorical { log_probs } if noise > 0.0 => {
+            let [_, actions] = log_probs.dims();
+            let meant = nll.neg().exp() * (1.0 - noise);
+            (meant + noise / actions as f64).log().neg()
+        }
+        _ => nll,
+    }
 }

@@ -7,6 +7,7 @@
 //! There is one pipeline everywhere: observations are used raw, and the decoder sees tanh(z) (or z, by
 //! [`SkillConfig::tanh_latent`]) in training and in use.
 
+mod checkpoint;
 mod config;
 mod dataset;
 mod encoder;
@@ -20,8 +21,8 @@ pub use config::{Reduction, SkillConfig};
 pub use dataset::{Dataset, DemoEpisode, Window};
 pub use encoder::Encoder;
 pub use loss::{SkillLoss, skill_loss};
-pub use model::SkillModel;
 pub(crate) use model::SkillDescription;
+pub use model::SkillModel;
 pub use nets::{SkillForward, SkillNets};
 pub use prior::{Prior, SkillDraw};
 pub use trainer::{SkillMetrics, SkillProgress, SkillTrainer};

@@ -108,13 +108,7 @@ impl SkillModel {
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description()?;
-        if header.kind != KIND || header.version != VERSION {
-            let detail = format!(
-                "is a {} of version {}, expected a {KIND} of version {VERSION}",
-                header.kind, header.version
-            );
-            return Err(file.format(detail));
-        }
+        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
         let description = header.skill;
         let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut nets, &device.plain())?;

@@ -35,30 +35,13 @@ pub struct SkillForward {
 
 impl SkillNets {
     /// Starting weights from the streams `skill.encoder`, `skill.decoder` and `skill.prior`.
-    pub fn new(
-        config: &SkillConfig,
-        obs_dim: usize,
-        space: ActionSpace,
-        streams: &Streams,
-        device: &Device,
-    ) -> Self {
+    pub fn new(config: &SkillConfig, obs_dim: usize, space: ActionSpace, streams: &Streams, device: &Device) -> Self {
         let rng = |name| streams.stream(name, 0);
-        let shape = |latent| NetShape {
-            obs_dim,
-            latent,
-            hidden: config.hidden.clone(),
-            activation: Activation::Relu,
-        };
+        let shape = |latent| NetShape { obs_dim, latent, hidden: config.hidden.clone(), activation: Activation::Relu };
         let latent = ActionSpace::Continuous(config.latent);
         Self {
             encoder: Encoder::new(config, obs_dim, space.dim(), &mut rng("skill.encoder"), device),
-            decoder: Actor::new(
-                &shape(config.latent),
-                space,
-                config.decoder_std,
-                &mut rng("skill.decoder"),
-                device,
-            ),
+            decoder: Actor::new(&shape(config.latent), space, config.decoder_std, &mut rng("skill.decoder"), device),
             prior: Actor::new(&shape(0), latent, config.prior_std, &mut rng("skill.prior"), device),
             tanh_latent: config.tanh_latent,
         }

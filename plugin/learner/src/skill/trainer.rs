@@ -40,23 +40,24 @@ pub struct SkillProgress {
 /// Trains a skill model on demonstrations, batch by batch, so that the caller can show progress and stop at any time.
 #[derive(Debug)]
 pub struct SkillTrainer {
-    config: SkillConfig,
-    dataset: Dataset,
-    nets: SkillNets,
-    adam: Adam,
-    streams: Streams,
-    device: DeviceKind,
-    epoch: u64,
-    windows: Vec<Window>,
-    next: usize,
-    sums: Sums,
+    pub(super) config: SkillConfig,
+    pub(super) dataset: Dataset,
+    pub(super) nets: SkillNets,
+    pub(super) adam: Adam,
+    pub(super) streams: Streams,
+    pub(super) device: DeviceKind,
+    pub(super) epoch: u64,
+    pub(super) windows: Vec<Window>,
+    pub(super) next: usize,
+    pub(super) sums: Sums,
     last_epoch: SkillMetrics,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    count: usize,
-    total: [f64; 6],
+/// What the running epoch's batches add up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Sums {
+    pub(super) count: usize,
+    pub(super) total: [f64; 6],
 }
 
 impl SkillTrainer {
@@ -64,12 +65,7 @@ impl SkillTrainer {
     ///
     /// # Errors
     /// [`LearnError::Config`] for settings that cannot work, [`LearnError::NoWindow`] if no episode is long enough.
-    pub fn new(
-        config: SkillConfig,
-        dataset: Dataset,
-        seed: u64,
-        device: DeviceKind,
-    ) -> Result<Self, LearnError> {
+    pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         config.validate()?;
         let streams = Streams::new(seed);
         let nets = SkillNets::new(&config, dataset.obs_dim, dataset.space, &streams, &device.plain());
@@ -154,12 +150,15 @@ impl SkillTrainer {
 
     /// The model as it is now.
     pub fn model(&self) -> SkillModel {
-        let description = SkillDescription {
+        SkillModel::new(self.description(), &self.nets, self.device)
+    }
+
+    pub(super) fn description(&self) -> SkillDescription {
+        SkillDescription {
             config: self.config.clone(),
             obs_dim: self.dataset.obs_dim,
             action_space: self.dataset.space,
-        };
-        SkillModel::new(description, &self.nets, self.device)
+        }
     }
 
     /// The trained model.

@@ -19,10 +19,8 @@ pub struct Case {
 
 impl Case {
     pub fn load(name: &str) -> Self {
-        let folder = std::env::var_os("PLAYBOT_GOLDEN").map_or_else(
-            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/numerics"),
-            PathBuf::from,
-        );
+        let folder = std::env::var_os("PLAYBOT_GOLDEN")
+            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/numerics"), PathBuf::from);
         let read = |ending: &str| {
             let path = folder.join(format!("{name}.{ending}"));
             std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
@@ -142,9 +140,10 @@ impl Case {
     /// Asserts that every expected tensor and number was compared, but for those that start with one of `skipped`.
     pub fn finish(&self, skipped: &[&str]) {
         let checked = self.checked.borrow();
-        let tensors = self.tensors.keys().filter(|name| {
-            ["out.", "grad.", "after.", "adam_", "step1_grad."].iter().any(|p| name.starts_with(p))
-        });
+        let tensors = self
+            .tensors
+            .keys()
+            .filter(|name| ["out.", "grad.", "after.", "adam_", "step1_grad."].iter().any(|p| name.starts_with(p)));
         let numbers = self.json["expected"].as_object().into_iter().flat_map(|map| map.keys());
         for name in tensors.chain(numbers) {
             let skip = skipped.iter().any(|prefix| name.starts_with(prefix));
@@ -152,27 +151,24 @@ impl Case {
         }
     }
 
-    /// The stored tensor(s) for our parameter `name`, in our layout; `None` if the case does not hold them.
-    pub fn parameter(&self, group: &str, name: &str) -> Option<(String, Vec<f64>)> {
+    /// The stored tensors that make up our parameter `name` (both directions of a recurrent layer, or one tensor): their
+    /// name and their numbers in our layout, `None` where the case does not hold them.
+    fn parts(&self, group: &str, name: &str) -> Vec<(String, Option<Vec<f64>>)> {
         let theirs = format!("{group}{}", their_name(name));
         let (stem, last) = theirs.rsplit_once('.').unwrap_or(("", &theirs));
-        if let Some((stem, layer)) = stem.rsplit_once(".l").filter(|_| name.contains("gru")) {
-            let one = |suffix: &str| {
-                let name = format!("{stem}.{last}_l{layer}{suffix}");
-                self.has(&name).then(|| self.transposed(&name))
-            };
-            let mut values = one("")?;
-            values.extend(one("_reverse").unwrap_or_default());
-            let mark = format!("{stem}.{last}_l{layer}");
-            self.checked.borrow_mut().extend([mark.clone(), format!("{mark}_reverse")]);
-            return Some((mark, values));
-        }
-        if !self.has(&theirs) {
-            return None;
-        }
-        self.checked.borrow_mut().insert(theirs.clone());
-        let values = self.transposed(&theirs);
-        Some((theirs, values))
+        let names = match stem.rsplit_once(".l").filter(|_| name.contains("gru")) {
+            None => vec![theirs],
+            Some((stem, layer)) => {
+                let forward = format!("{stem}.{last}_l{layer}");
+                let both = vec![forward.clone(), format!("{forward}_reverse")];
+                if name.contains("uni") { vec![forward] } else { both }
+            }
+        };
+        let numbers = |name: String| {
+            let values = self.has(&name).then(|| self.transposed(&name));
+            (name, values)
+        };
+        names.into_iter().map(numbers).collect()
     }
 
     /// `[out, in]` to `[in, out]`; anything else as it is.
@@ -187,10 +183,15 @@ impl Case {
         network.visit(prefix, &mut Fill { case: self, group, device: device.plain() });
     }
 
-    /// Compares a parameter-like tensor of ours (a gradient, a weight, a moment) with the stored one, if there is one.
+    /// Compares a parameter-like tensor of ours (a gradient, a weight, a moment) with what the case holds of it.
     pub fn check_parameter(&self, group: &str, name: &str, got: &[f32]) {
-        if let Some((theirs, want)) = self.parameter(group, name) {
-            self.compare(&theirs, &want, got.iter().map(|&x| f64::from(x)));
+        let parts = self.parts(group, name);
+        let length = got.len() / parts.len();
+        for ((theirs, want), got) in parts.into_iter().zip(got.chunks_exact(length)) {
+            if let Some(want) = want {
+                self.compare(&theirs, &want, got.iter().map(|&x| f64::from(x)));
+                self.checked.borrow_mut().insert(theirs);
+            }
         }
     }
 }
@@ -233,11 +234,11 @@ struct Fill<'a> {
 
 impl ParamVisitor for Fill<'_> {
     fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
-        let (_, values) = self
-            .case
-            .parameter(self.group, name)
-            .unwrap_or_else(|| panic!("{}: no {}{name}", self.case.name, self.group));
-        let values: Vec<f32> = values.into_iter().map(|x| x as f32).collect();
+        let mut values = Vec::new();
+        for (theirs, part) in self.case.parts(self.group, name) {
+            let part = part.unwrap_or_else(|| panic!("{}: no {theirs}", self.case.name));
+            values.extend(part.into_iter().map(|x| x as f32));
+        }
         assert_eq!(values.len(), tensor.dims().iter().product::<usize>(), "size of {name}");
         *tensor = Tensor::from_data(TensorData::new(values, tensor.dims()), &self.device);
     }

@@ -18,9 +18,8 @@ fn check(case: &Case, stack: &str, weights: &str, kind: DeviceKind) {
 
     let x = case.tensor::<3>("in.x", &device).autodiff().require_grad();
     let batch = case.dim("B");
-    let sequence: Vec<Tensor<2>> = (0..steps)
-        .map(|t| x.clone().slice([0..batch, t..t + 1, 0..inputs]).squeeze_dim(1))
-        .collect();
+    let sequence: Vec<Tensor<2>> =
+        (0..steps).map(|t| x.clone().slice([0..batch, t..t + 1, 0..inputs]).squeeze_dim(1)).collect();
     let initial = (stack == "bi2_h0").then(|| {
         let all = case.tensor::<3>("in.h0_bi2", &device);
         (0..layers).map(|k| all.clone().slice([2 * k..2 * k + 2, 0..batch, 0..hidden])).collect()

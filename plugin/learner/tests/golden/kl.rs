@@ -28,10 +28,7 @@ fn check(name: &str, kinds: &[(&str, AlphaKind)]) {
         let decoder = if case.has("in.dec_logits") {
             Dist::categorical(case.tensor("in.dec_logits", &plain))
         } else {
-            Dist::Gaussian {
-                mean: case.tensor("in.dec_mean", &plain),
-                log_std: case.tensor("in.dec_log_std", &plain),
-            }
+            Dist::Gaussian { mean: case.tensor("in.dec_mean", &plain), log_std: case.tensor("in.dec_log_std", &plain) }
         };
         let rows = decoder.clone().to_host().expect("readable");
         for (alpha_name, alpha_kind) in kinds {
@@ -43,8 +40,7 @@ fn check(name: &str, kinds: &[(&str, AlphaKind)]) {
             if *alpha_kind != AlphaKind::Off {
                 case.check(&format!("out.alpha.{alpha_name}"), &alpha);
             }
-            for (direction, short) in
-                [(KlDirection::DecoderPolicy, "dec_pol"), (KlDirection::PolicyDecoder, "pol_dec")]
+            for (direction, short) in [(KlDirection::DecoderPolicy, "dec_pol"), (KlDirection::PolicyDecoder, "pol_dec")]
             {
                 let (policy, leaves) = policy(&case, device);
                 let kl = decoder_kl(&decoder, &policy, direction).expect("same kind");

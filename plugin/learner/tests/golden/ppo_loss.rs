@@ -2,9 +2,9 @@
 
 use crate::case::{Case, host, number};
 use burn::tensor::Tensor;
+use playbot_learner::DeviceKind;
 use playbot_learner::nn::{ActionRows, Dist};
 use playbot_learner::ppo::{PpoBatch, normalize_advantages, ppo_loss, ratio_stats};
-use playbot_learner::DeviceKind;
 
 fn check(name: &str) {
     let case = Case::load(name);
@@ -49,8 +49,8 @@ fn check(name: &str) {
         case.check_number("policy_loss", number(loss.policy_loss.clone()));
         case.check_number("value_loss", number(loss.value_loss.clone()));
         case.check_number("entropy", number(loss.entropy.clone()));
-        let total = loss.policy_loss - loss.entropy * case.number("ent_coef")
-            + loss.value_loss * case.number("vf_coef");
+        let total =
+            loss.policy_loss - loss.entropy * case.number("ent_coef") + loss.value_loss * case.number("vf_coef");
         case.check_number("total_loss", number(total.clone()));
         let grads = total.backward();
         case.check("grad.values", &host(values.grad(&grads).expect("tracked")));

@@ -2,9 +2,7 @@
 
 use crate::case::{Case, host};
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{
-    ActionRows, Activation, Adam, AdamConfig, ParamVisitor, Parameters, tracked,
-};
+use playbot_learner::nn::{ActionRows, Activation, Adam, AdamConfig, ParamVisitor, Parameters, tracked};
 use playbot_learner::policy::{Actor, Critic, NetShape};
 use playbot_learner::ppo::{
     DecoderBatch, Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages,

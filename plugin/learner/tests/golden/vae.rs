@@ -95,14 +95,9 @@ fn run(case: &Case, mut nets: SkillNets, inputs: &Inputs, kind: DeviceKind) {
 fn check(name: &str) {
     let case = Case::load(name);
     let space = ActionSpace::Continuous(case.dim("act"));
-    let inputs = Inputs {
-        states: case.f32s("in.states"),
-        actions: case.f32s("in.actions"),
-        eps: case.f32s("in.eps"),
-    };
+    let inputs = Inputs { states: case.f32s("in.states"), actions: case.f32s("in.actions"), eps: case.f32s("in.eps") };
     for kind in DeviceKind::ALL {
-        let mut nets =
-            SkillNets::new(&config(&case), case.dim("obs"), space, &Streams::new(0), &kind.plain());
+        let mut nets = SkillNets::new(&config(&case), case.dim("obs"), space, &Streams::new(0), &kind.plain());
         case.fill(&mut nets, "param.", "", kind);
         if case.dim("hidden") == 200 {
             case.check_number("param_count.enc", parameter_count(&nets.encoder) as f64);

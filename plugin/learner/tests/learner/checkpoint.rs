@@ -64,7 +64,7 @@ fn a_wrong_file_is_explained() {
     };
     let error = edit("actor.l0.bias", "actor.l9.bias");
     assert!(error.contains("`actor.l0.bias` is missing"), "{error}");
-    let error = edit("[16,16]", "[32,8] ");
+    let error = edit("\"shape\":[16,16]", "\"shape\":[32,8] ");
     assert!(error.contains("l1.weight") && error.contains("[32, 8]"), "{error}");
     let error = edit("\\\"version\\\":1", "\\\"version\\\":2");
     assert!(error.contains("version 2"), "{error}");

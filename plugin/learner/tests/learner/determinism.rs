@@ -4,9 +4,7 @@ use crate::corridor::config;
 use crate::score::model;
 use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::rng::{Streams, normal};
-use playbot_learner::{
-    ActionSpace, DeviceKind, Policy, PolicyOutput, PolicySpec, PpoConfig, PpoLearner, ScoreConfig,
-};
+use playbot_learner::{ActionSpace, DeviceKind, Policy, PolicyOutput, PolicySpec, PpoConfig, PpoLearner, ScoreConfig};
 
 fn numbers(n: usize) -> Vec<f32> {
     let mut rng = Streams::new(4).stream("numbers", 0);
@@ -14,11 +12,20 @@ fn numbers(n: usize) -> Vec<f32> {
 }
 
 #[test]
+fn everything_can_move_to_another_thread() {
+    fn movable<T: Send>() {}
+    movable::<Policy>();
+    movable::<playbot_learner::Prior>();
+    movable::<PpoLearner>();
+    movable::<playbot_learner::SkillModel>();
+    movable::<playbot_learner::SkillTrainer>();
+}
+
+#[test]
 fn two_runs_are_equal() {
     let run = || {
-        let mut learner =
-            PpoLearner::with_skill(config(), ScoreConfig::default(), &model(1), 3, DeviceKind::Flex)
-                .expect("good settings");
+        let mut learner = PpoLearner::with_skill(config(), ScoreConfig::default(), &model(1), 3, DeviceKind::Flex)
+            .expect("good settings");
         let mut driver = Driver::new(4, 1);
         let mut last = None;
         for _ in 0..3 {

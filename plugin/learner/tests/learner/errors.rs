@@ -31,7 +31,7 @@ fn numbers_that_run_away_are_named() {
 
 #[test]
 fn rollouts_that_do_not_fit_are_named() {
-    let error = after(|rollout| drop(rollout.values.pop()));
+    let error = after(|rollout| rollout.values.truncate(3));
     assert!(error.to_string().contains("rollout values"), "{error}");
     let error = after(|rollout| rollout.actions = Actions::Discrete(vec![3; rollout.rows()]));
     assert!(matches!(error, LearnError::Action(_)), "{error}");

@@ -1,9 +1,7 @@
 //! A corridor, and a driver that plays it.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal};
-use playbot_learner::{
-    Action, ActionSpace, Actions, PolicyOutput, PpoLearner, Rollout, RolloutStep, SkillDraw,
-};
+use playbot_learner::{Action, ActionSpace, Actions, PolicyOutput, PpoLearner, Rollout, RolloutStep, SkillDraw};
 
 /// Steps until an episode is cut off.
 const LIMIT: usize = 40;

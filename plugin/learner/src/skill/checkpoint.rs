@@ -1,0 +1,93 @@
+//! A trainer's complete state in one file.
+
+use super::{Dataset, SkillDescription, SkillTrainer};
+use crate::file::TensorFile;
+use crate::nn::tracked;
+use crate::{DeviceKind, FileError, LearnError};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const KIND: &str = "skill checkpoint";
+const VERSION: u32 = 1;
+
+/// The JSON in the file's header.
+///
+/// The trainer's generators are streams of `seed` numbered by the epoch and by `adam_steps`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    kind: String,
+    version: u32,
+    skill: SkillDescription,
+    seed: u64,
+    epoch: u64,
+    windows_done: usize,
+    adam_steps: u64,
+    batches: usize,
+    demo_episodes: usize,
+    demo_steps: usize,
+}
+
+impl SkillTrainer {
+    /// Writes everything but the demonstrations that is needed to go on bit for bit. Under a temporary name first, so
+    /// that a checkpoint is whole or not there.
+    ///
+    /// # Errors
+    /// [`FileError::Io`] if it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), FileError> {
+        let header = Header {
+            kind: KIND.to_owned(),
+            version: VERSION,
+            skill: self.description(),
+            seed: self.streams.seed(),
+            epoch: self.epoch,
+            windows_done: self.next,
+            adam_steps: self.adam.steps,
+            batches: self.sums.count,
+            demo_episodes: self.dataset.episodes(),
+            demo_steps: self.dataset.steps(),
+        };
+        let mut file = TensorFile::new(path, &header)?;
+        file.put_network("", &self.nets)?;
+        file.put_adam(&self.adam);
+        file.put_f64("epoch_sums", &self.sums.total);
+        file.write()
+    }
+
+    /// Reads a file that [`Self::save`] wrote; `dataset` must be the one of that training.
+    ///
+    /// # Errors
+    /// [`FileError`] says what is wrong with the file or does not fit the demonstrations.
+    pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
+        let mut file = TensorFile::read(path)?;
+        let header: Header = file.description()?;
+        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
+        let skill = header.skill;
+        for (what, expected, found) in [
+            ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),
+            ("steps of the demonstrations", header.demo_steps, dataset.steps()),
+            ("obs_dim of the demonstrations", skill.obs_dim, dataset.obs_dim()),
+        ] {
+            LearnError::check(what, expected, found).map_err(|e| file.learner(e))?;
+        }
+        if skill.action_space != dataset.action_space() {
+            return Err(file.format(format!("acts in {:?}, the demonstrations do not", skill.action_space)));
+        }
+        let mut trainer = Self::new(skill.config, dataset, header.seed, device).map_err(|e| file.learner(e))?;
+        file.take_network("", &mut trainer.nets, &device.plain())?;
+        trainer.nets = tracked(&trainer.nets);
+        file.take_adam(&mut trainer.adam, &mut trainer.nets, header.adam_steps)?;
+        trainer.sums.count = header.batches;
+        let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
+        trainer.sums.total.copy_from_slice(&sums);
+        trainer.epoch = header.epoch;
+        let windows = trainer.dataset.windows(trainer.config.window, &trainer.streams, header.epoch);
+        trainer.windows = windows.map_err(|e| file.learner(e))?;
+        if header.windows_done >= trainer.windows.len() {
+            return Err(file.format("stands behind the end of its epoch".to_owned()));
+        }
+        trainer.next = header.windows_done;
+        file.finish()?;
+        Ok(trainer)
+    }
+}
