@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 pub use playbot_learner::{Action as ActionValue, ActionSpace};
 
-use crate::{agent::Agent, episode::Episode, fault::Faults};
+use crate::{agent::Agent, control::Control, episode::Episode, fault::Faults};
 
 /// The action of this tick, written in [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide) by whoever
 /// holds the [`Control`](crate::control::Control) and read by the game in `FixedUpdate`.
@@ -52,14 +52,16 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     }
 }
 
-/// Reports actions that do not belong to their agent's space, with agent and tick.
-pub(crate) fn check_actions(agents: Query<(&Agent, &Action, &Episode)>, mut faults: ResMut<Faults>) {
-    for (agent, action, episode) in &agents {
-        if !episode.is_running() {
+/// Reports actions that do not belong to their agent's space, with agent and tick, and stops those agents: a game need
+/// not be able to bear what its agents cannot do.
+pub(crate) fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
+    for (agent, action, episode, mut control) in &mut agents {
+        if !control.is_active() || !episode.is_running() {
             continue;
         }
         if let Some(why) = misfit(&action.0, &agent.actions) {
             faults.report(format!("agent {}, level {}, tick {}: {why}", agent.index, episode.level, episode.tick));
+            *control = Control::Idle;
         }
     }
 }

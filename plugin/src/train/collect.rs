@@ -198,13 +198,11 @@ fn collect_tick(world: &mut World) {
         &mut ActionLog,
     ), With<Agent>>();
     let entities = world.resource::<AgentOrder>().entities().to_vec();
-    let policy = world.resource::<ActivePolicy>().policy.clone();
-    let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
-    if collecting.rollout.envs != entities.len() {
+    let Some(policy) = world.get_resource::<ActivePolicy>().map(|active| active.policy.clone()) else {
         // Arenas are being restored, not played.
-        world.insert_resource(collecting);
         return;
-    }
+    };
+    let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
     let final_values = final_values(world, &entities, &policy).unwrap_or_else(|error| {
         world.resource_mut::<Faults>().report(error.to_string());
         vec![0.0; entities.len()]

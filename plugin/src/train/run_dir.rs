@@ -23,7 +23,7 @@ use super::{
     arena_state::{ArenaState, restore_arenas, save_arenas},
     config::{Algorithm, Experiment},
     config_file::{ConfigError, read_experiment},
-    trainer::{Progress, TrainError, Trainer, UpdateReport},
+    trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
 
@@ -210,6 +210,7 @@ impl RunDir {
         device: DeviceKind,
         threads: usize,
     ) -> Result<Trainer, RunError> {
+        trainer::check(game, experiment)?;
         let mut folder = self.path.join(CHECKPOINT);
         if !folder.exists() {
             // The moment between two renames in `save`.

@@ -135,11 +135,12 @@ impl Trainer {
         device: DeviceKind,
         threads: usize,
     ) -> Result<Self, TrainError> {
+        check(game, experiment)?;
         let learner = new_learner(game, experiment, algorithm, skills, device)?;
         Self::with_learner(game, experiment, algorithm, learner, threads)
     }
 
-    /// A trainer around a learner that exists already.
+    /// A trainer around a learner that exists already, for an experiment that was checked.
     pub(crate) fn with_learner(
         game: &dyn Game,
         experiment: &Experiment,
@@ -147,9 +148,6 @@ impl Trainer {
         learner: PpoLearner,
         threads: usize,
     ) -> Result<Self, TrainError> {
-        experiment.check()?;
-        check_mode(game, &experiment.train.mode)?;
-        check_mode(game, &experiment.test.mode)?;
         let prior = skill_prior(experiment, &learner);
         let share = experiment.arenas / experiment.worlds;
         let collectors = (0..experiment.worlds)
@@ -237,6 +235,14 @@ impl Trainer {
     pub fn skill_prior(&self) -> Option<SkillPrior> {
         skill_prior(&self.experiment, &self.learner)
     }
+}
+
+/// Whether the experiment can be run on this game.
+pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
+    experiment.check()?;
+    check_mode(game, &experiment.train.mode)?;
+    check_mode(game, &experiment.test.mode)?;
+    Ok(())
 }
 
 fn new_learner(

@@ -13,7 +13,7 @@ pub struct DemoEpisode {
 }
 
 /// Demonstrations of one game.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     pub(crate) obs_dim: usize,
     pub(crate) space: ActionSpace,
