@@ -6,7 +6,7 @@ pub use playbot_learner::{Action as ActionValue, ActionSpace};
 use crate::{agent::Agent, control::Control, episode::Episode, fault::Faults};
 
 /// The action of this tick, written in [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide) by whoever
-/// holds the [`Control`](crate::control::Control) and read by the game in `FixedUpdate`.
+/// holds the [`Control`] and read by the game in `FixedUpdate`.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct Action(pub ActionValue);
 
