@@ -14,7 +14,7 @@ pub const GAMES: [&str; 1] = ["coinrun"];
 /// [`UnknownName`] with the valid names.
 pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
     match name {
-        "coinrun" => Ok(&CoinRun),
+        "coinrun" => Ok(&CoinRun { physics: false }),
         _ => Err(UnknownName::new("game", name, &GAMES)),
     }
 }

@@ -17,7 +17,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment,
 };
-use crate::registry;
+use crate::{coinrun::CoinRun, registry};
 
 /// Measures speed. Numbers are for this machine and this moment; nothing is tested.
 #[derive(clap::Args)]
@@ -46,19 +46,22 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     if args.arenas == 0 || args.threads == 0 || !args.arenas.is_multiple_of(args.threads as u32) {
         return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
     }
-    let game = registry::game("coinrun")?;
-    let cases: [(&str, fn(&dyn Game, &Args) -> Result<Measure, CliError>); 2] =
-        [("sim/coinrun/vector", simulate), ("train/coinrun/vector", train)];
-    let wanted: Vec<_> = cases.iter().filter(|(name, _)| name.contains(&args.case)).collect();
+    let (plain, with_physics) = (registry::game("coinrun")?, &CoinRun { physics: true });
+    let cases: [Case; 3] = [
+        ("sim/coinrun/vector", plain, simulate),
+        ("sim/coinrun/physics", with_physics, simulate),
+        ("train/coinrun/vector", plain, train),
+    ];
+    let wanted: Vec<_> = cases.iter().filter(|(name, ..)| name.contains(&args.case)).collect();
     if wanted.is_empty() {
         return Err(CliError::Usage(format!(
             "no case is called `{}`; cases: {}",
             args.case,
-            cases.map(|(name, _)| name).join(", ")
+            cases.map(|(name, ..)| name).join(", ")
         )));
     }
-    for (name, measure) in wanted {
-        let measured = measure(game, &args)?;
+    for (name, game, measure) in wanted {
+        let measured = measure(*game, &args)?;
         if args.json {
             print_line(measured.to_json(name, &args))?;
         } else {
@@ -74,6 +77,9 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     }
     Ok(Outcome::Pass)
 }
+
+/// Name, game and what to do with it.
+type Case = (&'static str, &'static dyn Game, fn(&dyn Game, &Args) -> Result<Measure, CliError>);
 
 struct Measure {
     steps_per_s: f64,

@@ -15,7 +15,10 @@ use super::{
 
 /// CoinRun under its name `coinrun`.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct CoinRun;
+pub struct CoinRun {
+    /// Whether its Worlds carry rapier colliders. Training does without: nothing there asks for them.
+    pub physics: bool,
+}
 
 /// The action "right and jump", which a player without eyes does best to hold.
 const RIGHT_JUMP: u32 = 8;
@@ -63,7 +66,7 @@ impl Game for CoinRun {
 
     fn build(&self, app: &mut App, mode: &str) {
         let mode = mode.parse().expect("callers check the mode against `modes`");
-        app.add_plugins(CoinRunPlugin { mode, physics: false });
+        app.add_plugins(CoinRunPlugin { mode, physics: self.physics });
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {

@@ -1,0 +1,101 @@
+//! CoinRun as a Bevy game: the same as its rules, open to additions, with colliders for rays.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use bevy_playbot::{game::build_world, prelude::*};
+use bevy_rapier2d::prelude::*;
+use playbot_games::coinrun::{
+    Body, CoinRun, Mode, Outcome, Sim,
+    components::{ArenaBody, Crate, InArena, LastOutcome, PlayerBody, PlaysIn, Saw},
+    generate,
+};
+
+/// Random numbers without a crate: a linear congruential generator is plenty for choosing buttons.
+struct Buttons(u64);
+
+impl Buttons {
+    fn next(&mut self) -> u8 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let pressed = (self.0 >> 33) as u8 % 30;
+        // Mostly right and jump, so that episodes get somewhere.
+        if pressed < 15 { pressed } else { 7 + pressed % 2 }
+    }
+}
+
+#[test]
+fn the_game_and_the_pure_simulation_never_differ() {
+    for mode in [Mode::Easy, Mode::Hard] {
+        let (mut world, agents) = build_world(&CoinRun::default(), mode.name(), 0, 0, 1);
+        let agent = agents[0];
+        for seed in 0..40_u32 {
+            world.entity_mut(agent).insert((Control::Human, LevelQueue::Always(seed.into())));
+            let mut sim = Sim::new(Arc::new(generate(mode, seed)));
+            let mut buttons = Buttons(seed.into());
+            while sim.end().is_none() {
+                let button = buttons.next();
+                let expected = sim.step(button);
+                world.entity_mut(agent).insert(Action(ActionValue::Discrete(button.into())));
+                world.tick().expect("sound");
+                assert_eq!(world.get::<PlayerBody>(agent).expect("a player").0, *sim.player(), "{mode} {seed}");
+                assert_eq!(world.get::<StateHash>(agent).expect("an agent").0, sim.state_hash());
+                assert_eq!(world.get::<Reward>(agent).expect("an agent").get(), expected.reward);
+            }
+            assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, sim.end());
+        }
+    }
+}
+
+#[test]
+fn a_game_may_add_a_saw_and_a_crate() {
+    let (mut world, agents) = build_world(&CoinRun::default(), "easy", 0, 0, 1);
+    let agent = agents[0];
+    world.entity_mut(agent).insert((Control::Human, Action(ActionValue::Discrete(4)), LevelQueue::Always(0)));
+    world.tick().expect("sound");
+    let arena = world.get::<PlaysIn>(agent).expect("a player").0;
+    world.spawn((Crate::default(), ArenaBody(Body::block([1, 2])), InArena(arena)));
+    world.entity_mut(agent).insert(Action(ActionValue::Discrete(5)));
+    for _ in 0..40 {
+        world.tick().expect("sound");
+        world.entity_mut(agent).insert(Action(ActionValue::Discrete(4)));
+    }
+    let player = world.get::<PlayerBody>(agent).expect("a player").0;
+    assert!((player.y - (3.0 + player.ry)).abs() < 1e-4, "stands on the added crate, not at {}", player.y);
+    world.spawn((Saw, ArenaBody(Body::block([1, 3])), InArena(arena)));
+    world.tick().expect("sound");
+    assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, Some(Outcome::Saw));
+}
+
+#[test]
+fn levels_beyond_32_bits_are_a_fault_and_no_panic() {
+    let (mut world, agents) = build_world(&CoinRun::default(), "hard", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Human, LevelQueue::Always(1 << 40)));
+    assert!(world.tick().expect_err("no such level").to_string().contains("32 bits"));
+}
+
+#[test]
+fn rays_hit_the_ground_and_the_crates_of_their_own_arena() {
+    let (mut world, agents) = build_world(&CoinRun { physics: true }, "hard", 0, 0, 2);
+    for (&agent, level) in agents.iter().zip([0_u64, 7]) {
+        world.entity_mut(agent).insert((Control::Human, Action(ActionValue::Discrete(4)), LevelQueue::Always(level)));
+    }
+    world.ticks(3).expect("sound");
+    for (&agent, level) in agents.iter().zip([0_u32, 7]) {
+        let layout = generate(Mode::Hard, level);
+        let arena = world.get::<PlaysIn>(agent).expect("a player").0;
+        let mut contexts = world.query::<(
+            &RapierContextSimulation,
+            &RapierContextColliders,
+            &RapierContextJoints,
+            &RapierRigidBodySet,
+        )>();
+        let (simulation, colliders, joints, rigidbody_set) = contexts.get(&world, arena).expect("a context per arena");
+        let context = RapierContext { simulation, colliders, joints, rigidbody_set };
+        let wall = (5..64).find(|&x| layout.tiles.get(x, 1).is_wall()).expect("some wall") as f32;
+        let filter = QueryFilter::default().exclude_rigid_body(agent).exclude_sensors();
+        let hit =
+            context.with_query_pipeline(filter, |pipeline| pipeline.cast_ray(Vec2::new(2.6, 1.5), Vec2::X, 60.0, true));
+        let (_, distance) = hit.expect("the ray meets a wall");
+        assert!((distance - (wall - 2.6)).abs() < 1e-3, "level {level}: {distance} instead of {}", wall - 2.6);
+    }
+}
