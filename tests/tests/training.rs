@@ -19,6 +19,7 @@ use bevy_playbot::{
         trainer::TrainError,
     },
 };
+use playbot_games::coinrun::CoinRun;
 use playbot_tests::Corridor;
 
 const EXPERIMENT: &str = r#"(
@@ -161,6 +162,39 @@ fn skills_are_asked_for_and_must_fit() {
     let mut overlapping = experiment();
     overlapping.test.first = 3;
     assert!(refuse(&overlapping, None).to_string().contains("overlap"));
+}
+
+#[test]
+fn skills_and_policies_of_another_game_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let skills = skills(folder.path());
+    let coinrun = CoinRun::default();
+    let mut foreign = experiment();
+    foreign.train = "hard:0..7".parse().expect("a split");
+    foreign.test = "hard:8..15".parse().expect("a split");
+    let made = Trainer::new(&coinrun, &foreign, Algorithm::ScorePpo, Some(&skills), DeviceKind::Flex, 1);
+    let text = made.err().expect("must be refused").to_string();
+    assert!(text.contains("2 observation values") && text.contains("`coinrun` has 563"), "{text}");
+
+    let (mut world, agents) = build_world(&coinrun, "hard", 0, 0, 1);
+    world.insert_resource(ActivePolicy { policy: skills.policy(), draw: ActionDraw::Sample });
+    world.entity_mut(agents[0]).insert(Control::Policy);
+    let fault = world.tick().expect_err("does not fit").to_string();
+    assert!(fault.contains("made for 2 observation values") && fault.contains("gives 563"), "{fault}");
+}
+
+#[test]
+fn levels_can_be_chosen_as_the_original_does() {
+    let levels = playbot_games::coinrun::LevelSet { start_level: 10, num_levels: 5 };
+    let queue = playbot_games::coinrun::LevelQueue::new(levels, 3);
+    let mut expected = queue.clone();
+    let mut source = LevelQueue::Custom(Box::new(queue));
+    let mut unused = bevy_playbot::learner::Streams::new(0).stream("unused", 0);
+    for _ in 0..20 {
+        let level = source.next_level(&mut unused).expect("never ends");
+        assert_eq!(level, u64::from(expected.next_level()));
+        assert!((10..15).contains(&level));
+    }
 }
 
 #[test]

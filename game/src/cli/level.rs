@@ -28,6 +28,9 @@ pub struct Args {
     json: bool,
 }
 
+const LEGEND: &str =
+    "A start  C coin  # = ground  ~ ^ lava  S saw  < > enemy and where it goes  x crate  | enemies turn here";
+
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     check_mode(game, &args.mode)?;
@@ -37,6 +40,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         print_line(json!(level.to_golden_json()))?;
     } else {
         print_line(level.to_text())?;
+        print_line(LEGEND)?;
     }
     Ok(Outcome::Pass)
 }

@@ -163,7 +163,7 @@ fn train_one(
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, u64::MAX, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {
-            tracing::info!("KL from decoder to policy before the first update: {kl}");
+            eprintln!("{algorithm}: the first policy is the decoder, KL {kl}");
         }
         if let (Some(episodic_return), Some(success_rate)) = (report.episodic_return, report.success_rate) {
             curve.push(CurvePoint { step: report.step, episodic_return, success_rate });

@@ -81,6 +81,18 @@ impl LevelQueue {
     }
 }
 
+/// Lets an agent choose its levels as the original does:
+/// `bevy_playbot::level::LevelQueue::Custom(Box::new(queue))`.
+impl bevy_playbot::level::LevelSource for LevelQueue {
+    fn next_level(&mut self) -> Option<u64> {
+        Some(Self::next_level(self).into())
+    }
+
+    fn clone_box(&self) -> Box<dyn bevy_playbot::level::LevelSource> {
+        Box::new(self.clone())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
