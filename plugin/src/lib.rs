@@ -96,6 +96,7 @@ pub mod report;
 pub mod reward;
 pub mod skill_prior;
 pub mod split;
+pub mod stage_clock;
 pub mod state_hash;
 pub mod systems;
 pub mod test_app;

@@ -2,10 +2,12 @@
 
 use std::time::Instant;
 
+use bevy::prelude::World;
 use bevy_playbot::{
     game::{Game, build_world},
     learner::DeviceKind,
     prelude::*,
+    stage_clock::StageClock,
     train::{
         Algorithm, Trainer,
         worlds::{default_threads, on_threads},
@@ -110,6 +112,7 @@ fn simulate(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
             world
         })
         .collect();
+    worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
     const TICKS: u64 = 500;
     let (start, mut ticks) = (Instant::now(), 0);
     while start.elapsed().as_secs_f64() < args.seconds {
@@ -120,8 +123,7 @@ fn simulate(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
     }
     let steps = (ticks * u64::from(args.arenas)) as f64;
     let steps_per_s = steps / start.elapsed().as_secs_f64();
-    let simulate_and_observe = 1e6 * args.threads as f64 / steps_per_s;
-    Ok(Measure { steps_per_s, parts: json!({ "simulate_observe": simulate_and_observe }) })
+    Ok(Measure { steps_per_s, parts: stages(worlds.iter_mut(), steps) })
 }
 
 /// PPO on state vectors with 256 steps a rollout, 3 epochs, 8 minibatches.
@@ -134,21 +136,37 @@ fn train(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
     experiment.ppo.minibatches = 8;
     let mut trainer = Trainer::new(game, &experiment, Algorithm::Ppo, None, DeviceKind::default(), args.threads)?;
     trainer.update()?;
+    trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
     let (start, before) = (Instant::now(), trainer.steps());
-    let (mut collect, mut learn) = (0.0, 0.0);
+    let mut learn_s = 0.0;
     while start.elapsed().as_secs_f64() < args.seconds {
-        let timing = trainer.update()?.timing;
-        collect += timing.collect_s;
-        learn += timing.learn_s;
+        learn_s += trainer.update()?.timing.learn_s;
     }
     let steps = (trainer.steps() - before) as f64;
-    Ok(Measure {
-        steps_per_s: steps / start.elapsed().as_secs_f64(),
-        parts: json!({
-            "simulate_observe_infer": 1e6 * collect * args.threads as f64 / steps,
-            "learn": 1e6 * learn * args.threads as f64 / steps,
-        }),
+    let steps_per_s = steps / start.elapsed().as_secs_f64();
+    let mut parts = stages(trainer.worlds_mut(), steps);
+    parts["learn"] = json!(microseconds(learn_s * args.threads as f64, steps));
+    Ok(Measure { steps_per_s, parts })
+}
+
+/// Microseconds per step that the Worlds' threads spent in each part of their ticks.
+fn stages<'a>(worlds: impl Iterator<Item = &'a mut World>, steps: f64) -> Value {
+    let mut sum = StageClock::default();
+    for world in worlds {
+        let clock = world.resource::<StageClock>();
+        sum.simulate_s += clock.simulate_s;
+        sum.observe_s += clock.observe_s;
+        sum.infer_s += clock.infer_s;
+        sum.record_s += clock.record_s;
+    }
+    json!({
+        "simulate": microseconds(sum.simulate_s, steps), "observe": microseconds(sum.observe_s, steps),
+        "infer": microseconds(sum.infer_s, steps), "record": microseconds(sum.record_s, steps),
     })
+}
+
+fn microseconds(seconds: f64, steps: f64) -> f64 {
+    (1e8 * seconds / steps).round() / 100.0
 }
 
 /// Largest resident memory of this process so far, MiB; 0 where the system does not say.

@@ -2,6 +2,7 @@
 
 use std::{collections::VecDeque, time::Instant};
 
+use bevy::prelude::World;
 use playbot_learner::{DeviceKind, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SkillModel, UpdateMetrics};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -229,6 +230,11 @@ impl Trainer {
     /// The policy as it is now.
     pub fn policy(&self) -> Policy {
         self.learner.policy()
+    }
+
+    /// The Worlds that play, to look into or to measure.
+    pub fn worlds_mut(&mut self) -> impl Iterator<Item = &mut World> {
+        self.collectors.iter_mut().map(Collector::world_mut)
     }
 
     /// Where the policy's skills come from, if it has any.
