@@ -72,7 +72,7 @@ fn traces_stop_at_the_end_and_read_back_exactly() {
         playbot(folder.path(), &["trace", "coinrun", "--seed", "0", "--actions-file", "actions.txt", "--json"]);
     assert_eq!(output.stdout, from_file.stdout);
     let wrong = playbot(folder.path(), &["trace", "coinrun", "--actions", "99", "--json"]);
-    assert_eq!(code(&wrong), 2);
+    assert_eq!(code(&wrong), 3);
     assert!(errors(&wrong).contains("action 99 is outside 0..15"), "{}", errors(&wrong));
 }
 

@@ -4,7 +4,12 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    agent::Agent, control::Control, fault::Faults, level::LevelQueue, policy::AgentStreams, reward::Reward,
+    agent::{Agent, AgentOrder},
+    control::Control,
+    fault::Faults,
+    level::LevelQueue,
+    policy::AgentStreams,
+    reward::Reward,
     skill_prior::ActiveSkill,
 };
 
@@ -48,16 +53,17 @@ enum EpisodeState {
 }
 
 impl Episode {
-    /// The game is over. The first call in a tick decides, and termination outranks truncation.
+    /// The game is over. The first call in a tick decides, and termination outranks truncation. Between two episodes it
+    /// means nothing.
     pub fn terminate(&mut self, success: bool) {
-        if !matches!(self.end(), Some(EpisodeEnd::Terminated { .. })) {
+        if self.is_running() && !matches!(self.end(), Some(EpisodeEnd::Terminated { .. })) {
             self.state = EpisodeState::Ended(EpisodeEnd::Terminated { success });
         }
     }
 
-    /// Time is up.
+    /// Time is up. Between two episodes it means nothing.
     pub fn truncate(&mut self) {
-        if self.end().is_none() {
+        if self.is_running() && self.end().is_none() {
             self.state = EpisodeState::Ended(EpisodeEnd::Truncated);
         }
     }
@@ -158,10 +164,12 @@ pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &Reward, &mut Episode)>
 
 /// Announces ended episodes and frees their agents for the next level.
 pub(crate) fn end_episodes(
-    mut agents: Query<(Entity, &mut Episode, &mut EpisodeCount), With<Agent>>,
+    order: Res<AgentOrder>,
+    mut agents: Query<(&mut Episode, &mut EpisodeCount)>,
     mut commands: Commands,
 ) {
-    for (entity, mut episode, mut count) in &mut agents {
+    for &entity in order.entities() {
+        let Ok((mut episode, mut count)) = agents.get_mut(entity) else { continue };
         let Some(end) = episode.end() else { continue };
         count.finished += 1;
         count.successes += u64::from(end.is_success());

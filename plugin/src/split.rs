@@ -5,6 +5,9 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+/// Most levels in one split: more could not be listed in memory.
+const MAX_LEVELS: u64 = 1 << 24;
+
 /// Levels `first..=last` of one mode of a game. Written `hard:64..127`, both ends included.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -47,7 +50,9 @@ impl fmt::Display for LevelSplit {
 
 /// The text is not a split.
 #[derive(Debug, Error, PartialEq, Eq)]
-#[error("`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127")]
+#[error(
+    "`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, with at most 16,777,216 levels"
+)]
 pub struct SplitError(String);
 
 impl FromStr for LevelSplit {
@@ -58,7 +63,8 @@ impl FromStr for LevelSplit {
             let (mode, range) = text.split_once(':')?;
             let (first, last) = range.split_once("..").unwrap_or((range, range));
             let (first, last) = (first.parse().ok()?, last.parse().ok()?);
-            (!mode.is_empty() && first <= last).then(|| Self { mode: mode.to_owned(), first, last })
+            let is_range = first <= last && last - first < MAX_LEVELS;
+            (!mode.is_empty() && is_range).then(|| Self { mode: mode.to_owned(), first, last })
         };
         parse().ok_or_else(|| SplitError(text.to_owned()))
     }
@@ -88,7 +94,7 @@ mod tests {
         assert_eq!((split.first, split.last, split.len()), (64, 127, 64));
         assert_eq!(split.to_string(), "hard:64..127");
         assert_eq!("easy:7".parse::<LevelSplit>().expect("one level").len(), 1);
-        for bad in ["", "hard", "hard:9..3", ":1..2", "hard:a..b", "hard:-1..2"] {
+        for bad in ["", "hard", "hard:9..3", ":1..2", "hard:a..b", "hard:-1..2", "easy:0..18446744073709551615"] {
             assert!(bad.parse::<LevelSplit>().is_err(), "{bad} was taken");
         }
     }

@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, default_value_t = 64)]
     arenas: u32,
     /// Threads; each has a World of its own.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = usual_threads())]
     threads: usize,
     /// Seconds to measure each case for, at least.
     #[arg(long, default_value_t = 5.0)]
@@ -44,7 +44,15 @@ pub struct Args {
     json: bool,
 }
 
+/// The largest power of two that the cores and the usual 64 arenas allow.
+fn usual_threads() -> usize {
+    1 << default_threads().min(64).ilog2()
+}
+
 pub fn run(args: Args) -> Result<Outcome, CliError> {
+    if args.seconds <= 0.0 {
+        return Err(CliError::Usage("--seconds must be more than 0".to_owned()));
+    }
     if args.arenas == 0 || args.threads == 0 || !args.arenas.is_multiple_of(args.threads as u32) {
         return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
     }

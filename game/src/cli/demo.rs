@@ -177,7 +177,8 @@ fn verify(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
         let report = verify_file(game, &file, |done| bar.set_position(done));
         bar.finish_and_clear();
         let report = report?;
-        if !report.divergences.is_empty() {
+        // A verdict is never vacuous: nothing replayed proves nothing.
+        if !report.divergences.is_empty() || report.episodes == 0 {
             outcome = Outcome::Findings;
         }
         if as_json {
@@ -188,6 +189,7 @@ fn verify(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
             print_line(format!("{}: episode {episode}: {divergence}", file.display()))?;
         }
         let verdict = match report.divergences.len() {
+            0 if report.episodes == 0 => "nothing to replay".to_owned(),
             0 => "all as recorded".to_owned(),
             n => format!("{n} diverge"),
         };

@@ -73,15 +73,24 @@ impl CliError {
                 _ => 3,
             },
             Self::Train(error) => train_code(error),
-            Self::Verify(VerifyError::File(_)) => 3,
-            Self::BrokenPipe | Self::Io(_) | Self::Verify(_) | Self::Learn(_) | Self::Fault(_) => 2,
+            Self::Verify(VerifyError::Fault(_)) => 2,
+            Self::Verify(VerifyError::Data(error)) => learn_code(error),
+            Self::Learn(error) => learn_code(error),
+            Self::Verify(_) => 3,
+            Self::BrokenPipe | Self::Io(_) | Self::Fault(_) => 2,
         }
     }
 }
 
+/// A setting can be put right by the caller; a loss that is no number cannot.
+fn learn_code(error: &LearnError) -> u8 {
+    if matches!(error, LearnError::NotFinite { .. }) { 2 } else { 3 }
+}
+
 fn train_code(error: &TrainError) -> u8 {
     match error {
-        TrainError::Fault(_) | TrainError::Learn(_) => 2,
+        TrainError::Fault(_) => 2,
+        TrainError::Learn(error) => learn_code(error),
         _ => 3,
     }
 }

@@ -1,6 +1,6 @@
 //! `playbot eval`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
     eval::Player,
@@ -113,11 +113,14 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
             horizon: own.score.horizon as u32,
             draw: own.score.skill_draw,
         });
-        players.push((info.algorithm.name().to_owned(), Player::Policy { policy: learner.policy(), prior, draw }));
+        players.push((
+            named(info.algorithm.name(), path, args.run.len()),
+            Player::Policy { policy: learner.policy(), prior, draw },
+        ));
     }
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
-        players.push(("bc".to_owned(), cloning(&model, experiment, draw)));
+        players.push((named("bc", path, args.skills.len()), cloning(&model, experiment, draw)));
     }
     for name in &args.bot {
         players.push((name.clone(), methods::bot(game, name)?));
@@ -128,6 +131,11 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
         }
     }
     Ok(players)
+}
+
+/// A method's name; with its path where there are several of its kind.
+fn named(method: &str, path: &Path, of: usize) -> String {
+    if of > 1 { format!("{method} {}", path.display()) } else { method.to_owned() }
 }
 
 /// Behaviour cloning: the decoder under the prior, without any reinforcement learning.

@@ -86,7 +86,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let experiment = read_experiment(&args)?;
     let game = registry::game(&experiment.game)?;
-    let skills = skills(game, &experiment, &args)?;
+    let Some(skills) = skills(game, &experiment, &args)? else {
+        eprintln!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
+        return Ok(Outcome::Pass);
+    };
     let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut trained = Vec::new();
     for algorithm in [Algorithm::ScorePpo, Algorithm::Ppo] {
@@ -133,7 +136,8 @@ fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
     Ok(experiment)
 }
 
-fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<SkillModel, CliError> {
+/// Learns the skill model and saves it; `None` after Ctrl-C.
+fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Option<SkillModel>, CliError> {
     std::fs::create_dir_all(&args.run)
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}", args.run.display())))?;
     interrupt::listen();
@@ -144,9 +148,12 @@ fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Skill
         log.push_str(&format!("{line}\n"));
         Ok(())
     })?;
+    if interrupt::asked() {
+        return Ok(None);
+    }
     write_atomically(&args.run.join("skills.jsonl"), log.as_bytes())?;
     model.save(&args.run.join("skills.safetensors"))?;
-    Ok(model)
+    Ok(Some(model))
 }
 
 fn train_one(

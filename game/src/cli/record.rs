@@ -57,6 +57,9 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     if !(0.0..=1.0).contains(&args.noise) {
         return Err(CliError::Usage(format!("--noise is {}; a probability lies between 0 and 1", args.noise)));
     }
+    if args.steps == Some(0) {
+        return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
+    }
     let writer = open_writer(game, &args)?;
     let (mut world, agents) = build_world(game, &args.levels.mode, args.seed, 0, 1);
     let agent = agents[0];

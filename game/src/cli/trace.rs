@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use bevy::prelude::*;
 use bevy_playbot::{
+    action::misfit,
     game::{build_world, check_mode},
     prelude::*,
 };
@@ -42,6 +43,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     check_mode(game, &args.mode)?;
     let actions = read_actions(&args)?;
+    let space = game.actions();
+    if let Some(why) = actions.iter().find_map(|&action| misfit(&ActionValue::Discrete(action), &space)) {
+        return Err(CliError::Usage(why));
+    }
     let (mut world, agents) = build_world(game, &args.mode, 0, 0, 1);
     let agent = agents[0];
     world.entity_mut(agent).insert((Control::Human, LevelQueue::Always(args.seed.into())));

@@ -86,8 +86,11 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 
 fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     let (run, mut experiment, info) = RunDir::open(&args.run)?;
-    experiment.steps = args.steps.unwrap_or(experiment.steps);
     let game = registry::game(&experiment.game)?;
+    if let Some(steps) = args.steps {
+        experiment.steps = steps;
+        run.write_experiment(&experiment)?;
+    }
     let trainer = run.resume(game, &experiment, &info, args.device, args.threads)?;
     eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
     Ok((run, trainer))
@@ -103,7 +106,7 @@ pub fn create_run(path: &Path, experiment: &Experiment, algorithm: Algorithm, fo
         algorithm,
         seed: experiment.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        revision: option_env!("PLAYBOT_REVISION").unwrap_or("unknown").to_owned(),
+        revision: env!("PLAYBOT_REVISION").to_owned(),
     };
     RunDir::create(path, experiment, &info, force)
 }

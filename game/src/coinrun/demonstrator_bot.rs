@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_playbot::{bot::uniform, fault::Faults, policy::AgentStreams, prelude::*};
 use rand::RngExt;
 
-use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator};
+use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator, play::NOTHING};
 
 /// Plays by planning ahead with the exact rules.
 ///
@@ -58,6 +58,17 @@ pub(super) fn decide(
         } else {
             ActionValue::Discrete(planned.into())
         };
-        sim.step(action.discrete().and_then(|index| u8::try_from(index).ok()).unwrap_or(planned));
+    }
+}
+
+/// Steps the copies along, whoever has decided.
+pub(super) fn follow(mut bots: Query<(&Control, &Episode, &Action, &mut DemonstratorBot)>) {
+    for (control, episode, action, mut bot) in &mut bots {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        if let Some(sim) = &mut bot.sim {
+            sim.step(action.discrete().and_then(|index| u8::try_from(index).ok()).unwrap_or(NOTHING));
+        }
     }
 }

@@ -30,7 +30,13 @@ impl Plugin for CoinRunPlugin {
             .add_observer(arena::start_episode)
             .add_observer(demonstrator_bot::start_episode)
             .add_systems(ObserveSchedule, play::observe)
-            .add_systems(FixedPreUpdate, demonstrator_bot::decide.in_set(PlaybotSystems::Decide))
+            .add_systems(
+                FixedPreUpdate,
+                (
+                    demonstrator_bot::decide.in_set(PlaybotSystems::Decide),
+                    demonstrator_bot::follow.after(PlaybotSystems::Act),
+                ),
+            )
             .add_systems(FixedUpdate, play::play.in_set(CoinRunSystems));
         if self.physics {
             app.add_plugins(CoinRunPhysicsPlugin);

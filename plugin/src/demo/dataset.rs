@@ -7,9 +7,13 @@ use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode};
 
 use super::{
     file::{DemoEpisode, DemoReader, EpisodeActions, find_demos},
+    replay::Divergence,
     verify::{ReplayStage, VerifyError},
 };
-use crate::{game::Game, observation::Observation};
+use crate::{
+    game::{Game, check_mode},
+    observation::Observation,
+};
 
 /// Reads all recordings of a game below a path and pairs each action with the observation that preceded it.
 ///
@@ -27,13 +31,18 @@ pub fn load_dataset(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64))
     for file in find_demos(path)? {
         let reader = DemoReader::open_for_game(&file, game.name(), game.version(), None)?;
         let header = reader.header().clone();
+        check_mode(game, &header.mode).map_err(|source| VerifyError::Mode { path: file.clone(), source })?;
         let mut stage = ReplayStage::new(game, &header.mode);
-        for episode in reader {
+        for (index, episode) in reader.enumerate() {
             let episode = Arc::new(episode?);
             let observations = if header.observation_names == names {
                 episode.observations.clone()
             } else {
-                observe_again(&mut stage, &episode)?
+                let (observations, divergence) = observe_again(&mut stage, &episode)?;
+                if let Some(divergence) = divergence {
+                    return Err(VerifyError::Diverged { path: file, episode: index, divergence });
+                }
+                observations
             };
             steps += episode.len() as u64;
             episodes.push(LearnerEpisode { observations, actions: learner_actions(&episode) });
@@ -44,15 +53,18 @@ pub fn load_dataset(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64))
 }
 
 /// Replays an episode and collects the observation before each action, `[steps, names]`.
-fn observe_again(stage: &mut ReplayStage, episode: &Arc<DemoEpisode>) -> Result<Vec<f32>, VerifyError> {
+fn observe_again(
+    stage: &mut ReplayStage,
+    episode: &Arc<DemoEpisode>,
+) -> Result<(Vec<f32>, Option<Divergence>), VerifyError> {
     let mut observations = Vec::new();
     // The observation an agent carries after a tick is still the one it acted on.
-    stage.play(episode.clone(), |world: &World, agent| {
+    let divergence = stage.play(episode.clone(), |world: &World, agent| {
         if let Some(observation) = world.get::<Observation>(agent) {
             observations.extend_from_slice(&observation.vector);
         }
     })?;
-    Ok(observations)
+    Ok((observations, divergence))
 }
 
 fn learner_actions(episode: &DemoEpisode) -> Actions {

@@ -49,6 +49,11 @@ impl Recorder {
         self.episodes
     }
 
+    /// Whether the step limit has been reached.
+    fn is_full(&self) -> bool {
+        self.limit.is_some_and(|limit| self.steps >= limit)
+    }
+
     fn push(&mut self, episode: &DemoEpisode) -> Result<(), DemoFileError> {
         self.writer.push(episode)?;
         self.steps += episode.len() as u64;
@@ -106,8 +111,20 @@ pub(crate) fn record_ticks(
         if !control.is_active() || !episode.is_running() {
             continue;
         }
-        let demo =
-            recording.episode.get_or_insert_with(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+        if recorder.is_full() {
+            continue;
+        }
+        if episode.tick == 1 {
+            // What is still pending was abandoned.
+            if let Some(pending) = recording.episode.take()
+                && let Err(error) = recorder.push(&pending)
+            {
+                faults.report(error.to_string());
+            }
+            recording.episode = Some(DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+        }
+        // Without its first ticks an episode could not be replayed: recording waits for the next one.
+        let Some(demo) = recording.episode.as_mut() else { continue };
         push_action(&mut demo.actions, &action.0);
         demo.rewards.push(reward.get());
         demo.state_hashes.push(hash.folded());

@@ -1,6 +1,9 @@
 //! Proving a recording: it is played again, and each tick must come out as recorded.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy::prelude::*;
 use serde::Serialize;
@@ -14,7 +17,7 @@ use crate::{
     control::Control,
     episode::Episode,
     fault::Fault,
-    game::{Game, build_world},
+    game::{Game, UnknownName, build_world, check_mode},
     headless::tick_world,
     level::LevelQueue,
     policy::AgentStreams,
@@ -40,6 +43,24 @@ pub enum VerifyError {
     /// The game broke its contract while it was replayed.
     #[error("while replaying: {0}")]
     Fault(#[from] Fault),
+    /// A recording is not of this game any more.
+    #[error("{}: episode {episode} does not replay ({divergence}): record it again", path.display())]
+    Diverged {
+        /// The file.
+        path: PathBuf,
+        /// Index of the episode.
+        episode: usize,
+        /// Where it stops being the recorded game.
+        divergence: Divergence,
+    },
+    /// The recording is of a mode the game does not have.
+    #[error("{}: {source}", path.display())]
+    Mode {
+        /// The file.
+        path: PathBuf,
+        /// The mode, and those there are.
+        source: UnknownName,
+    },
     /// The recordings do not make a data set.
     #[error(transparent)]
     Data(#[from] playbot_learner::LearnError),
@@ -53,6 +74,7 @@ pub enum VerifyError {
 pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<VerifyReport, VerifyError> {
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
     let mode = reader.header().mode.clone();
+    check_mode(game, &mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
     let mut stage = ReplayStage::new(game, &mode);
     let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
     for episode in reader {

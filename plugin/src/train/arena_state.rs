@@ -28,9 +28,10 @@ pub struct ActionLog(Vec<ActionValue>);
 impl ActionLog {
     /// Notes the action of this tick; the log is empty again after the last tick of an episode.
     pub(crate) fn note(&mut self, episode: &Episode, action: &ActionValue) {
-        if episode.end().is_some() {
+        if episode.tick <= 1 || episode.end().is_some() {
             self.0.clear();
-        } else {
+        }
+        if episode.end().is_none() {
             self.0.push(action.clone());
         }
     }

@@ -14,7 +14,7 @@ use crate::{
     headless::tick_world,
     level::LevelQueue,
     observation::Observation,
-    policy::{ActionDraw, ActivePolicy, Decision},
+    policy::{ActionDraw, ActivePolicy, AgentStreams, Decision},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior, draw_skills},
     split::LevelSplit,
@@ -64,8 +64,9 @@ impl Collector {
         world.schedule_scope(FixedPostUpdate, |_, schedule| {
             schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
         });
-        for &agent in &agents {
+        for (&agent, index) in agents.iter().zip(first..) {
             world.entity_mut(agent).insert((
+                AgentStreams::new(seed, index),
                 Control::Policy,
                 LevelQueue::Uniform { first: split.first, last: split.last },
                 ActionLog::default(),

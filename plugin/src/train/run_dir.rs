@@ -1,4 +1,4 @@
-//! The folder of a run: configuration, metrics, checkpoints, report.
+//! The folder of a run: configuration, metrics, checkpoint.
 //!
 //! ```text
 //! runs/<id>/experiment.ron     the experiment with all defaults filled in
@@ -37,6 +37,9 @@ pub enum RunError {
     /// The folder exists already.
     #[error("{} exists already: choose another --run, go on with --resume, or overwrite with --force", .0.display())]
     Exists(PathBuf),
+    /// The folder to overwrite is something else.
+    #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
+    NotARun(PathBuf),
     /// There is nothing to go on with.
     #[error("{} has no checkpoint to resume from", .0.display())]
     NothingToResume(PathBuf),
@@ -125,14 +128,16 @@ impl RunDir {
             if !force {
                 return Err(RunError::Exists(path.into()));
             }
+            if !is_run(path) {
+                return Err(RunError::NotARun(path.into()));
+            }
             fs::remove_dir_all(path).map_err(io_error("empty", path))?;
         }
         fs::create_dir_all(path).map_err(io_error("create", path))?;
-        let text = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
-            .map_err(|error| damaged(path, &error))?;
-        write_atomically(&path.join("experiment.ron"), text.as_bytes())?;
+        let run = Self { path: path.into() };
+        run.write_experiment(experiment)?;
         write_atomically(&path.join("run.json"), json!(info).to_string().as_bytes())?;
-        Ok(Self { path: path.into() })
+        Ok(run)
     }
 
     /// Opens the folder of a run that exists.
@@ -148,6 +153,17 @@ impl RunDir {
         Ok((Self { path: path.into() }, experiment, info))
     }
 
+    /// Writes the experiment anew, after its steps were raised.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Io`].
+    pub fn write_experiment(&self, experiment: &Experiment) -> Result<(), RunError> {
+        let text = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
+            .map_err(|error| damaged(&self.path, &error))?;
+        write_atomically(&self.path.join("experiment.ron"), text.as_bytes())
+    }
+
     /// The folder.
     pub fn path(&self) -> &Path {
         &self.path
@@ -155,7 +171,13 @@ impl RunDir {
 
     /// The learner's file of the last checkpoint: the policy, its prior and all that training needs.
     pub fn learner_file(&self) -> PathBuf {
-        self.path.join(CHECKPOINT).join(LEARNER)
+        self.checkpoint().join(LEARNER)
+    }
+
+    /// The last whole checkpoint. `save` renames twice; between the two it is the old one.
+    fn checkpoint(&self) -> PathBuf {
+        let current = self.path.join(CHECKPOINT);
+        if current.exists() { current } else { self.path.join("checkpoint.old") }
     }
 
     /// Appends an update to `metrics.jsonl` and `timing.jsonl`.
@@ -211,11 +233,7 @@ impl RunDir {
         threads: usize,
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
-        let mut folder = self.path.join(CHECKPOINT);
-        if !folder.exists() {
-            // The moment between two renames in `save`.
-            folder = self.path.join("checkpoint.old");
-        }
+        let folder = self.checkpoint();
         if !folder.exists() {
             return Err(RunError::NothingToResume(self.path.clone()));
         }
@@ -233,6 +251,12 @@ impl RunDir {
         }
         Ok(trainer)
     }
+}
+
+/// Whether a folder is empty or was made by [`RunDir::create`].
+fn is_run(path: &Path) -> bool {
+    let is_empty = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    is_empty || (path.join("run.json").is_file() && path.join("experiment.ron").is_file())
 }
 
 fn damaged(path: &Path, error: &impl ToString) -> RunError {
