@@ -97,7 +97,7 @@ impl Collector {
             tick_world(world)?;
         }
         let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
-        rollout.next_values = peek_values(world, policy).map_err(|error| Fault(error.to_string()))?;
+        peek(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
         world.resource_mut::<Faults>().take()?;
         Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
     }
@@ -113,9 +113,9 @@ impl Collector {
     }
 }
 
-/// Values of the states in which the rollout stopped, under the skills that will be active there. Agents between two
-/// episodes have no such state; their entry is 0 and is never used, since their last row ended an episode.
-fn peek_values(world: &mut World, policy: &Policy) -> Result<Vec<f32>, LearnError> {
+/// Adds the states in which the rollout stopped, with the skills that will be active there, and their values. Agents
+/// between two episodes have no such state; theirs is 0 and is never used, since their last row ended an episode.
+fn peek(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
     world.run_schedule(ObserveSchedule);
     if world.contains_resource::<SkillPrior>()
         && let Err(error) = world.run_system_cached(draw_skills)
@@ -131,11 +131,20 @@ fn peek_values(world: &mut World, policy: &Policy) -> Result<Vec<f32>, LearnErro
         push_state(world, entities[row], &mut skills, &mut observations);
     }
     let values = policy.values(&skills, &observations, running.len())?;
-    let mut all = vec![0.0; entities.len()];
-    for (&row, value) in running.iter().zip(values) {
-        all[row] = value;
+    let (obs_dim, latent) = (rollout.obs_dim, rollout.latent);
+    rollout.next_values = vec![0.0; entities.len()];
+    rollout.ends.next_obs = vec![0.0; entities.len() * obs_dim];
+    rollout.ends.next_z = vec![0.0; entities.len() * latent];
+    for (i, (&row, value)) in running.iter().zip(values).enumerate() {
+        rollout.next_values[row] = value;
+        copy_row(&mut rollout.ends.next_obs, row, &observations, i, obs_dim);
+        copy_row(&mut rollout.ends.next_z, row, &skills, i, latent);
     }
-    Ok(all)
+    Ok(())
+}
+
+fn copy_row(to: &mut [f32], to_row: usize, from: &[f32], from_row: usize, width: usize) {
+    to[to_row * width..(to_row + 1) * width].copy_from_slice(&from[from_row * width..(from_row + 1) * width]);
 }
 
 fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Vec<f32>) {
@@ -204,10 +213,14 @@ fn collect_tick(world: &mut World) {
         return;
     };
     let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
-    let final_values = final_values(world, &entities, &policy).unwrap_or_else(|error| {
+    let cut = cut_episodes(world, &entities, &policy).unwrap_or_else(|error| {
         world.resource_mut::<Faults>().report(error.to_string());
-        vec![0.0; entities.len()]
+        CutEpisodes::default()
     });
+    let mut final_values = vec![0.0; entities.len()];
+    for (&row, &value) in cut.agents.iter().zip(&cut.values) {
+        final_values[row] = value;
+    }
     let mut rows = Rows::new(&policy);
     for &entity in &entities {
         let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
@@ -225,48 +238,60 @@ fn collect_tick(world: &mut World) {
         rows.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
         log.note(episode, &action.0);
     }
-    if let Err(error) = collecting.rollout.push_step(rows.as_step(&final_values)) {
+    let rollout = &mut collecting.rollout;
+    if let Err(error) = rollout.push_step(rows.as_step(&final_values)) {
         world.resource_mut::<Faults>().report(error.to_string());
+    }
+    let (obs_dim, latent) = (rollout.obs_dim, rollout.latent);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
+        rollout.push_cut(row, &cut.obs[i * obs_dim..(i + 1) * obs_dim], z);
     }
     world.insert_resource(collecting);
 }
 
-/// Value of the last state of each episode that ran out of time in this tick; 0 elsewhere.
+/// The last states of the episodes that ran out of time in one tick.
+#[derive(Default)]
+struct CutEpisodes {
+    agents: Vec<usize>,
+    obs: Vec<f32>,
+    z: Vec<f32>,
+    values: Vec<f32>,
+}
+
+/// The last state of each episode that ran out of time in this tick, with its value.
 ///
 /// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
 /// episode.
-fn final_values(world: &mut World, entities: &[Entity], policy: &Policy) -> Result<Vec<f32>, LearnError> {
-    let mut values = vec![0.0; entities.len()];
-    let truncated: Vec<_> = (0..entities.len())
+fn cut_episodes(world: &mut World, entities: &[Entity], policy: &Policy) -> Result<CutEpisodes, LearnError> {
+    let agents: Vec<_> = (0..entities.len())
         .filter(|&row| {
             world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
         })
         .collect();
-    if truncated.is_empty() {
-        return Ok(values);
+    let mut cut = CutEpisodes { agents, ..CutEpisodes::default() };
+    if cut.agents.is_empty() {
+        return Ok(cut);
     }
     let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
     world.run_schedule(ObserveSchedule);
-    let (mut skills, mut observations) = (Vec::new(), Vec::new());
-    for &row in &truncated {
-        let from = observations.len();
-        let skill_from = skills.len();
-        push_state(world, entities[row], &mut skills, &mut observations);
+    for &row in &cut.agents {
+        let from = cut.obs.len();
+        let skill_from = cut.z.len();
+        push_state(world, entities[row], &mut cut.z, &mut cut.obs);
         let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
         if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
-            let mean = prior.prior.sample(&observations[from..], 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
-            skills.truncate(skill_from);
-            skills.extend(mean);
+            let mean = prior.prior.sample(&cut.obs[from..], 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
+            cut.z.truncate(skill_from);
+            cut.z.extend(mean);
         }
     }
-    for (row, value) in truncated.iter().zip(policy.values(&skills, &observations, truncated.len())?) {
-        values[*row] = value;
-    }
+    cut.values = policy.values(&cut.z, &cut.obs, cut.agents.len())?;
     // The row that is being written belongs to the state before the action.
     for (&entity, before) in entities.iter().zip(before) {
         if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
             *observation = before;
         }
     }
-    Ok(values)
+    Ok(cut)
 }

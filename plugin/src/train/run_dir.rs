@@ -277,26 +277,9 @@ fn append_line(path: &Path, line: &serde_json::Value) -> Result<(), RunError> {
 
 /// One update under the names that TensorBoard users know.
 fn metrics_line(report: &UpdateReport) -> serde_json::Value {
-    let learner = &report.learner;
-    let mut line = json!({
-        "step": report.step,
-        "update": report.update,
-        "charts/episodic_return": report.episodic_return,
-        "charts/episodic_length": report.episodic_length,
-        "charts/success_rate": report.success_rate,
-        "charts/learning_rate": learner.lr,
-        "losses/policy_loss": learner.policy_loss,
-        "losses/value_loss": learner.value_loss,
-        "losses/entropy": learner.entropy,
-        "losses/approx_kl": learner.approx_kl,
-        "losses/clip_fraction": learner.clip_fraction,
-        "losses/explained_variance": learner.explained_variance,
-        "losses/grad_norm": learner.grad_norm,
-        "score/decoder_kl": learner.decoder_kl,
-        "score/alpha_mean": learner.alpha_mean,
-    });
-    if let Some(kl) = report.initial_kl {
-        line["score/initial_kl"] = json!(kl);
+    let mut line = json!({ "step": report.step, "update": report.update });
+    for (tag, value) in report.scalars() {
+        line[tag] = json!(value);
     }
     line
 }

@@ -95,6 +95,20 @@ pub struct UpdateReport {
     pub timing: Timing,
 }
 
+impl UpdateReport {
+    /// Everything measured, by TensorBoard tag; the same numbers in every run with the same seed.
+    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
+        let episodes = [
+            ("charts/episodic_return", self.episodic_return),
+            ("charts/episodic_length", self.episodic_length),
+            ("charts/success_rate", self.success_rate),
+            ("score/initial_kl", self.initial_kl.map(f64::from)),
+        ];
+        let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
+        known.chain(self.learner.scalars()).collect()
+    }
+}
+
 /// Wall-clock seconds of one update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Timing {

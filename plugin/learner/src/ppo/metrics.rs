@@ -27,6 +27,25 @@ pub struct UpdateMetrics {
     pub lr: f32,
 }
 
+impl UpdateMetrics {
+    /// The numbers by their TensorBoard tags; what was not measured is left out.
+    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
+        let all = [
+            ("charts/learning_rate", Some(self.lr)),
+            ("losses/policy_loss", Some(self.policy_loss)),
+            ("losses/value_loss", Some(self.value_loss)),
+            ("losses/entropy", Some(self.entropy)),
+            ("losses/approx_kl", Some(self.approx_kl)),
+            ("losses/clip_fraction", Some(self.clip_fraction)),
+            ("losses/explained_variance", Some(self.explained_variance)),
+            ("losses/grad_norm", Some(self.grad_norm)),
+            ("score/decoder_kl", self.decoder_kl),
+            ("score/alpha_mean", self.alpha_mean),
+        ];
+        all.into_iter().filter_map(|(tag, value)| Some((tag, f64::from(value?)))).collect()
+    }
+}
+
 /// How far a policy has moved from the one that played.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioStats {

@@ -19,5 +19,5 @@ pub use learner::PpoLearner;
 pub use loss::{PpoBatch, PpoLoss, normalize_advantages, ppo_loss};
 pub use metrics::{RatioStats, UpdateMetrics, explained_variance, ratio_stats};
 pub use nets::PpoNets;
-pub use rollout::{Rollout, RolloutStep};
+pub use rollout::{EndStates, Rollout, RolloutStep};
 pub use update::{StepMetrics, gradient_step};

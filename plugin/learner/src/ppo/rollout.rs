@@ -33,6 +33,32 @@ pub struct Rollout {
     pub final_values: Vec<f32>,
     /// Value of the observation after the last step of each environment (under the skill active then), `B`.
     pub next_values: Vec<f32>,
+    /// The states behind `final_values` and `next_values`, for learners that keep transitions; may be left empty for PPO.
+    pub ends: EndStates,
+}
+
+/// States that no row of a rollout shows: where episodes were cut off, and where the rollout stopped.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EndStates {
+    /// Rows that cut an episode off without terminating it, ascending.
+    pub cut_rows: Vec<usize>,
+    /// Last observation of each of those episodes, `cut_rows * obs_dim`.
+    pub cut_obs: Vec<f32>,
+    /// The skill under which that observation is judged, `cut_rows * latent`.
+    pub cut_z: Vec<f32>,
+    /// Observation after the last row of each environment, `B * obs_dim`; zeros where that row ended an episode.
+    pub next_obs: Vec<f32>,
+    /// The skill active there, `B * latent`.
+    pub next_z: Vec<f32>,
+}
+
+impl EndStates {
+    fn clear(&mut self) {
+        self.cut_rows.clear();
+        for values in [&mut self.cut_obs, &mut self.cut_z, &mut self.next_obs, &mut self.next_z] {
+            values.clear();
+        }
+    }
 }
 
 /// One tick of all environments of a [`Rollout`].
@@ -76,6 +102,7 @@ impl Rollout {
             truncated: Vec::new(),
             final_values: Vec::new(),
             next_values: Vec::new(),
+            ends: EndStates::default(),
         }
     }
 
@@ -101,6 +128,18 @@ impl Rollout {
         }
         self.terminated.clear();
         self.truncated.clear();
+        self.ends.clear();
+    }
+
+    /// Keeps the last observation of an episode of environment `env` that the newest step has cut off, with the skill
+    /// under which it is judged. Environments come in ascending order within a step.
+    ///
+    /// # Panics
+    /// If no step was pushed yet.
+    pub fn push_cut(&mut self, env: usize, obs: &[f32], z: &[f32]) {
+        self.ends.cut_rows.push((self.steps - 1) * self.envs + env);
+        self.ends.cut_obs.extend_from_slice(obs);
+        self.ends.cut_z.extend_from_slice(z);
     }
 
     /// Adds one tick.
@@ -142,6 +181,8 @@ impl Rollout {
             LearnError::check("latent of a joined rollout", first.latent, part.latent)?;
             all.envs += part.envs;
             all.next_values.extend_from_slice(&part.next_values);
+            all.ends.next_obs.extend_from_slice(&part.ends.next_obs);
+            all.ends.next_z.extend_from_slice(&part.ends.next_z);
         }
         for t in 0..first.steps {
             for part in parts {
@@ -158,7 +199,28 @@ impl Rollout {
                 all.final_values.extend_from_slice(&part.final_values[rows]);
             }
         }
+        all.join_cuts(parts);
         Ok(all)
+    }
+
+    /// The cut episodes of all parts, in ascending order of their joined rows.
+    fn join_cuts(&mut self, parts: &[Self]) {
+        let mut cuts = Vec::new();
+        let mut offset = 0;
+        for part in parts {
+            for (i, &row) in part.ends.cut_rows.iter().enumerate() {
+                let joined = row / part.envs * self.envs + offset + row % part.envs;
+                cuts.push((joined, part, i));
+            }
+            offset += part.envs;
+        }
+        cuts.sort_by_key(|(row, ..)| *row);
+        for (row, part, i) in cuts {
+            let (obs_dim, latent) = (self.obs_dim, self.latent);
+            self.ends.cut_rows.push(row);
+            self.ends.cut_obs.extend_from_slice(&part.ends.cut_obs[i * obs_dim..(i + 1) * obs_dim]);
+            self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * latent..(i + 1) * latent]);
+        }
     }
 
     /// `Ok` if all lengths fit T and B.
@@ -213,7 +275,9 @@ mod tests {
             };
             rollout.push_step(step).expect("discrete");
         }
+        rollout.push_cut(envs - 1, &[base], &[]);
         rollout.next_values = vec![base; envs];
+        rollout.ends.next_obs = vec![base; envs];
         rollout
     }
 
@@ -223,6 +287,8 @@ mod tests {
         assert_eq!((joined.steps, joined.envs), (2, 3));
         assert_eq!(joined.rewards, [0.0, 1.0, 100.0, 10.0, 11.0, 110.0]);
         assert_eq!(joined.next_values, [0.0, 0.0, 100.0]);
+        assert_eq!((&joined.ends.cut_rows[..], &joined.ends.cut_obs[..]), (&[4, 5][..], &[0.0, 100.0][..]));
+        assert_eq!(joined.ends.next_obs, joined.next_values);
         assert!(joined.check().is_ok());
     }
 
