@@ -1,44 +1,21 @@
 //! Reading an experiment from a RON file, with errors one can act on.
+//!
+//! `base: ["coinrun-ppo", "mine.ron"]` at the top of a file names what it is built on: presets by name, files by their
+//! path from the file's own folder. Each is laid over the ones before it, and the file's own keys over all of them, key by
+//! key; a list is one value. A base may have a base of its own.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use thiserror::Error;
+use super::{
+    config::Experiment,
+    config_keys::{Keys, Origin},
+    presets::Preset,
+};
 
-use super::config::{Experiment, ExperimentError};
-use crate::game::nearest;
+pub use super::config_error::ConfigError;
 
-/// An experiment file cannot be used.
-#[derive(Debug, Error)]
-pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The text is not an experiment.
-    #[error("{}:{line}:{column}: {message}", path.display())]
-    Syntax {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// What is wrong, and the nearest valid key where a key is unknown.
-        message: String,
-    },
-    /// The values do not go together.
-    #[error("{}: {source}", path.display())]
-    Values {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: ExperimentError,
-    },
-}
+/// Files below one another, at most: more means that they go round in a circle.
+const MAX_DEPTH: usize = 8;
 
 /// Reads and checks an experiment.
 ///
@@ -46,34 +23,59 @@ pub enum ConfigError {
 ///
 /// [`ConfigError`] with file, line and column.
 pub fn read_experiment(path: &Path) -> Result<Experiment, ConfigError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
-    let experiment = parse_experiment(&text, path)?;
+    let experiment = parse_experiment(&read(path)?, path)?;
     experiment.check().map_err(|source| ConfigError::Values { path: path.into(), source })?;
     Ok(experiment)
 }
 
-/// Parses the text of an experiment; `path` is for messages.
+/// Parses the text of an experiment. `path` is for messages and says where to look for files that it is built on.
 ///
 /// # Errors
 ///
-/// [`ConfigError::Syntax`].
+/// [`ConfigError::Syntax`], also for what it is built on; [`ConfigError::Read`] if that cannot be read.
 pub fn parse_experiment(text: &str, path: &Path) -> Result<Experiment, ConfigError> {
-    ron::from_str(text).map_err(|error| ConfigError::Syntax {
-        path: path.into(),
-        line: error.span.start.line,
-        column: error.span.start.col,
-        message: explain(&error.code),
-    })
+    gather(text, path, 0)?.parse(&Origin::start_of(path))
 }
 
-fn explain(error: &ron::Error) -> String {
-    match error {
-        ron::Error::NoSuchStructField { expected, found, .. } => match nearest(found, expected) {
-            Some(near) => format!("unknown key `{found}`; did you mean `{near}`?"),
-            None => format!("unknown key `{found}`; valid keys: {}", expected.join(", ")),
-        },
-        other => other.to_string(),
+fn read(path: &Path) -> Result<String, ConfigError> {
+    std::fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.into(), source })
+}
+
+/// The keys of a file over those of what it is built on. Each file is checked alone, so that a wrong value is found even
+/// if a later one hides it.
+fn gather(text: &str, path: &Path, depth: usize) -> Result<Keys, ConfigError> {
+    let start = Origin::start_of(path);
+    let mut own = Keys::of_text(text, path)?;
+    let base = own.take("base");
+    own.check_names()?;
+    Keys::all().clone().overlaid(&own).parse(&start)?;
+    let mut keys = Keys::default();
+    if let Some(base) = base {
+        let names: Vec<String> = ron::from_str(&base.text).map_err(|_| {
+            let message = "`base` must be a list of presets and files, such as [\"coinrun-ppo\", \"mine.ron\"]";
+            base.origin.error((1, 1), message.to_owned())
+        })?;
+        if depth == MAX_DEPTH {
+            return Err(base.origin.error((1, 1), format!("`base` goes round in a circle, or {MAX_DEPTH} files deep")));
+        }
+        for name in names {
+            keys = keys.overlaid(&gather_base(&name, path, depth + 1, &base.origin)?);
+        }
     }
+    Ok(keys.overlaid(&own))
+}
+
+fn gather_base(name: &str, user: &Path, depth: usize, origin: &Origin) -> Result<Keys, ConfigError> {
+    if name.ends_with(".ron") {
+        let path = user.with_file_name(name);
+        let text = std::fs::read_to_string(&path).map_err(|error| {
+            origin.error((1, 1), format!("`base` names {}, which cannot be read: {error}", path.display()))
+        })?;
+        return gather(&text, &path, depth);
+    }
+    let preset = Preset::find(name)
+        .map_err(|error| origin.error((1, 1), format!("{error}; or a file, by its path ending in .ron")))?;
+    gather(preset.text, Path::new(&format!("assets/presets/{name}.ron")), depth)
 }
 
 #[cfg(test)]

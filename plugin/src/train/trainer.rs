@@ -273,7 +273,7 @@ fn new_learner(
     device: DeviceKind,
 ) -> Result<PpoLearner, TrainError> {
     let (obs_dim, action_space) = (game.observation().len(), game.actions());
-    let config = experiment.ppo.clone();
+    let config = experiment.ppo_config();
     if !algorithm.needs_skills() {
         let spec = PolicySpec { obs_dim, latent: 0, action_space };
         return Ok(PpoLearner::new(config, spec, experiment.seed, device)?);
