@@ -6,6 +6,7 @@ use playbot_learner::{PpoConfig, ScoreConfig, SkillConfig};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::checkpoint::CheckpointConfig;
 use crate::{game::UnknownName, split::LevelSplit};
 
 /// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
@@ -45,6 +46,9 @@ pub struct Experiment {
     /// Evaluation.
     #[serde(default)]
     pub eval: EvalConfig,
+    /// When the state of the training is saved.
+    #[serde(default)]
+    pub checkpoints: CheckpointConfig,
 }
 
 fn one() -> u64 {
@@ -120,6 +124,12 @@ impl Experiment {
         }
         if self.eval.episodes_per_level == 0 {
             return refuse("eval.episodes_per_level", 0, "a verdict needs at least one episode");
+        }
+        if self.checkpoints.every == 0 {
+            return refuse("checkpoints.every", 0, "is a number of updates, at least one");
+        }
+        if self.checkpoints.keep == 0 {
+            return refuse("checkpoints.keep", 0, "at least the latest checkpoint must stay");
         }
         let batch = u64::from(self.arenas) * self.ppo.num_steps as u64;
         if self.ppo.minibatches == 0 || !batch.is_multiple_of(self.ppo.minibatches as u64) {

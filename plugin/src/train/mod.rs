@@ -1,6 +1,7 @@
 //! Headless training over many levels: collecting with the current policy, learning from what was collected.
 
 pub mod arena_state;
+pub mod checkpoint;
 pub mod collect;
 pub mod config;
 pub mod config_file;
