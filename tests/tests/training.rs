@@ -1,6 +1,6 @@
 //! Training: the same bytes for the same seed, on any number of threads, in one go or in two.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use bevy_playbot::{
     bot::BlindBot,
@@ -14,6 +14,7 @@ use bevy_playbot::{
     prelude::*,
     train::{
         Algorithm, Experiment, Trainer,
+        checkpoint::Which,
         config_file::parse_experiment,
         run_dir::{RunDir, RunError, RunInfo},
         trainer::TrainError,
@@ -85,10 +86,11 @@ fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Traine
     trainer
 }
 
-fn bytes(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    ["metrics.jsonl", "checkpoint/learner.safetensors", "checkpoint/arenas.json"]
+fn bytes(folder: &Path) -> Vec<Vec<u8>> {
+    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
+    [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
         .into_iter()
-        .map(|name| (name.into(), std::fs::read(folder.join(name)).expect("written")))
+        .map(|path| std::fs::read(path).expect("written"))
         .collect()
 }
 
@@ -209,7 +211,7 @@ fn an_existing_run_is_not_overwritten() {
     let nothing = RunDir::open(&path).expect("readable").0;
     let resumed =
         nothing.resume(&Corridor, &experiment(), &info(Algorithm::Ppo), DeviceKind::Flex, 1).err().expect("empty");
-    assert!(matches!(resumed, RunError::NothingToResume(_)), "{resumed}");
+    assert!(matches!(resumed, RunError::NoCheckpoint { .. }), "{resumed}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What can go wrong, and the exit code it has.
 
-use std::io;
+use std::{io, path::PathBuf};
 
 use bevy_playbot::{
     demo::{file::DemoFileError, verify::VerifyError},
@@ -32,6 +32,30 @@ pub enum CliError {
     /// The operating system refused.
     #[error("{0}")]
     Io(String),
+    /// The numbers of a training ran away.
+    #[error(
+        "{error}; the last good checkpoint is {} of step {step}: try a smaller learning rate or a tighter \
+         max_grad_norm in a new run", checkpoint.display()
+    )]
+    Diverged {
+        /// What ran away.
+        error: TrainError,
+        /// Environment steps of the checkpoint.
+        step: u64,
+        /// Its folder.
+        checkpoint: PathBuf,
+    },
+    /// A training could not be saved.
+    #[error(
+        "{error}; the earlier checkpoints are untouched: make room or rights and go on with \
+         `playbot train --run {} --resume`", run.display()
+    )]
+    NotSaved {
+        /// Why.
+        error: RunError,
+        /// Folder of the run.
+        run: PathBuf,
+    },
     #[error(transparent)]
     Name(#[from] UnknownName),
     #[error(transparent)]
@@ -60,15 +84,13 @@ impl CliError {
     /// 3 for what the caller can put right by calling differently, 2 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_)
-            | Self::Name(_)
-            | Self::Split(_)
-            | Self::Config(_)
-            | Self::Experiment(_)
-            | Self::Demo(_)
-            | Self::File(_) => 3,
-            Self::Run(error) => match error {
+            Self::Usage(_) | Self::Name(_) | Self::Split(_) | Self::Config(_) | Self::Experiment(_) | Self::Demo(_) => {
+                3
+            }
+            Self::File(error) => file_code(error),
+            Self::Run(error) | Self::NotSaved { error, .. } => match error {
                 RunError::Io { .. } => 2,
+                RunError::Learner(error) => file_code(error),
                 RunError::Train(error) => train_code(error),
                 _ => 3,
             },
@@ -77,7 +99,7 @@ impl CliError {
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),
             Self::Verify(_) => 3,
-            Self::BrokenPipe | Self::Io(_) | Self::Fault(_) => 2,
+            Self::BrokenPipe | Self::Io(_) | Self::Fault(_) | Self::Diverged { .. } => 2,
         }
     }
 }
@@ -85,6 +107,14 @@ impl CliError {
 /// A setting can be put right by the caller; a loss that is no number cannot.
 fn learn_code(error: &LearnError) -> u8 {
     if matches!(error, LearnError::NotFinite { .. }) { 2 } else { 3 }
+}
+
+/// A file that is not there or not what it should be was named by the caller; a disk that fails was not.
+fn file_code(error: &FileError) -> u8 {
+    match error {
+        FileError::Io { source, .. } if source.kind() != io::ErrorKind::NotFound => 2,
+        _ => 3,
+    }
 }
 
 fn train_code(error: &TrainError) -> u8 {

@@ -10,7 +10,7 @@ use bevy_playbot::{
     report::to_text_table,
     skill_prior::SkillPrior,
     split::LevelSplit,
-    train::{Experiment, run_dir::RunDir, worlds::default_threads},
+    train::{Experiment, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
 };
 
 use super::{
@@ -30,6 +30,9 @@ pub struct Args {
     /// Folder of a run; may be given several times.
     #[arg(long)]
     run: Vec<PathBuf>,
+    /// Checkpoint of the runs: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, default_value = "last")]
+    checkpoint: Which,
     /// Skill model: measures behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Vec<PathBuf>,
@@ -107,7 +110,7 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     let mut players = Vec::new();
     for path in &args.run {
         let (run, own, info) = RunDir::open(path)?;
-        let learner = PpoLearner::load(&run.learner_file(), args.device)?;
+        let learner = PpoLearner::load(&run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
         let prior = learner.prior().map(|prior| SkillPrior {
             prior,
             horizon: own.score.horizon as u32,

@@ -168,7 +168,7 @@ fn train_one(
     let mut trainer = Trainer::new(game, experiment, algorithm, skills, DeviceKind::default(), args.threads)?;
     let run = create_run(&args.run.join(algorithm.name()), experiment, algorithm, true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
-    let finished = drive(&run, &mut trainer, u64::MAX, &format!("train {algorithm}"), |report| {
+    let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {
             eprintln!("{algorithm}: the first policy is the decoder, KL {kl}");
         }

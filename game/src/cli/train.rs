@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
-    learner::{DeviceKind, SkillModel},
+    learner::{DeviceKind, LearnError, SkillModel},
     train::{
         Algorithm, Experiment, Trainer, UpdateReport,
+        checkpoint::Which,
         run_dir::{RunDir, RunError, RunInfo},
+        trainer::TrainError,
         worlds::default_threads,
     },
 };
@@ -51,9 +53,9 @@ pub struct Args {
     /// Threads; the result does not depend on it.
     #[arg(long, default_value_t = default_threads())]
     threads: usize,
-    /// Save a checkpoint every so many updates.
-    #[arg(long, default_value_t = 10)]
-    checkpoint_every: u64,
+    /// Save a checkpoint every so many updates, instead of the experiment's.
+    #[arg(long)]
+    checkpoint_every: Option<u64>,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
     device: DeviceKind,
@@ -61,7 +63,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let (run, mut trainer) = if args.resume { resume(&args)? } else { start(&args)? };
-    let finished = drive(&run, &mut trainer, args.checkpoint_every, "train", |_| {})?;
+    let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
         eprintln!("done: test it with `playbot eval --run {}`", args.run.display());
     } else {
@@ -74,6 +76,7 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     let mut experiment = experiment::load(args.experiment.as_deref())?;
     experiment.steps = args.steps.unwrap_or(experiment.steps);
     experiment.seed = args.seed.unwrap_or(experiment.seed);
+    experiment.checkpoints.every = args.checkpoint_every.unwrap_or(experiment.checkpoints.every);
     let game = registry::game(&experiment.game)?;
     let skills = match &args.skills {
         Some(path) => Some(SkillModel::load(path, args.device)?),
@@ -87,8 +90,9 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     let (run, mut experiment, info) = RunDir::open(&args.run)?;
     let game = registry::game(&experiment.game)?;
-    if let Some(steps) = args.steps {
-        experiment.steps = steps;
+    if args.steps.is_some() || args.checkpoint_every.is_some() {
+        experiment.steps = args.steps.unwrap_or(experiment.steps);
+        experiment.checkpoints.every = args.checkpoint_every.unwrap_or(experiment.checkpoints.every);
         run.write_experiment(&experiment)?;
     }
     let trainer = run.resume(game, &experiment, &info, args.device, args.threads)?;
@@ -120,27 +124,48 @@ pub fn create_run(path: &Path, experiment: &Experiment, algorithm: Algorithm, fo
 pub fn drive(
     run: &RunDir,
     trainer: &mut Trainer,
-    checkpoint_every: u64,
     title: &str,
     mut after_update: impl FnMut(&UpdateReport),
 ) -> Result<bool, CliError> {
     interrupt::listen();
-    let per_update = trainer.experiment().steps_per_update();
+    let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
     let bar = progress::bar(title, trainer.experiment().steps, "steps");
+    let mut saved = trainer.updates();
+    if saved == 0 {
+        // Whatever goes wrong later, there is something good to go back to.
+        save(run, trainer)?;
+    }
     while !trainer.is_done() && !interrupt::asked() {
         bar.set_position(trainer.steps());
-        let report = trainer.update()?;
+        let report = trainer.update().map_err(|error| stopped_by(run, error))?;
         run.log(&report, per_update)?;
         bar.set_position(report.step);
         bar.set_message(message(&report, per_update));
         after_update(&report);
-        if report.update.is_multiple_of(checkpoint_every.max(1)) {
-            run.save(trainer)?;
+        if report.update.is_multiple_of(every) {
+            save(run, trainer)?;
+            saved = report.update;
         }
     }
-    run.save(trainer)?;
+    if trainer.updates() > saved {
+        save(run, trainer)?;
+    }
     bar.finish_and_clear();
     Ok(trainer.is_done())
+}
+
+fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
+    run.save(trainer).map_err(|error| CliError::NotSaved { error, run: run.path().into() })
+}
+
+/// The error of a training, with the checkpoint that is left if its numbers ran away.
+fn stopped_by(run: &RunDir, error: TrainError) -> CliError {
+    match (&error, run.checkpoint(Which::Last)) {
+        (TrainError::Learn(LearnError::NotFinite { .. }), Ok(checkpoint)) => {
+            CliError::Diverged { error, step: checkpoint.summary.step, checkpoint: checkpoint.path }
+        }
+        _ => error.into(),
+    }
 }
 
 fn message(report: &UpdateReport, steps_per_update: u64) -> String {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use super::algorithm::Algorithm;
+use super::checkpoint::CheckpointConfig;
 use crate::split::LevelSplit;
 
 /// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
@@ -59,6 +60,9 @@ pub struct Experiment {
     /// Evaluation.
     #[serde(default)]
     pub eval: EvalConfig,
+    /// When the state of the training is saved.
+    #[serde(default)]
+    pub checkpoints: CheckpointConfig,
     /// What a study measures.
     #[serde(default)]
     pub study: StudyConfig,
@@ -177,6 +181,12 @@ impl Experiment {
         }
         if self.eval.episodes_per_level == 0 {
             return refuse("eval.episodes_per_level", 0, "a verdict needs at least one episode");
+        }
+        if self.checkpoints.every == 0 {
+            return refuse("checkpoints.every", 0, "is a number of updates, at least one");
+        }
+        if self.checkpoints.keep == 0 {
+            return refuse("checkpoints.keep", 0, "at least the latest checkpoint must stay");
         }
         if !(0.0..=1.0).contains(&self.study.threshold) {
             return refuse("study.threshold", self.study.threshold, "a success rate lies in 0..1");

@@ -2,6 +2,7 @@
 
 mod algorithm;
 pub mod arena_state;
+pub mod checkpoint;
 pub mod collect;
 pub mod config;
 mod config_error;

@@ -5,7 +5,7 @@
 //! runs/<id>/run.json           algorithm, seed, version
 //! runs/<id>/metrics.jsonl      one line per update; the same bytes for the same seed
 //! runs/<id>/timing.jsonl       seconds and steps per second of each update
-//! runs/<id>/checkpoint/        learner.safetensors, arenas.json
+//! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`](super::checkpoint)
 //! ```
 
 use std::{
@@ -21,15 +21,12 @@ use thiserror::Error;
 
 use super::{
     arena_state::{ArenaState, restore_arenas, save_arenas},
+    checkpoint::{self, Checkpoint, Which},
     config::{Algorithm, Experiment},
     config_file::{ConfigError, read_experiment},
     trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
-
-const CHECKPOINT: &str = "checkpoint";
-const LEARNER: &str = "learner.safetensors";
-const ARENAS: &str = "arenas.json";
 
 /// A run's folder cannot be used.
 #[derive(Debug, Error)]
@@ -40,9 +37,14 @@ pub enum RunError {
     /// The folder to overwrite is something else.
     #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
     NotARun(PathBuf),
-    /// There is nothing to go on with.
-    #[error("{} has no checkpoint to resume from", .0.display())]
-    NothingToResume(PathBuf),
+    /// There is no such checkpoint.
+    #[error("{} has no such checkpoint; it has {}", path.display(), list_steps(steps))]
+    NoCheckpoint {
+        /// The folder of the run.
+        path: PathBuf,
+        /// Environment steps of those that it has.
+        steps: Vec<u64>,
+    },
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
@@ -72,7 +74,15 @@ pub enum RunError {
     Train(#[from] TrainError),
 }
 
-fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
+fn list_steps(steps: &[u64]) -> String {
+    if steps.is_empty() {
+        return "none".to_owned();
+    }
+    let steps: Vec<_> = steps.iter().map(u64::to_string).collect();
+    format!("those of the steps {}", steps.join(", "))
+}
+
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
     move |source| RunError::Io { action, path: path.into(), source }
 }
 
@@ -169,15 +179,13 @@ impl RunDir {
         &self.path
     }
 
-    /// The learner's file of the last checkpoint: the policy, its prior and all that training needs.
-    pub fn learner_file(&self) -> PathBuf {
-        self.checkpoint().join(LEARNER)
-    }
-
-    /// The last whole checkpoint. `save` renames twice; between the two it is the old one.
-    fn checkpoint(&self) -> PathBuf {
-        let current = self.path.join(CHECKPOINT);
-        if current.exists() { current } else { self.path.join("checkpoint.old") }
+    /// A checkpoint of the run: the policy, its prior and all that training needs.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::NoCheckpoint`].
+    pub fn checkpoint(&self, which: Which) -> Result<Checkpoint, RunError> {
+        checkpoint::choose(&self.path, which)
     }
 
     /// Appends an update to `metrics.jsonl` and `timing.jsonl`.
@@ -195,35 +203,29 @@ impl RunDir {
         append_line(&self.path.join("timing.jsonl"), &line)
     }
 
-    /// Saves learner and arenas. The previous checkpoint stays until the new one is whole.
+    /// Saves learner and arenas as a new checkpoint; the latest and the best of the earlier ones stay.
     ///
     /// # Errors
     ///
-    /// [`RunError`]; the previous checkpoint is still there.
+    /// [`RunError`]; the earlier checkpoints are still there.
     pub fn save(&self, trainer: &mut Trainer) -> Result<(), RunError> {
-        let (fresh, old) = (self.path.join("checkpoint.new"), self.path.join("checkpoint.old"));
-        let current = self.path.join(CHECKPOINT);
-        remove_if_there(&fresh)?;
-        fs::create_dir_all(&fresh).map_err(io_error("create", &fresh))?;
-        trainer.learner.save(&fresh.join(LEARNER))?;
-        let state = TrainState {
-            progress: trainer.progress.clone(),
-            arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
-        };
-        write_atomically(&fresh.join(ARENAS), json!(state).to_string().as_bytes())?;
-        remove_if_there(&old)?;
-        if current.exists() {
-            fs::rename(&current, &old).map_err(io_error("move", &current))?;
-        }
-        fs::rename(&fresh, &current).map_err(io_error("move", &fresh))?;
-        remove_if_there(&old)
+        let keep = trainer.experiment().checkpoints.keep;
+        checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
+            trainer.learner.save(&fresh.learner_file())?;
+            let state = TrainState {
+                progress: trainer.progress.clone(),
+                arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
+            };
+            write_atomically(&fresh.arenas_file(), json!(state).to_string().as_bytes())
+        })
     }
 
-    /// Brings a training back from its last checkpoint, and drops metrics that were logged after it.
+    /// Brings a training back from its last checkpoint, and drops metrics that were logged after it. A checkpoint that
+    /// cannot be read, say after a fault of the disk, is passed over with a warning for the one before it.
     ///
     /// # Errors
     ///
-    /// [`RunError`] if there is no checkpoint, it is damaged, or it does not fit the game.
+    /// [`RunError`] if there is no checkpoint, none can be read, or it does not fit the game.
     pub fn resume(
         &self,
         game: &dyn Game,
@@ -233,14 +235,7 @@ impl RunDir {
         threads: usize,
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
-        let folder = self.checkpoint();
-        if !folder.exists() {
-            return Err(RunError::NothingToResume(self.path.clone()));
-        }
-        let learner = PpoLearner::load(&folder.join(LEARNER), device)?;
-        let arenas = folder.join(ARENAS);
-        let text = fs::read_to_string(&arenas).map_err(io_error("read", &arenas))?;
-        let state: TrainState = serde_json::from_str(&text).map_err(|error| damaged(&arenas, &error))?;
+        let (learner, state) = self.last_readable(device)?;
         let mut trainer = Trainer::with_learner(game, experiment, info.algorithm, learner, threads)?;
         for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
@@ -251,6 +246,28 @@ impl RunDir {
         }
         Ok(trainer)
     }
+
+    fn last_readable(&self, device: DeviceKind) -> Result<(PpoLearner, TrainState), RunError> {
+        let mut first_error = None;
+        for checkpoint in checkpoint::list(&self.path)?.iter().rev() {
+            match read_checkpoint(checkpoint, device) {
+                Ok(read) => return Ok(read),
+                Err(error) => {
+                    tracing::warn!("checkpoint of step {} cannot be read: {error}", checkpoint.summary.step);
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+        Err(first_error.unwrap_or(RunError::NoCheckpoint { path: self.path.clone(), steps: Vec::new() }))
+    }
+}
+
+fn read_checkpoint(checkpoint: &Checkpoint, device: DeviceKind) -> Result<(PpoLearner, TrainState), RunError> {
+    let learner = PpoLearner::load(&checkpoint.learner_file(), device)?;
+    let path = checkpoint.arenas_file();
+    let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
+    let state = serde_json::from_str(&text).map_err(|error| damaged(&path, &error))?;
+    Ok((learner, state))
 }
 
 /// Whether a folder is empty or was made by [`RunDir::create`].
@@ -259,15 +276,8 @@ fn is_run(path: &Path) -> bool {
     is_empty || (path.join("run.json").is_file() && path.join("experiment.ron").is_file())
 }
 
-fn damaged(path: &Path, error: &impl ToString) -> RunError {
+pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {
     RunError::Damaged { path: path.into(), message: error.to_string() }
-}
-
-fn remove_if_there(folder: &Path) -> Result<(), RunError> {
-    match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", folder)(error)),
-        _ => Ok(()),
-    }
 }
 
 fn append_line(path: &Path, line: &serde_json::Value) -> Result<(), RunError> {

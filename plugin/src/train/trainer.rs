@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::{
     arena_state::RestoreError,
+    checkpoint::CheckpointSummary,
     collect::Collector,
     config::{Algorithm, Experiment, ExperimentError},
     worlds::on_threads,
@@ -307,17 +308,35 @@ impl Progress {
         self.recent.drain(..surplus);
     }
 
+    /// Mean over the last episodes; `None` before the first has ended.
+    fn mean(&self, value: fn(&RecentEpisode) -> f64) -> Option<f64> {
+        let n = self.recent.len();
+        (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
+    }
+
+    fn episodic_return(&self) -> Option<f64> {
+        self.mean(|episode| episode.total_reward)
+    }
+
+    fn success_rate(&self) -> Option<f64> {
+        self.mean(|episode| f64::from(u8::from(episode.success)))
+    }
+
+    pub(crate) fn summary(&self) -> CheckpointSummary {
+        CheckpointSummary {
+            step: self.steps,
+            episodic_return: self.episodic_return(),
+            success_rate: self.success_rate(),
+        }
+    }
+
     fn report(&self, learner: UpdateMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
-        let mean = |value: fn(&RecentEpisode) -> f64| {
-            let n = self.recent.len();
-            (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
-        };
         UpdateReport {
             update: self.updates,
             step: self.steps,
-            episodic_return: mean(|episode| episode.total_reward),
-            episodic_length: mean(|episode| f64::from(episode.ticks)),
-            success_rate: mean(|episode| f64::from(u8::from(episode.success))),
+            episodic_return: self.episodic_return(),
+            episodic_length: self.mean(|episode| f64::from(episode.ticks)),
+            success_rate: self.success_rate(),
             initial_kl,
             learner,
             timing,

@@ -1,0 +1,136 @@
+//! Trainings that are killed, run out of disk or run away: nothing that was saved is lost.
+
+use std::{
+    path::Path,
+    process::{Command, Output, Stdio},
+    time::Duration,
+};
+
+const UPDATES: usize = 60;
+
+/// A small training; `more` is added to its settings of PPO.
+fn write_experiment(folder: &Path, more: &str) {
+    let text = format!(
+        r#"(
+    game: "coinrun", train: "hard:0..7", test: "hard:64..71", demos: "none",
+    steps: {steps}, arenas: 8, worlds: 2,
+    ppo: (num_steps: 32, minibatches: 4, hidden: [32, 32], {more}),
+    checkpoints: (every: 2, keep: 2),
+)"#,
+        steps = UPDATES * 8 * 32
+    );
+    std::fs::write(folder.join("small.ron"), text).expect("writable");
+}
+
+fn train(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+    command.args(["train", "--algorithm", "ppo", "--experiment", "small.ron"]).args(args).current_dir(folder);
+    command
+}
+
+fn resume(folder: &Path, run: &str) -> Output {
+    let args = ["train", "--resume", "--run", run];
+    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Metrics, and weights and arenas of the last checkpoint.
+fn results(run: &Path) -> Vec<Vec<u8>> {
+    let last = steps(run).pop().expect("a checkpoint");
+    let last = run.join("checkpoints").join(last);
+    [run.join("metrics.jsonl"), last.join("learner.safetensors"), last.join("arenas.json")]
+        .map(|path| std::fs::read(path).expect("readable"))
+        .to_vec()
+}
+
+/// Names of the checkpoints, in order.
+fn steps(run: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(run.join("checkpoints")).expect("a run");
+    let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
+    let mut names: Vec<_> = names.filter(|name| name.starts_with("step-")).collect();
+    names.sort();
+    names
+}
+
+fn logged(run: &Path) -> usize {
+    std::fs::read_to_string(run.join("metrics.jsonl")).unwrap_or_default().lines().count()
+}
+
+#[test]
+fn a_killed_training_goes_on_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_experiment(folder.path(), "");
+    let whole = train(folder.path(), &["--run", "whole"]).output().expect("the program starts");
+    assert!(whole.status.success(), "{}", errors(&whole));
+
+    let run = folder.path().join("killed");
+    let mut child =
+        train(folder.path(), &["--run", "killed"]).stderr(Stdio::null()).spawn().expect("the program starts");
+    while logged(&run) < 5 {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // SIGKILL: no handler runs, whatever was being written stays as it is.
+    child.kill().expect("it runs");
+    child.wait().expect("a child");
+    assert!(logged(&run) < UPDATES, "it was killed too late to prove anything");
+    let resumed = resume(folder.path(), "killed");
+    assert!(resumed.status.success(), "{}", errors(&resumed));
+    assert!(results(&folder.path().join("whole")) == results(&run), "killing it changed the result");
+}
+
+#[test]
+fn a_torn_checkpoint_is_passed_over_for_the_one_before() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_experiment(folder.path(), "");
+    let whole = train(folder.path(), &["--run", "whole"]).output().expect("the program starts");
+    assert!(whole.status.success(), "{}", errors(&whole));
+    let run = folder.path().join("whole");
+    let before = results(&run);
+    let last = run.join("checkpoints").join(steps(&run).pop().expect("a checkpoint")).join("learner.safetensors");
+    let bytes = std::fs::read(&last).expect("readable");
+    std::fs::write(&last, &bytes[..bytes.len() / 2]).expect("writable");
+    let resumed = resume(folder.path(), "whole");
+    assert!(resumed.status.success(), "{}", errors(&resumed));
+    assert!(errors(&resumed).contains("cannot be read"), "{}", errors(&resumed));
+    assert!(results(&run) == before, "going on from the checkpoint before changed the result");
+}
+
+#[test]
+fn a_training_that_runs_away_names_the_tensor_and_the_last_good_checkpoint() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_experiment(folder.path(), "lr: 1e30");
+    let output = train(folder.path(), &["--run", "wild"]).output().expect("the program starts");
+    assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+    let text = errors(&output);
+    assert!(text.contains("is not finite") && text.contains("wild/checkpoints/step-000000000000"), "{text}");
+    assert!(text.contains("learning rate"), "{text}");
+    assert_eq!(steps(&folder.path().join("wild")), ["step-000000000000"]);
+}
+
+/// A limit on the size of files stands for a full disk: a write fails in the middle of a checkpoint.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_the_old_checkpoint() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_experiment(folder.path(), "");
+    let start = train(folder.path(), &["--run", "full", "--steps", "512"]).output().expect("the program starts");
+    assert!(start.status.success(), "{}", errors(&start));
+    let run = folder.path().join("full");
+    let (before, results_before) = (steps(&run), results(&run));
+    let limited = format!(
+        "trap '' XFSZ; ulimit -f 64; exec {} train --resume --run full --steps 5120",
+        env!("CARGO_BIN_EXE_playbot")
+    );
+    let output = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().expect("a shell");
+    assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+    let text = errors(&output);
+    assert!(text.contains("learner.safetensors") && text.contains("--resume"), "{text}");
+    assert_eq!(steps(&run), before, "the old checkpoints are still there and no new one is");
+    assert!(results(&run)[1..] == results_before[1..], "the old checkpoint was touched");
+    let resumed = resume(folder.path(), "full");
+    assert!(resumed.status.success(), "with room again it goes on: {}", errors(&resumed));
+}
