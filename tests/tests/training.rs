@@ -98,7 +98,7 @@ fn bytes(folder: &Path) -> Vec<Vec<u8>> {
 fn the_same_seed_gives_the_same_bytes_on_one_and_on_two_threads() {
     let folder = tempfile::tempdir().expect("a folder");
     let skills = skills(folder.path());
-    for algorithm in Algorithm::ALL {
+    for algorithm in Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()) {
         let results: Vec<_> = [1, 2, 2]
             .into_iter()
             .enumerate()
@@ -117,7 +117,7 @@ fn the_same_seed_gives_the_same_bytes_on_one_and_on_two_threads() {
 fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let skills = skills(folder.path());
-    for algorithm in Algorithm::ALL {
+    for algorithm in Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()) {
         let (whole, halved) =
             (folder.path().join(format!("{algorithm}-w")), folder.path().join(format!("{algorithm}-h")));
         train(&whole, trainer(algorithm, &skills, 2), None);

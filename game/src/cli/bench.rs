@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment,
+    experiment::ExperimentArgs,
 };
 use crate::{coinrun::CoinRun, registry};
 
@@ -136,7 +136,7 @@ fn simulate(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
 
 /// PPO on state vectors with 256 steps a rollout, 3 epochs, 8 minibatches.
 fn train(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
-    let mut experiment = experiment::load(None)?;
+    let mut experiment = ExperimentArgs::default().load([])?;
     experiment.arenas = args.arenas;
     experiment.worlds = args.threads as u32;
     experiment.ppo.num_steps = 256;

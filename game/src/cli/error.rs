@@ -8,7 +8,9 @@ use bevy_playbot::{
     game::UnknownName,
     learner::{FileError, LearnError},
     split::SplitError,
-    train::{config::ExperimentError, config_file::ConfigError, run_dir::RunError, trainer::TrainError},
+    train::{
+        config::ExperimentError, config_file::ConfigError, run_dir::RunError, study::StudyError, trainer::TrainError,
+    },
 };
 use thiserror::Error;
 
@@ -65,6 +67,8 @@ pub enum CliError {
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
     #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error(transparent)]
     Run(#[from] RunError),
     #[error(transparent)]
     Train(#[from] TrainError),
@@ -84,9 +88,13 @@ impl CliError {
     /// 3 for what the caller can put right by calling differently, 2 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) | Self::Name(_) | Self::Split(_) | Self::Config(_) | Self::Experiment(_) | Self::Demo(_) => {
-                3
-            }
+            Self::Usage(_)
+            | Self::Name(_)
+            | Self::Split(_)
+            | Self::Config(_)
+            | Self::Experiment(_)
+            | Self::Study(_)
+            | Self::Demo(_) => 3,
             Self::File(error) => file_code(error),
             Self::Run(error) | Self::NotSaved { error, .. } => match error {
                 RunError::Io { .. } => 2,

@@ -15,7 +15,8 @@ use bevy_playbot::{
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment, methods,
+    experiment::{ExperimentArgs, option},
+    methods,
 };
 use crate::registry;
 
@@ -48,9 +49,8 @@ pub struct Args {
     /// Take the most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
-    /// Experiment file; the run's own, or the built-in CoinRun experiment if there is no run.
-    #[arg(long)]
-    experiment: Option<PathBuf>,
+    #[command(flatten)]
+    from: ExperimentArgs,
     /// Seed of the players' draws, instead of the experiment's.
     #[arg(long)]
     seed: Option<u64>,
@@ -71,15 +71,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
             "nobody to measure: name a --run, a --skills file or a --bot (see `playbot eval --help`)".to_owned(),
         ));
     }
-    let mut experiment = read_experiment(&args)?;
-    experiment.seed = args.seed.unwrap_or(experiment.seed);
+    let experiment = read_experiment(&args)?;
     let game = registry::game(&experiment.game)?;
     let players = players(game, &experiment, &args)?;
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
-    let episodes = args.episodes_per_level.unwrap_or(experiment.eval.episodes_per_level);
-    if episodes == 0 {
-        return Err(CliError::Usage("--episodes-per-level is 0: a verdict needs at least one episode".to_owned()));
-    }
+    let episodes = experiment.eval.episodes_per_level;
     let mut rows = Vec::new();
     for split in &splits {
         check_mode(game, &split.mode)?;
@@ -99,9 +95,14 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 }
 
 fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
-    match (&args.experiment, args.run.first()) {
-        (None, Some(run)) => Ok(RunDir::open(run)?.1),
-        (path, _) => Ok(experiment::load(path.as_deref())?),
+    let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
+    match (&args.from.experiment, args.run.first()) {
+        (None, Some(run)) => {
+            let experiment = RunDir::open(run)?.1.with_set(&args.from.sets(options))?;
+            experiment.check()?;
+            Ok(experiment)
+        }
+        _ => Ok(args.from.load(options)?),
     }
 }
 

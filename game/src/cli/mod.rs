@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 
 mod bench;
+mod config;
 mod demo;
 mod error;
 mod eval;
@@ -13,6 +14,8 @@ mod methods;
 mod progress;
 mod quickstart;
 mod record;
+mod study;
+mod study_run;
 mod trace;
 mod train;
 
@@ -43,6 +46,8 @@ Examples:
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
+  playbot config show --set ppo.lr=0.0003          an experiment with all its values
+  playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
 
@@ -58,6 +63,10 @@ enum Verb {
     LearnSkills(learn_skills::Args),
     /// Train a policy.
     Train(train::Args),
+    /// Compare variants of an experiment over several seeds.
+    Study(study::Args),
+    /// Show experiments with all their values, and the presets to build them on.
+    Config(config::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
     /// Show a level.
@@ -103,6 +112,8 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Demo(args) => demo::run(args),
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),
+        Verb::Study(args) => study::run(args),
+        Verb::Config(args) => config::run(args),
         Verb::Eval(args) => eval::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),

@@ -216,6 +216,11 @@ impl Experiment {
         Ok(())
     }
 
+    /// The experiment of a single run: without what only a study reads.
+    pub fn without_study(&self) -> Self {
+        Self { seeds: Vec::new(), variants: Vec::new(), ..self.clone() }
+    }
+
     /// The settings of PPO as the learner gets them: a learning rate that falls does so over the whole training, unless
     /// the experiment says otherwise.
     pub fn ppo_config(&self) -> PpoConfig {

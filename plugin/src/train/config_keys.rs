@@ -20,12 +20,14 @@ use super::{
 /// Where a value was written.
 #[derive(Clone, Debug)]
 pub(super) enum Origin {
-    /// In a file, at this line and column.
+    /// In a file, at these lines and columns.
     File {
         /// The file.
         path: PathBuf,
+        /// Line and column of the key.
+        key: (usize, usize),
         /// Line and column of the value.
-        at: (usize, usize),
+        value: (usize, usize),
     },
     /// In a text `key=value`.
     Set(String),
@@ -33,18 +35,28 @@ pub(super) enum Origin {
 
 impl Origin {
     pub(super) fn start_of(path: &Path) -> Self {
-        Self::File { path: path.into(), at: (1, 1) }
+        Self::File { path: path.into(), key: (1, 1), value: (1, 1) }
     }
 
     /// An error at a line and column of the value, both from 1.
     pub(super) fn error(&self, (line, column): (usize, usize), message: String) -> ConfigError {
         match self {
-            Self::File { path, at } => ConfigError::Syntax {
+            Self::File { path, value, .. } => ConfigError::Syntax {
                 path: path.clone(),
-                line: at.0 + line - 1,
-                column: if line == 1 { at.1 + column - 1 } else { column },
+                line: value.0 + line - 1,
+                column: if line == 1 { value.1 + column - 1 } else { column },
                 message,
             },
+            Self::Set(set) => ConfigError::Set { set: set.clone(), message },
+        }
+    }
+
+    /// An error of the key itself.
+    pub(super) fn key_error(&self, message: String) -> ConfigError {
+        match self {
+            Self::File { path, key, .. } => {
+                ConfigError::Syntax { path: path.clone(), line: key.0, column: key.1, message }
+            }
             Self::Set(set) => ConfigError::Set { set: set.clone(), message },
         }
     }
@@ -92,11 +104,12 @@ impl Keys {
     pub(super) fn of_text(text: &str, path: &Path) -> Result<Self, ConfigError> {
         let start = Origin::start_of(path);
         check_syntax(text).map_err(|error| {
-            let at = (error.span.start.line, error.span.start.col);
+            let at = (error.span.end.line, error.span.end.col);
             start.error(at, error.code.to_string())
         })?;
         let mut keys = Self::default();
-        let origin = |at| Origin::File { path: path.into(), at: position(text, at) };
+        let origin =
+            |key, value| Origin::File { path: path.into(), key: position(text, key), value: position(text, value) };
         keys.collect(text, 0, "", &origin, &|key, _| ALL.is_section(key))?;
         Ok(keys)
     }
@@ -109,7 +122,7 @@ impl Keys {
     pub(super) fn of_set(section: &str, text: &str, origin: &Origin) -> Result<Self, ConfigError> {
         check_syntax(text).map_err(|error| origin.error((1, 1), error.code.to_string()))?;
         let mut keys = Self::default();
-        keys.collect(text, 0, &format!("{section}."), &|_| origin.clone(), &|key, _| ALL.is_section(key))?;
+        keys.collect(text, 0, &format!("{section}."), &|_, _| origin.clone(), &|key, _| ALL.is_section(key))?;
         Ok(keys)
     }
 
@@ -122,7 +135,7 @@ impl Keys {
         let text = experiment.to_ron().map_err(|error| origin.error((1, 1), error.to_string()))?;
         let mut keys = Self::default();
         // Told by their looks, since it is an example that says what is a section; variants of enums have a name.
-        keys.collect(&text, 0, "", &|_| origin.clone(), &|_, value| value.starts_with('('))?;
+        keys.collect(&text, 0, "", &|_, _| origin.clone(), &|_, value| value.starts_with('('))?;
         Ok(keys)
     }
 
@@ -132,22 +145,23 @@ impl Keys {
         text: &str,
         at: usize,
         prefix: &str,
-        origin: &dyn Fn(usize) -> Origin,
+        origin: &dyn Fn(usize, usize) -> Origin,
         is_section: &dyn Fn(&str, &str) -> bool,
     ) -> Result<(), ConfigError> {
         let Some(fields) = fields(text, at) else {
             let message = "an experiment is a list of keys in round brackets: (key: value, ...)";
-            return Err(origin(at).error((1, 1), message.to_owned()));
+            return Err(origin(at, at).key_error(message.to_owned()));
         };
         for (index, field) in fields.iter().enumerate() {
             let key = format!("{prefix}{}", field.key);
+            let origin_here = origin(field.key_at, field.value_at);
             if fields[..index].iter().any(|before| before.key == field.key) {
-                return Err(origin(field.key_at).error((1, 1), format!("`{key}` is there twice")));
+                return Err(origin_here.key_error(format!("`{key}` is there twice")));
             }
             if is_section(&key, field.value) && self::fields(text, field.value_at).is_some() {
                 self.collect(text, field.value_at, &format!("{key}."), origin, is_section)?;
             } else {
-                self.put(key, Value { text: field.value.to_owned(), origin: origin(field.value_at) });
+                self.put(key, Value { text: field.value.to_owned(), origin: origin_here });
             }
         }
         Ok(())
@@ -160,7 +174,7 @@ impl Keys {
     /// The unknown key with the nearest one that exists.
     pub(super) fn check_names(&self) -> Result<(), ConfigError> {
         match self.0.iter().find(|(key, _)| !ALL.0.contains_key(*key)) {
-            Some((key, value)) => Err(value.origin.error((1, 1), unknown_key(key))),
+            Some((key, value)) => Err(value.origin.key_error(unknown_key(key))),
             None => Ok(()),
         }
     }
@@ -230,15 +244,17 @@ impl Keys {
         {
             return whole.error((1, 1), format!("`{field}` is missing"));
         }
-        let at = error.span.start;
-        let found = lines.iter().rev().find(|(line, _)| *line <= at.line);
-        match found.and_then(|(line, key)| Some((line, *key, self.0.get(*key)?))) {
-            Some((line, key, value)) => {
-                let message = type_message(&error.code, key, &value.text, || self.valid_names(key));
-                value.origin.error((at.line - line + 1, at.col), message)
-            }
-            None => whole.error((1, 1), error.code.to_string()),
-        }
+        let of = |at: ron::error::Position| lines.iter().rposition(|(line, _)| *line <= at.line);
+        // The reader says from where to where it was; of what it refused at once only the end lies in the value.
+        let ron::error::Span { start, end } = error.span;
+        let at = if of(start) == of(end) { start } else { end };
+        let Some((key, line)) = of(end).map(|index| (lines[index].1, lines[index].0)) else {
+            return whole.error((1, 1), error.code.to_string());
+        };
+        let value = &self.0[key];
+        let message = type_message(&error.code, key, &value.text, || self.valid_names(key));
+        let within = (1..=value.text.lines().count()).contains(&(at.line + 1 - line));
+        value.origin.error(if within { (at.line + 1 - line, at.col) } else { (1, 1) }, message)
     }
 
     /// The names of which this key takes one, if it is of that kind: those that the reader says when it gets another.

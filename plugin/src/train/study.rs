@@ -83,11 +83,11 @@ pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> 
     }
     let mut runs = Vec::new();
     for variant in variants(experiment)? {
-        let mut changed = experiment
+        let changed = experiment
+            .without_study()
             .with_set(&variant.set)
-            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source })?;
-        changed.variants.clear();
-        changed.seeds.clear();
+            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source })?
+            .without_study();
         changed.check().map_err(|source| StudyError::Values { variant: variant.name.clone(), source })?;
         runs.extend(seeds.iter().map(|&seed| StudyRun {
             variant: variant.name.clone(),
@@ -112,4 +112,62 @@ fn variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyError> {
         }
     }
     Ok(experiment.variants.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::train::{Algorithm, config_file::parse_experiment};
+
+    fn experiment(variants: &str) -> Experiment {
+        let text = format!(
+            r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos", steps: 1000, seeds: [3, 5],
+            variants: [{variants}])"#
+        );
+        parse_experiment(&text, Path::new("x.ron")).expect("valid")
+    }
+
+    fn error(variants: &str) -> String {
+        study_runs(&experiment(variants)).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn every_variant_runs_with_every_seed_and_shares_skills_where_it_can() {
+        let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false", "seed=9"]),
+            (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"])"#;
+        let runs = study_runs(&experiment(variants)).expect("valid");
+        let ids: Vec<String> = runs.iter().map(StudyRun::id).collect();
+        let expected = ["full", "no-kl", "short", "ppo"].map(|name| [3, 5].map(|seed| format!("{name}-seed{seed}")));
+        assert_eq!(ids, expected.concat());
+        assert!(runs.iter().all(|run| run.experiment.variants.is_empty() && run.experiment.seeds.is_empty()));
+        assert!(!runs[2].experiment.score.kl && runs[0].experiment.score.kl);
+        assert_eq!(runs[7].experiment.algorithm, Algorithm::Ppo);
+        let skills: Vec<String> = runs.iter().map(|run| run.skill_file().expect("Unicode")).collect();
+        assert_eq!((&skills[0], &skills[1]), (&skills[2], &skills[3]), "the same skill settings");
+        assert_ne!(skills[0], skills[1], "other seeds");
+        assert_ne!(skills[0], skills[4], "other windows");
+    }
+
+    #[test]
+    fn an_experiment_without_variants_is_its_own_only_one() {
+        let mut experiment = experiment("");
+        experiment.seeds.clear();
+        let runs = study_runs(&experiment).expect("valid");
+        assert_eq!(runs.iter().map(StudyRun::id).collect::<Vec<_>>(), ["score-ppo-seed1"]);
+    }
+
+    #[test]
+    fn a_variant_that_does_not_fit_is_named_before_anything_runs() {
+        let text = error(r#"(name: "a"), (name: "b", set: ["score.kll=false"])"#);
+        assert!(text.contains("variant `b`") && text.contains("`score.kl`"), "{text}");
+        let text = error(r#"(name: "b", set: ["ppo.minibatches=7"])"#);
+        assert!(text.contains("variant `b`") && text.contains("must divide"), "{text}");
+        assert!(error(r#"(name: "a"), (name: "a")"#).contains("two variants"));
+        assert!(error(r#"(name: "../a")"#).contains("letters, digits"));
+        let mut twice = experiment("");
+        twice.seeds = vec![1, 2, 1];
+        assert!(study_runs(&twice).expect_err("twice").to_string().contains("seed 1"));
+    }
 }

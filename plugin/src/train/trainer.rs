@@ -39,6 +39,9 @@ pub enum TrainError {
     /// The algorithm needs a skill model.
     #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
     NoSkills(Algorithm),
+    /// The algorithm does not learn from play.
+    #[error("{0} is not trained: measure its skill model with `playbot eval --skills`")]
+    NotTrained(Algorithm),
     /// The skill model was learned for another game.
     #[error(
         "the skill model was learned for {model_obs} observation values and {model_actions:?}, but `{game}` has \
@@ -278,6 +281,9 @@ fn new_learner(
     if !algorithm.needs_skills() {
         let spec = PolicySpec { obs_dim, latent: 0, action_space };
         return Ok(PpoLearner::new(config, spec, experiment.seed, device)?);
+    }
+    if !algorithm.is_trained() {
+        return Err(TrainError::NotTrained(algorithm));
     }
     let skills = skills.ok_or(TrainError::NoSkills(algorithm))?;
     if (skills.obs_dim(), skills.action_space()) != (obs_dim, action_space) {
