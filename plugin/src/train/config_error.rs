@@ -116,6 +116,11 @@ pub(super) fn type_message(
     }
 }
 
+/// What to say about a text that is no value at all.
+pub(super) fn no_value(key: &str, text: &str, error: &ron::Error) -> String {
+    format!("`{key}` must be {}; `{text}` is not a value ({error})", kind(Keys::all().text(key)))
+}
+
 fn one_of(key: &str, found: &str, names: &[&str]) -> String {
     let hint = nearest(found, names).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
     format!("`{key}` cannot be `{found}`{hint}; valid: {}", names.join(", "))
@@ -131,6 +136,6 @@ fn kind(example: Option<&str>) -> String {
         Some('0'..='9') => format!("a whole number such as {example}"),
         _ if matches!(example, "true" | "false") => "true or false".to_owned(),
         _ if example == "None" => "None or Some(value)".to_owned(),
-        _ => "another kind of value".to_owned(),
+        _ => format!("a name such as {example}"),
     }
 }

@@ -133,7 +133,7 @@ mod tests {
         for (good, bad, line, words) in [
             ("gamma", "gama", "x.ron:4:11:", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
             ("steps:", "step:", "x.ron:3:5:", "unknown key `step`; did you mean `steps`?"),
-            ("ppo: (", "pop: (", "x.ron:4:11:", "did you mean `ppo.gamma`?"),
+            ("ppo: (", "pppo: (", "x.ron:4:5:", "did you mean `ppo`?"),
             ("gamma", "horizon", "x.ron:4:11:", "did you mean `score.horizon`?"),
             ("gamma", "qqq", "x.ron:4:11:", "valid keys in `ppo`: activation, adam_eps, anneal_lr,"),
             ("steps:", "qqq:", "x.ron:3:5:", "valid keys: algorithm, arenas,"),

@@ -2,7 +2,7 @@
 
 use super::{
     config::Experiment,
-    config_error::{ConfigError, unknown_key},
+    config_error::{ConfigError, no_value, unknown_key},
     config_keys::{Keys, Origin, Value, check_syntax},
 };
 
@@ -45,7 +45,7 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
     } else {
         text.to_owned()
     };
-    check_syntax(&text).map_err(|error| refuse(format!("`{text}` is not a value: {}", error.code)))?;
+    check_syntax(&text).map_err(|error| refuse(no_value(key, &text, &error.code)))?;
     keys.put(key.to_owned(), Value { text, origin: origin.clone() });
     keys.parse(&origin)
 }
@@ -125,7 +125,7 @@ mod tests {
             ("kl_coef=1", "did you mean `score.kl_coef`?"),
             ("pop.lr=1", "did you mean `ppo.lr`?"),
             ("ppo.qqq=1", "valid keys in `ppo`: activation"),
-            ("steps.more=1", "did you mean `steps`"),
+            ("steps.more=1", "`steps` has no keys"),
             ("ppo=3", "`ppo` is a section"),
             ("ppo=(gama: 1)", "did you mean `ppo.gamma`?"),
             ("ppo.lr=fast", "`ppo.lr` must be a number such as 0.0005, not fast"),
