@@ -10,6 +10,7 @@ mod interrupt;
 mod learn_skills;
 mod level;
 mod methods;
+mod policy;
 mod progress;
 mod quickstart;
 mod record;
@@ -43,6 +44,7 @@ Examples:
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
+  playbot policy export --run runs/first --out coinrun.policy
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
 
@@ -60,6 +62,8 @@ enum Verb {
     Train(train::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
+    /// Make and look at policy files.
+    Policy(policy::Args),
     /// Show a level.
     Level(level::Args),
     /// Play given actions and print the state after each.
@@ -104,6 +108,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),
         Verb::Eval(args) => eval::run(args),
+        Verb::Policy(args) => policy::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),
         Verb::Bench(args) => bench::run(args),

@@ -155,14 +155,14 @@ pub fn drive(
 }
 
 fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
-    run.save(trainer).map_err(|error| CliError::NotSaved { error, run: run.path().into() })
+    run.save(trainer).map_err(|error| CliError::NotSaved { error: error.into(), run: run.path().into() })
 }
 
 /// The error of a training, with the checkpoint that is left if its numbers ran away.
 fn stopped_by(run: &RunDir, error: TrainError) -> CliError {
     match (&error, run.checkpoint(Which::Last)) {
         (TrainError::Learn(LearnError::NotFinite { .. }), Ok(checkpoint)) => {
-            CliError::Diverged { error, step: checkpoint.summary.step, checkpoint: checkpoint.path }
+            CliError::Diverged { error: error.into(), step: checkpoint.summary.step, checkpoint: checkpoint.path }
         }
         _ => error.into(),
     }

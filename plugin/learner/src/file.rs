@@ -4,7 +4,7 @@ use crate::nn::{Adam, ParamVisitor, Parameters, host};
 use crate::{FileError, LearnError};
 use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io::Write;
@@ -12,6 +12,13 @@ use std::path::{Path, PathBuf};
 
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";
+
+/// What every description begins with.
+#[derive(Deserialize)]
+struct Format {
+    kind: String,
+    version: u32,
+}
 
 /// A tensor in host memory.
 #[derive(Clone, Debug)]
@@ -82,15 +89,20 @@ impl TensorFile {
 
     /// Reads a whole file.
     pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
-        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
         let bytes = fs::read(path).map_err(|source| FileError::Io { path: path.to_owned(), source })?;
-        let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Takes a whole file from memory; `path` is for messages.
+    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
+        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
         let description = metadata
             .metadata()
             .as_ref()
             .and_then(|map| map.get(DESCRIPTION).cloned())
             .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry")))?;
-        let views = SafeTensors::deserialize(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let views = SafeTensors::deserialize(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
         let tensors = views
             .iter()
             .map(|(name, view)| {
@@ -151,13 +163,23 @@ impl TensorFile {
         Ok(())
     }
 
-    /// `Ok` if the file calls itself a `kind` of `version`.
-    pub(crate) fn check_kind(&self, (kind, version): (&str, u32), found: (&str, u32)) -> Result<(), FileError> {
-        if found == (kind, version) {
-            return Ok(());
+    /// `Ok` if the file calls itself a `kind` of `version`. Comes before [`Self::description`], which a newer version may
+    /// have changed.
+    pub(crate) fn check_format(&self, kind: &'static str, version: u32) -> Result<(), FileError> {
+        let found: Format = self.description()?;
+        if found.kind != kind {
+            return Err(self.format(format!("is a {}, expected a {kind}", found.kind)));
         }
-        let (found, other) = found;
-        Err(self.format(format!("is a {found} of version {other}, expected a {kind} of version {version}")))
+        if found.version > version {
+            let path = self.path.clone();
+            return Err(FileError::Newer { path, kind, found: found.version, readable: version });
+        }
+        if found.version < version {
+            let detail =
+                format!("is a {kind} of the old format {}, this program reads format {version}", found.version);
+            return Err(self.format(detail));
+        }
+        Ok(())
     }
 
     /// Fails if any tensor was not taken out.
@@ -166,6 +188,11 @@ impl TensorFile {
             None => Ok(()),
             Some(name) => Err(FileError::ExtraTensor { path: self.path, name }),
         }
+    }
+
+    /// The file's name.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// An error about this file's contents.

@@ -43,7 +43,7 @@ mod space;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
-pub use policy::{Policy, PolicyOutput, StdKind};
+pub use policy::{Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
 pub use ppo::{EndStates, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
 pub use rng::{RngState, Streams};
 pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};

@@ -164,7 +164,7 @@ impl Trainer {
         learner: PpoLearner,
         threads: usize,
     ) -> Result<Self, TrainError> {
-        let prior = skill_prior(experiment, &learner);
+        let prior = learner.skills().as_ref().map(SkillPrior::from);
         let share = experiment.arenas / experiment.worlds;
         let collectors = (0..experiment.worlds)
             .map(|world| Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone()))
@@ -254,7 +254,7 @@ impl Trainer {
 
     /// Where the policy's skills come from, if it has any.
     pub fn skill_prior(&self) -> Option<SkillPrior> {
-        skill_prior(&self.experiment, &self.learner)
+        self.learner.skills().as_ref().map(SkillPrior::from)
     }
 }
 
@@ -290,11 +290,6 @@ fn new_learner(
         });
     }
     Ok(PpoLearner::with_skill(config, experiment.score.clone(), skills, experiment.seed, device)?)
-}
-
-fn skill_prior(experiment: &Experiment, learner: &PpoLearner) -> Option<SkillPrior> {
-    let (horizon, draw) = (experiment.score.horizon as u32, experiment.score.skill_draw);
-    learner.prior().map(|prior| SkillPrior { prior, horizon, draw })
 }
 
 impl Progress {

@@ -13,12 +13,12 @@ use std::sync::Arc;
 /// are in the batch or on the number of threads.
 #[derive(Clone, Debug)]
 pub struct Policy {
-    actor: Actor,
-    critic: Option<Critic>,
-    stats: Option<Arc<ObsStats>>,
-    space: ActionSpace,
-    obs_dim: usize,
-    latent: usize,
+    pub(super) actor: Actor,
+    pub(super) critic: Option<Critic>,
+    pub(super) stats: Option<Arc<ObsStats>>,
+    pub(super) space: ActionSpace,
+    pub(super) obs_dim: usize,
+    pub(super) latent: usize,
     device: Device,
 }
 

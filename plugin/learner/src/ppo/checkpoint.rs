@@ -73,8 +73,8 @@ impl PpoLearner {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
+        file.check_format(KIND, VERSION)?;
         let header: Header = file.description()?;
-        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
         let skill = match (header.score, header.skill) {
             (Some(config), Some(description)) => {
                 let nets = description.nets(device).map_err(|e| file.learner(e))?;

@@ -6,7 +6,7 @@ use super::update::{StepMetrics, gradient_step};
 use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
 use crate::nn::{Adam, AdamConfig, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, Critic, NetShape, Policy, StdKind};
+use crate::policy::{Actor, Critic, NetShape, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
 use crate::score::{PriorKind, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
@@ -151,6 +151,15 @@ impl PpoLearner {
                 Prior::learned(&skill.prior, skill.description.obs_dim, latent, tanh, device)
             }
         })
+    }
+
+    /// Where the policy's skills come from, and its decoder; `None` without a skill model.
+    pub fn skills(&self) -> Option<SkillSource> {
+        let skill = self.skill.as_ref()?;
+        let widths = (skill.description.obs_dim, skill.description.config.latent);
+        let decoder = Policy::new(&skill.decoder, None, None, self.spec.action_space, widths, self.device.plain());
+        let (horizon, draw) = (skill.config.horizon, skill.config.skill_draw);
+        Some(SkillSource { prior: self.prior()?, decoder, horizon, draw })
     }
 
     /// A snapshot of the policy that plays, with its critic.

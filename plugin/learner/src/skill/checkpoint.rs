@@ -60,8 +60,8 @@ impl SkillTrainer {
     /// [`FileError`] says what is wrong with the file or does not fit the demonstrations.
     pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
+        file.check_format(KIND, VERSION)?;
         let header: Header = file.description()?;
-        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
         let skill = header.skill;
         for (what, expected, found) in [
             ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),
