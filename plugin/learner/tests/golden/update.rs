@@ -4,11 +4,9 @@ use crate::case::{Case, host};
 use burn::tensor::{Tensor, TensorData};
 use playbot_learner::nn::{ActionRows, Activation, Adam, AdamConfig, ParamVisitor, Parameters, tracked};
 use playbot_learner::policy::{Actor, Critic, NetShape};
-use playbot_learner::ppo::{
-    DecoderBatch, Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages,
-};
+use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages};
 use playbot_learner::rng::Streams;
-use playbot_learner::score::alphas;
+use playbot_learner::score::{DecoderBatch, alphas};
 use playbot_learner::{ActionSpace, Actions, AlphaKind, DeviceKind, PpoConfig, ScoreConfig, StdKind};
 
 fn check(name: &str) {
