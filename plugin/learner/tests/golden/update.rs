@@ -176,7 +176,7 @@ impl<'a> Update<'a> {
     }
 }
 
-struct After<'a>(&'a Case);
+pub struct After<'a>(pub &'a Case);
 
 impl ParamVisitor for After<'_> {
     fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
@@ -184,7 +184,7 @@ impl ParamVisitor for After<'_> {
     }
 }
 
-struct Names(Vec<String>);
+pub struct Names(pub Vec<String>);
 
 impl ParamVisitor for Names {
     fn visit<const D: usize>(&mut self, name: &str, _: &mut Tensor<D>) {
