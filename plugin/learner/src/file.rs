@@ -57,6 +57,18 @@ impl TensorFile {
         self.tensors.insert(name.to_owned(), Stored { shape, dtype: Dtype::F64, bytes });
     }
 
+    /// Adds a vector of whole numbers.
+    pub(crate) fn put_u32(&mut self, name: &str, values: &[u32]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.tensors.insert(name.to_owned(), Stored { shape: vec![values.len()], dtype: Dtype::U32, bytes });
+    }
+
+    /// Adds a vector of flags, as bytes 0 and 1.
+    pub(crate) fn put_flags(&mut self, name: &str, values: &[bool]) {
+        let bytes = values.iter().map(|&flag| u8::from(flag)).collect();
+        self.tensors.insert(name.to_owned(), Stored { shape: vec![values.len()], dtype: Dtype::U8, bytes });
+    }
+
     /// Adds all parameters of `network`.
     pub(crate) fn put_network<M: Parameters + Clone>(&mut self, prefix: &str, network: &M) -> Result<(), FileError> {
         let mut writer = Put { file: self, error: None };
@@ -131,6 +143,18 @@ impl TensorFile {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
+    /// Takes out a vector of `len` whole numbers.
+    pub(crate) fn take_u32(&mut self, name: &str, len: usize) -> Result<Vec<u32>, FileError> {
+        let bytes = self.take_bytes(name, Some(&[len]), Dtype::U32)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out a vector of `len` flags.
+    pub(crate) fn take_flags(&mut self, name: &str, len: usize) -> Result<Vec<bool>, FileError> {
+        let bytes = self.take_bytes(name, Some(&[len]), Dtype::U8)?;
+        Ok(bytes.into_iter().map(|byte| byte != 0).collect())
+    }
+
     /// Takes out all parameters of `network`, which gives their shapes, and puts them on `device`.
     pub(crate) fn take_network<M: Parameters>(
         &mut self,
@@ -143,17 +167,18 @@ impl TensorFile {
         reader.error.map_or(Ok(()), Err)
     }
 
-    /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`.
+    /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`, called by `prefix`.
     pub(crate) fn take_adam<M: Parameters>(
         &mut self,
         adam: &mut Adam,
+        prefix: &str,
         network: &mut M,
         steps: u64,
     ) -> Result<(), FileError> {
         adam.steps = steps;
         let mut names = Names(Vec::new());
         if steps > 0 {
-            network.visit("", &mut names);
+            network.visit(prefix, &mut names);
         }
         for (name, shape) in names.0 {
             let m = self.take(&format!("adam.m.{name}"), &shape)?;

@@ -87,7 +87,15 @@ struct PolicyShape {
 #[serde(deny_unknown_fields)]
 struct ActorShape {
     net: NetShape,
-    std: StdKind,
+    std: StdShape,
+}
+
+/// How an actor's standard deviation is made; without meaning for discrete actions.
+#[derive(Serialize, Deserialize)]
+enum StdShape {
+    Vector,
+    State,
+    Squashed(f64, f64),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -263,13 +271,22 @@ impl SkillsShape {
 
 impl ActorShape {
     fn of(actor: &Actor, obs_dim: usize) -> Self {
-        let std = if matches!(actor.log_std, LogStd::State(_)) { StdKind::State } else { StdKind::Vector };
+        let std = match actor.log_std {
+            LogStd::None | LogStd::Vector(_) => StdShape::Vector,
+            LogStd::State(_) => StdShape::State,
+            LogStd::Squashed { range: (low, high), .. } => StdShape::Squashed(low, high),
+        };
         Self { net: net_shape(&actor.net, obs_dim), std }
     }
 
     /// An actor of this shape, to be filled from a file.
     fn build(&self, space: ActionSpace, device: DeviceKind) -> Actor {
-        Actor::new(&self.net, space, self.std, &mut Streams::new(0).stream("", 0), &device.plain())
+        let (rng, device) = (&mut Streams::new(0).stream("", 0), &device.plain());
+        match self.std {
+            StdShape::Vector => Actor::new(&self.net, space, StdKind::Vector, rng, device),
+            StdShape::State => Actor::new(&self.net, space, StdKind::State, rng, device),
+            StdShape::Squashed(low, high) => Actor::squashed(&self.net, space, (low, high), rng, device),
+        }
     }
 }
 

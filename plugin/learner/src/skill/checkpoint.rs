@@ -76,7 +76,7 @@ impl SkillTrainer {
         let mut trainer = Self::new(skill.config, dataset, header.seed, device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut trainer.nets, &device.plain())?;
         trainer.nets = tracked(&trainer.nets);
-        file.take_adam(&mut trainer.adam, &mut trainer.nets, header.adam_steps)?;
+        file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;
         trainer.sums.count = header.batches;
         let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
         trainer.sums.total.copy_from_slice(&sums);
