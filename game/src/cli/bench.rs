@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment,
+    experiment::ExperimentArgs,
 };
 use crate::{coinrun::CoinRun, registry};
 
@@ -136,13 +136,14 @@ fn simulate(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
 
 /// PPO on state vectors with 256 steps a rollout, 3 epochs, 8 minibatches.
 fn train(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
-    let mut experiment = experiment::load(None)?;
+    let mut experiment = ExperimentArgs::default().load([])?;
     experiment.arenas = args.arenas;
     experiment.worlds = args.threads as u32;
+    experiment.algorithm = Algorithm::Ppo;
     experiment.ppo.num_steps = 256;
     experiment.ppo.epochs = 3;
     experiment.ppo.minibatches = 8;
-    let mut trainer = Trainer::new(game, &experiment, Algorithm::Ppo, None, DeviceKind::default(), args.threads)?;
+    let mut trainer = Trainer::new(game, &experiment, None, DeviceKind::default(), args.threads)?;
     trainer.update()?;
     trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
     let (start, before) = (Instant::now(), trainer.steps());

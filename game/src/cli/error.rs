@@ -9,7 +9,9 @@ use bevy_playbot::{
     learner::{FileError, LearnError},
     policy_file::{ExportError, PolicyMisfit},
     split::SplitError,
-    train::{config::ExperimentError, config_file::ConfigError, run_dir::RunError, trainer::TrainError},
+    train::{
+        config::ExperimentError, config_file::ConfigError, run_dir::RunError, study::StudyError, trainer::TrainError,
+    },
 };
 use thiserror::Error;
 
@@ -66,6 +68,8 @@ pub enum CliError {
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
     #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error(transparent)]
     Run(#[from] RunError),
     #[error(transparent)]
     Train(#[from] TrainError),
@@ -94,6 +98,7 @@ impl CliError {
             | Self::Split(_)
             | Self::Config(_)
             | Self::Experiment(_)
+            | Self::Study(_)
             | Self::Demo(_)
             | Self::Misfit(_) => 3,
             Self::File(error) | Self::Export(ExportError::File(error)) => file_code(error),

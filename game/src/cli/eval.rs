@@ -5,18 +5,19 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     eval::Player,
     game::{Game, check_mode},
-    learner::{DeviceKind, PolicyFile, PpoLearner, SkillModel, SkillSource},
+    learner::{DeviceKind, PolicyFile, SkillModel, SkillSource},
     policy::ActionDraw,
     policy_file::check_policy,
     report::to_text_table,
     skill_prior::SkillPrior,
     split::LevelSplit,
-    train::{Experiment, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
+    train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
 };
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment, methods,
+    experiment::{ExperimentArgs, option},
+    methods,
 };
 use crate::registry;
 
@@ -52,9 +53,8 @@ pub struct Args {
     /// Take the most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
-    /// Experiment file; the run's own, or the built-in CoinRun experiment if there is no run.
-    #[arg(long)]
-    experiment: Option<PathBuf>,
+    #[command(flatten)]
+    from: ExperimentArgs,
     /// Seed of the players' draws, instead of the experiment's.
     #[arg(long)]
     seed: Option<u64>,
@@ -76,15 +76,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
                 .to_owned(),
         ));
     }
-    let mut experiment = read_experiment(&args)?;
-    experiment.seed = args.seed.unwrap_or(experiment.seed);
+    let experiment = read_experiment(&args)?;
     let game = registry::game(&experiment.game)?;
     let players = players(game, &experiment, &args)?;
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
-    let episodes = args.episodes_per_level.unwrap_or(experiment.eval.episodes_per_level);
-    if episodes == 0 {
-        return Err(CliError::Usage("--episodes-per-level is 0: a verdict needs at least one episode".to_owned()));
-    }
+    let episodes = experiment.eval.episodes_per_level;
     let mut rows = Vec::new();
     for split in &splits {
         check_mode(game, &split.mode)?;
@@ -104,9 +100,14 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 }
 
 fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
-    match (&args.experiment, args.run.first()) {
-        (None, Some(run)) => Ok(RunDir::open(run)?.1),
-        (path, _) => Ok(experiment::load(path.as_deref())?),
+    let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
+    match (&args.from.experiment, args.run.first()) {
+        (None, Some(run)) => {
+            let experiment = RunDir::open(run)?.1.with_set(&args.from.sets(options))?;
+            experiment.check()?;
+            Ok(experiment)
+        }
+        _ => Ok(args.from.load(options)?),
     }
 }
 
@@ -115,7 +116,7 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     let mut players = Vec::new();
     for path in &args.run {
         let (run, _, info) = RunDir::open(path)?;
-        let learner = PpoLearner::load(&run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
+        let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         players.push((
             named(info.algorithm.name(), path, args.run.len()),

@@ -1,25 +1,53 @@
-//! Finding and reading experiments, from a path or from those that come with the program.
+//! Finding and reading experiments, from a path or from those that come with the program, with what the command line
+//! changes in them.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt::Display,
+    path::{Path, PathBuf},
+};
 
 use bevy_playbot::train::{
     Experiment,
-    config_file::{ConfigError, parse_experiment, read_experiment},
+    config_file::{ConfigError, parse_experiment_with, read_experiment_with},
 };
 
 /// The experiment of the quickstart, which also serves where none is named.
 pub const COINRUN: &str = include_str!("../../../assets/experiments/coinrun.ron");
 
-/// Reads an experiment file, or the built-in CoinRun experiment if none is named.
-///
-/// # Errors
-///
-/// [`ConfigError`] with file, line and column.
-pub fn load(path: Option<&Path>) -> Result<Experiment, ConfigError> {
-    match path {
-        Some(path) => read_experiment(path),
-        None => parse_experiment(COINRUN, Path::new("assets/experiments/coinrun.ron")),
+/// Which experiment, and what to change in it.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct ExperimentArgs {
+    /// Experiment file; without one the run's own where a run is read, otherwise the built-in CoinRun experiment.
+    #[arg(long, value_name = "FILE")]
+    pub experiment: Option<PathBuf>,
+    /// Change a value of the experiment, such as ppo.lr=0.0003; may be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl ExperimentArgs {
+    /// Reads the experiment, changes what `--set` and then what the options with names of their own say, and checks it.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] with file, line and column, or with the `key=value` that does not fit.
+    pub fn load(&self, options: impl IntoIterator<Item = Option<String>>) -> Result<Experiment, ConfigError> {
+        let sets = self.sets(options);
+        match &self.experiment {
+            Some(path) => read_experiment_with(path, &sets),
+            None => parse_experiment_with(COINRUN, Path::new("assets/experiments/coinrun.ron"), &sets),
+        }
     }
+
+    /// What `--set` and then what the options with names of their own say.
+    pub fn sets(&self, options: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
+        self.set.iter().cloned().chain(options.into_iter().flatten()).collect()
+    }
+}
+
+/// An option with a name of its own, as `key=value`.
+pub fn option<T: Display>(key: &str, value: &Option<T>) -> Option<String> {
+    value.as_ref().map(|value| format!("{key}={value}"))
 }
 
 /// A path of the repository: as given if it exists, otherwise below the sources the program was built from, so that

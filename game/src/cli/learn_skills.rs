@@ -15,7 +15,8 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment, interrupt, progress,
+    experiment::{self, ExperimentArgs, option},
+    interrupt, progress,
 };
 use crate::registry;
 
@@ -25,9 +26,8 @@ use crate::registry;
   playbot learn-skills --out skills.safetensors
   playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors")]
 pub struct Args {
-    /// Experiment file; the built-in CoinRun experiment if none is named.
-    #[arg(long)]
-    experiment: Option<PathBuf>,
+    #[command(flatten)]
+    from: ExperimentArgs,
     /// File or folder of recordings, instead of the experiment's.
     #[arg(long)]
     demos: Option<PathBuf>,
@@ -49,10 +49,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
-    let mut experiment = experiment::load(args.experiment.as_deref())?;
-    if let Some(epochs) = args.epochs {
-        experiment.skills.epochs = epochs;
-    }
+    let experiment = args.from.load([option("skills.epochs", &args.epochs)])?;
     if args.out.exists() && !args.force {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
     }

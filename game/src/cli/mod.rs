@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 
 mod bench;
+mod config;
 mod demo;
 mod error;
 mod eval;
@@ -14,6 +15,8 @@ mod policy;
 mod progress;
 mod quickstart;
 mod record;
+mod study;
+mod study_run;
 mod trace;
 mod train;
 
@@ -45,6 +48,8 @@ Examples:
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
   playbot policy export --run runs/first --out coinrun.policy
+  playbot config show --set ppo.lr=0.0003          an experiment with all its values
+  playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
 
@@ -60,6 +65,10 @@ enum Verb {
     LearnSkills(learn_skills::Args),
     /// Train a policy.
     Train(train::Args),
+    /// Compare variants of an experiment over several seeds.
+    Study(study::Args),
+    /// Show experiments with all their values, and the presets to build them on.
+    Config(config::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
     /// Make and look at policy files.
@@ -107,6 +116,8 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Demo(args) => demo::run(args),
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),
+        Verb::Study(args) => study::run(args),
+        Verb::Config(args) => config::run(args),
         Verb::Eval(args) => eval::run(args),
         Verb::Policy(args) => policy::run(args),
         Verb::Level(args) => level::run(args),

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
     game::Game,
-    learner::{DeviceKind, PolicyFile, PpoLearner, SkillModel},
+    learner::{DeviceKind, PolicyFile, SkillModel},
     policy_file::{check_policy, export_policy, policy_file},
-    train::{Experiment, checkpoint::Which, run_dir::RunDir},
+    train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
 };
 use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
     eval::cloning_skills,
-    experiment,
+    experiment::ExperimentArgs,
 };
 use crate::registry;
 
@@ -57,9 +57,8 @@ struct Export {
     /// Skill model: exports behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Option<PathBuf>,
-    /// Experiment that the skill model belongs to; the built-in CoinRun experiment if none is named.
-    #[arg(long, conflicts_with = "run")]
-    experiment: Option<PathBuf>,
+    #[command(flatten)]
+    from: ExperimentArgs,
     /// File to write.
     #[arg(long)]
     out: PathBuf,
@@ -81,7 +80,7 @@ fn export(args: &Export) -> Result<Outcome, CliError> {
     }
     let (game, experiment, file) = match (&args.run, &args.skills) {
         (Some(run), _) => from_run(run, args.checkpoint)?,
-        (None, Some(skills)) => from_skills(skills, args.experiment.as_deref())?,
+        (None, Some(skills)) => from_skills(skills, &args.from)?,
         (None, None) => return Err(CliError::Usage("nothing to export: name a --run or a --skills file".to_owned())),
     };
     check_policy(game, &file)?;
@@ -96,7 +95,7 @@ fn from_run(path: &Path, which: Which) -> Result<Exported, CliError> {
     let (run, experiment, info) = RunDir::open(path)?;
     let game = registry::game(&experiment.game)?;
     let checkpoint = run.checkpoint(which)?;
-    let learner = PpoLearner::load(&checkpoint.learner_file(), DeviceKind::default())?;
+    let learner = Learner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
     let training = format!(
         "{} of {} steps on {}, seed {}",
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed
@@ -106,8 +105,8 @@ fn from_run(path: &Path, which: Which) -> Result<Exported, CliError> {
     Ok((game, experiment, file))
 }
 
-fn from_skills(path: &Path, experiment: Option<&Path>) -> Result<Exported, CliError> {
-    let experiment = experiment::load(experiment)?;
+fn from_skills(path: &Path, from: &ExperimentArgs) -> Result<Exported, CliError> {
+    let experiment = from.load([])?;
     let game = registry::game(&experiment.game)?;
     let model = SkillModel::load(path, DeviceKind::default())?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));

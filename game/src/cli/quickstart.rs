@@ -18,7 +18,8 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     eval::cloning,
-    experiment, interrupt, learn_skills, methods,
+    experiment::{self, ExperimentArgs, option},
+    interrupt, learn_skills, methods,
     train::{create_run, drive},
 };
 use crate::registry;
@@ -30,9 +31,8 @@ use crate::registry;
   playbot
   playbot quickstart --json --run runs/another --seed 2")]
 pub struct Args {
-    /// Experiment file; the built-in CoinRun experiment if none is named.
-    #[arg(long)]
-    experiment: Option<PathBuf>,
+    #[command(flatten)]
+    from: ExperimentArgs,
     /// Folder for everything the quickstart writes; its previous content is replaced.
     #[arg(long, default_value = "runs/quickstart")]
     run: PathBuf,
@@ -56,7 +56,7 @@ pub struct Args {
 impl Default for Args {
     fn default() -> Self {
         Self {
-            experiment: None,
+            from: ExperimentArgs::default(),
             run: "runs/quickstart".into(),
             seed: None,
             steps: None,
@@ -128,12 +128,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 }
 
 fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
-    let mut experiment = experiment::load(args.experiment.as_deref())?;
-    experiment.seed = args.seed.unwrap_or(experiment.seed);
-    experiment.steps = args.steps.unwrap_or(experiment.steps);
-    experiment.skills.epochs = args.epochs.unwrap_or(experiment.skills.epochs);
-    experiment.check()?;
-    Ok(experiment)
+    Ok(args.from.load([
+        option("seed", &args.seed),
+        option("steps", &args.steps),
+        option("skills.epochs", &args.epochs),
+    ])?)
 }
 
 /// Learns the skill model and saves it; `None` after Ctrl-C.
@@ -164,9 +163,10 @@ fn train_one(
     args: &Args,
     draw: ActionDraw,
 ) -> Result<Trained, CliError> {
+    let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
-    let mut trainer = Trainer::new(game, experiment, algorithm, skills, DeviceKind::default(), args.threads)?;
-    let run = create_run(&args.run.join(algorithm.name()), experiment, algorithm, true)?;
+    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads)?;
+    let run = create_run(&args.run.join(algorithm.name()), &experiment, true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {

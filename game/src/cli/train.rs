@@ -15,7 +15,8 @@ use bevy_playbot::{
 
 use super::{
     error::{CliError, Outcome},
-    experiment, interrupt, progress,
+    experiment::{ExperimentArgs, option},
+    interrupt, progress,
 };
 use crate::registry;
 
@@ -24,14 +25,14 @@ use crate::registry;
 #[command(after_help = "Examples:
   playbot train --skills skills.safetensors --run runs/first
   playbot train --algorithm ppo --run runs/baseline --steps 200000
+  playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.hidden=[64,64]
   playbot train --run runs/first --resume")]
 pub struct Args {
-    /// Experiment file; the built-in CoinRun experiment if none is named.
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// score-ppo, ppo, score-sac or sac, instead of the experiment's.
     #[arg(long, conflicts_with = "resume")]
-    experiment: Option<PathBuf>,
-    /// score-ppo or ppo.
-    #[arg(long, default_value = "score-ppo", conflicts_with = "resume")]
-    algorithm: Algorithm,
+    algorithm: Option<Algorithm>,
     /// Skill model, as written by `playbot learn-skills`.
     #[arg(long, conflicts_with = "resume")]
     skills: Option<PathBuf>,
@@ -39,7 +40,7 @@ pub struct Args {
     #[arg(long)]
     run: PathBuf,
     /// Go on from the last checkpoint of the run.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["experiment", "set"])]
     resume: bool,
     /// Delete the folder of the run first if it exists.
     #[arg(long, conflicts_with = "resume")]
@@ -73,29 +74,32 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 }
 
 fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
-    let mut experiment = experiment::load(args.experiment.as_deref())?;
-    experiment.steps = args.steps.unwrap_or(experiment.steps);
-    experiment.seed = args.seed.unwrap_or(experiment.seed);
-    experiment.checkpoints.every = args.checkpoint_every.unwrap_or(experiment.checkpoints.every);
+    let experiment = args.from.load([
+        option("algorithm", &args.algorithm),
+        option("seed", &args.seed),
+        option("steps", &args.steps),
+        option("checkpoints.every", &args.checkpoint_every),
+    ])?;
     let game = registry::game(&experiment.game)?;
     let skills = match &args.skills {
         Some(path) => Some(SkillModel::load(path, args.device)?),
         None => None,
     };
-    let trainer = Trainer::new(game, &experiment, args.algorithm, skills.as_ref(), args.device, args.threads)?;
-    let run = create_run(&args.run, &experiment, args.algorithm, args.force)?;
+    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.device, args.threads)?;
+    let run = create_run(&args.run, &experiment, args.force)?;
     Ok((run, trainer))
 }
 
 fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
-    let (run, mut experiment, info) = RunDir::open(&args.run)?;
-    let game = registry::game(&experiment.game)?;
-    if args.steps.is_some() || args.checkpoint_every.is_some() {
-        experiment.steps = args.steps.unwrap_or(experiment.steps);
-        experiment.checkpoints.every = args.checkpoint_every.unwrap_or(experiment.checkpoints.every);
+    let (run, saved, _) = RunDir::open(&args.run)?;
+    let game = registry::game(&saved.game)?;
+    let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
+    let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
+    if experiment != saved {
+        experiment.check()?;
         run.write_experiment(&experiment)?;
     }
-    let trainer = run.resume(game, &experiment, &info, args.device, args.threads)?;
+    let trainer = run.resume(game, &experiment, args.device, args.threads)?;
     eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
     Ok((run, trainer))
 }
@@ -105,14 +109,14 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 /// # Errors
 ///
 /// It exists and `force` is off, or it cannot be written.
-pub fn create_run(path: &Path, experiment: &Experiment, algorithm: Algorithm, force: bool) -> Result<RunDir, RunError> {
+pub fn create_run(path: &Path, experiment: &Experiment, force: bool) -> Result<RunDir, RunError> {
     let info = RunInfo {
-        algorithm,
+        algorithm: experiment.algorithm,
         seed: experiment.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         revision: env!("PLAYBOT_REVISION").to_owned(),
     };
-    RunDir::create(path, experiment, &info, force)
+    RunDir::create(path, &experiment.without_study(), &info, force)
 }
 
 /// Trains to the end of the experiment or to Ctrl-C, with progress bar, log and checkpoints. Returns whether the end

@@ -2,6 +2,8 @@
 //!
 //! - [`Chart`] draws [`Curve`]s as SVG.
 //! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`].
+//! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
+//! - [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
 //!   no network. It follows the reader's light or dark setting and prints.
 //!
@@ -15,6 +17,9 @@ mod line;
 mod mark;
 mod number;
 mod result;
+pub mod statistics;
+mod study;
+mod study_table;
 mod svg;
 mod table;
 #[cfg(test)]
@@ -25,5 +30,6 @@ mod text_width;
 pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
 pub use result::{ResultRow, ResultTable};
+pub use study::{StudyReport, StudyResult, SuccessCurve, TestResult, TrainingResult};
 pub use table::{PlainTable, Table};
 pub use text_table::to_text_table;

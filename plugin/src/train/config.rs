@@ -1,21 +1,32 @@
 //! What an experiment is.
 
-use std::{fmt, path::PathBuf, str::FromStr};
+use std::path::PathBuf;
 
-use playbot_learner::{PpoConfig, ScoreConfig, SkillConfig};
+use playbot_learner::{PpoConfig, SacConfig, ScoreConfig, SkillConfig};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+pub use super::algorithm::Algorithm;
 use super::checkpoint::CheckpointConfig;
-use crate::{game::UnknownName, split::LevelSplit};
+use crate::split::LevelSplit;
 
 /// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
 /// defaults.
+///
+/// Networks belong to what they are part of: `ppo.hidden` and `ppo.activation` (or `sac.…`) are those of actor and
+/// critic, `skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden` and `skills.gru_layers` those of the skill model. A
+/// policy that starts as a copy of the decoder has the decoder's layers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Name of the game.
     pub game: String,
+    /// What agents see of it.
+    #[serde(default)]
+    pub observation: ObservationKind,
+    /// How the policy is made.
+    #[serde(default = "score_ppo")]
+    pub algorithm: Algorithm,
     /// Levels to train on.
     pub train: LevelSplit,
     /// Held-out levels to evaluate on; never trained on.
@@ -25,6 +36,9 @@ pub struct Experiment {
     /// Seed of everything random.
     #[serde(default = "one")]
     pub seed: u64,
+    /// Seeds of a study, which runs everything once with each; `seed` alone if there are none.
+    #[serde(default)]
+    pub seeds: Vec<u64>,
     /// Environment steps to train for, over all arenas together; rounded up to whole rollouts.
     pub steps: u64,
     /// Arenas that play at the same time.
@@ -37,9 +51,12 @@ pub struct Experiment {
     /// The skill model.
     #[serde(default)]
     pub skills: SkillConfig,
-    /// The learner.
+    /// The learner of score-ppo and ppo.
     #[serde(default)]
     pub ppo: PpoConfig,
+    /// The learner of score-sac and sac.
+    #[serde(default)]
+    pub sac: SacConfig,
     /// The three steps of SCORE.
     #[serde(default)]
     pub score: ScoreConfig,
@@ -49,6 +66,16 @@ pub struct Experiment {
     /// When the state of the training is saved.
     #[serde(default)]
     pub checkpoints: CheckpointConfig,
+    /// What a study measures.
+    #[serde(default)]
+    pub study: StudyConfig,
+    /// What a study compares; empty in the experiment of a single run.
+    #[serde(default)]
+    pub variants: Vec<Variant>,
+}
+
+fn score_ppo() -> Algorithm {
+    Algorithm::ScorePpo
 }
 
 fn one() -> u64 {
@@ -61,6 +88,14 @@ fn default_arenas() -> u32 {
 
 fn default_worlds() -> u32 {
     2
+}
+
+/// What agents see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ObservationKind {
+    /// The game's vector of numbers.
+    #[default]
+    Vector,
 }
 
 /// How policies are measured.
@@ -77,6 +112,31 @@ impl Default for EvalConfig {
     fn default() -> Self {
         Self { episodes_per_level: 4, greedy: false }
     }
+}
+
+/// What a study measures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StudyConfig {
+    /// Success rate, over the last 100 training episodes, whose first step is looked for.
+    pub threshold: f64,
+}
+
+impl Default for StudyConfig {
+    fn default() -> Self {
+        Self { threshold: 0.8 }
+    }
+}
+
+/// One side of a comparison: the experiment with some of its values changed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// Its name in tables and folders: letters, digits, `-`, `_` and `.`.
+    pub name: String,
+    /// What it changes, as `key=value`, in the manner of `--set`.
+    #[serde(default)]
+    pub set: Vec<String>,
 }
 
 /// The experiment makes no sense.
@@ -98,8 +158,15 @@ pub enum ExperimentError {
         /// Its value.
         value: String,
         /// What it must be.
-        why: &'static str,
+        why: String,
     },
+    /// The learner refuses its settings.
+    #[error("{0}")]
+    Settings(String),
+}
+
+fn refuse(key: &'static str, value: impl ToString, why: impl Into<String>) -> Result<(), ExperimentError> {
+    Err(ExperimentError::Value { key, value: value.to_string(), why: why.into() })
 }
 
 impl Experiment {
@@ -112,15 +179,8 @@ impl Experiment {
         if self.train.overlaps(&self.test) {
             return Err(ExperimentError::Overlap { train: self.train.clone(), test: self.test.clone() });
         }
-        let refuse = |key, value: u64, why| Err(ExperimentError::Value { key, value: value.to_string(), why });
-        if self.worlds == 0 || !self.arenas.is_multiple_of(self.worlds) || self.arenas == 0 {
-            return refuse("worlds", self.worlds.into(), "must divide `arenas`, and neither may be 0");
-        }
         if self.steps == 0 {
             return refuse("steps", 0, "train for at least one step");
-        }
-        if self.score.horizon == 0 {
-            return refuse("score.horizon", 0, "a skill is held for at least one tick");
         }
         if self.eval.episodes_per_level == 0 {
             return refuse("eval.episodes_per_level", 0, "a verdict needs at least one episode");
@@ -131,65 +191,91 @@ impl Experiment {
         if self.checkpoints.keep == 0 {
             return refuse("checkpoints.keep", 0, "at least the latest checkpoint must stay");
         }
-        let batch = u64::from(self.arenas) * self.ppo.num_steps as u64;
-        if self.ppo.minibatches == 0 || !batch.is_multiple_of(self.ppo.minibatches as u64) {
-            return refuse("ppo.minibatches", self.ppo.minibatches as u64, "must divide arenas × ppo.num_steps");
+        if !(0.0..=1.0).contains(&self.study.threshold) {
+            return refuse("study.threshold", self.study.threshold, "a success rate lies in 0..1");
+        }
+        let settings = |error: playbot_learner::LearnError| ExperimentError::Settings(error.to_string());
+        self.skills.validate().map_err(settings)?;
+        self.score.validate().map_err(settings)?;
+        self.ppo_config().validate().map_err(settings)?;
+        self.sac.validate().map_err(settings)?;
+        self.check_batches()
+    }
+
+    fn check_batches(&self) -> Result<(), ExperimentError> {
+        if self.arenas == 0 {
+            return refuse("arenas", 0, "somebody has to play");
+        }
+        let (arenas, worlds) = (u64::from(self.arenas), u64::from(self.worlds));
+        if worlds == 0 || !arenas.is_multiple_of(worlds) {
+            let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
+            return refuse("worlds", worlds, why);
+        }
+        let (batch, minibatches) = (arenas * self.ppo.num_steps as u64, self.ppo.minibatches as u64);
+        if !self.algorithm.is_sac() && !batch.is_multiple_of(minibatches) {
+            let (steps, near) = (self.ppo.num_steps, nearest_divisor(batch, minibatches));
+            let why = format!("must divide `arenas` × `ppo.num_steps` = {arenas} × {steps} = {batch}; {near} does");
+            return refuse("ppo.minibatches", minibatches, why);
         }
         Ok(())
     }
 
+    /// The experiment of a single run: without what only a study reads.
+    pub fn without_study(&self) -> Self {
+        Self { seeds: Vec::new(), variants: Vec::new(), ..self.clone() }
+    }
+
+    /// The settings of PPO as the learner gets them: a learning rate that falls does so over the whole training, unless
+    /// the experiment says otherwise.
+    pub fn ppo_config(&self) -> PpoConfig {
+        let mut config = self.ppo.clone();
+        if config.anneal_lr && config.num_steps > 0 && self.arenas > 0 {
+            config.total_updates = config.total_updates.or_else(|| Some(self.updates()));
+        }
+        config
+    }
+
+    /// Ticks of one rollout.
+    pub fn rollout_steps(&self) -> usize {
+        if self.algorithm.is_sac() { self.sac.num_steps } else { self.ppo.num_steps }
+    }
+
     /// Environment steps of one rollout.
     pub fn steps_per_update(&self) -> u64 {
-        u64::from(self.arenas) * self.ppo.num_steps as u64
+        u64::from(self.arenas) * self.rollout_steps() as u64
     }
 
     /// Rollouts, and so updates, of the whole training.
     pub fn updates(&self) -> u64 {
         self.steps.div_ceil(self.steps_per_update())
     }
-}
 
-/// Learners that can be trained.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Algorithm {
-    /// PPO with skills: the paper's method.
-    ScorePpo,
-    /// PPO without skills: the same network, steps and tuning.
-    Ppo,
-}
-
-impl Algorithm {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::ScorePpo, Self::Ppo];
-
-    /// Name on the command line and in results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ScorePpo => "score-ppo",
-            Self::Ppo => "ppo",
-        }
-    }
-
-    /// Whether a skill model is needed.
-    pub fn needs_skills(self) -> bool {
-        self == Self::ScorePpo
+    /// The experiment as RON, all defaults filled in.
+    ///
+    /// # Errors
+    ///
+    /// The path of the demonstrations is not Unicode.
+    pub fn to_ron(&self) -> Result<String, ron::Error> {
+        ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default())
     }
 }
 
-impl fmt::Display for Algorithm {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
+/// The divisor of `n` nearest to `wanted`, the larger one of two.
+fn nearest_divisor(n: u64, wanted: u64) -> u64 {
+    let distance = |divisor: &u64| (divisor.abs_diff(wanted), u64::MAX - divisor);
+    let small = (1..).take_while(|d| d * d <= n).filter(|d| n.is_multiple_of(*d));
+    small.flat_map(|d| [d, n / d]).min_by_key(distance).unwrap_or(1)
 }
 
-impl FromStr for Algorithm {
-    type Err = UnknownName;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    fn from_str(name: &str) -> Result<Self, UnknownName> {
-        let names = Self::ALL.map(Self::name);
-        Self::ALL
-            .into_iter()
-            .find(|algorithm| algorithm.name() == name)
-            .ok_or_else(|| UnknownName::new("algorithm", name, &names))
+    #[test]
+    fn the_nearest_divisor_is_one() {
+        assert_eq!(nearest_divisor(8192, 7), 8);
+        assert_eq!(nearest_divisor(64, 3), 4, "2 and 4 are equally near");
+        assert_eq!(nearest_divisor(60, 0), 1);
+        assert_eq!(nearest_divisor(7, 1000), 7);
     }
 }

@@ -1,13 +1,22 @@
 //! Headless training over many levels: collecting with the current policy, learning from what was collected.
 
+mod algorithm;
 pub mod arena_state;
 pub mod checkpoint;
 pub mod collect;
 pub mod config;
+mod config_error;
 pub mod config_file;
+mod config_keys;
+mod config_set;
+pub mod learner;
+pub mod presets;
+mod ron_keys;
 pub mod run_dir;
+pub mod study;
 pub mod trainer;
 pub mod worlds;
 
 pub use config::{Algorithm, Experiment};
+pub use learner::{Learner, LearnerMetrics};
 pub use trainer::{Trainer, UpdateReport};

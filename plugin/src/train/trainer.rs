@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Instant};
 
 use bevy::prelude::World;
-use playbot_learner::{DeviceKind, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SkillModel, UpdateMetrics};
+use playbot_learner::{DeviceKind, LearnError, Policy, Rollout, SkillModel};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -12,6 +12,7 @@ use super::{
     checkpoint::CheckpointSummary,
     collect::Collector,
     config::{Algorithm, Experiment, ExperimentError},
+    learner::{Learner, LearnerMetrics},
     worlds::on_threads,
 };
 use crate::{
@@ -39,6 +40,9 @@ pub enum TrainError {
     /// The algorithm needs a skill model.
     #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
     NoSkills(Algorithm),
+    /// The algorithm does not learn from play.
+    #[error("{0} is not trained: measure its skill model with `playbot eval --skills`")]
+    NotTrained(Algorithm),
     /// The skill model was learned for another game.
     #[error(
         "the skill model was learned for {model_obs} observation values and {model_actions:?}, but `{game}` has \
@@ -91,7 +95,7 @@ pub struct UpdateReport {
     /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
     pub initial_kl: Option<f32>,
     /// What the learner reports.
-    pub learner: UpdateMetrics,
+    pub learner: LearnerMetrics,
     /// Where the time went.
     pub timing: Timing,
 }
@@ -122,9 +126,8 @@ pub struct Timing {
 /// One algorithm being trained on one experiment.
 pub struct Trainer {
     experiment: Experiment,
-    algorithm: Algorithm,
     threads: usize,
-    pub(crate) learner: PpoLearner,
+    pub(crate) learner: Learner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
 }
@@ -146,22 +149,20 @@ impl Trainer {
     pub fn new(
         game: &dyn Game,
         experiment: &Experiment,
-        algorithm: Algorithm,
         skills: Option<&SkillModel>,
         device: DeviceKind,
         threads: usize,
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
-        let learner = new_learner(game, experiment, algorithm, skills, device)?;
-        Self::with_learner(game, experiment, algorithm, learner, threads)
+        let learner = Learner::new(game, experiment, skills, device)?;
+        Self::with_learner(game, experiment, learner, threads)
     }
 
     /// A trainer around a learner that exists already, for an experiment that was checked.
     pub(crate) fn with_learner(
         game: &dyn Game,
         experiment: &Experiment,
-        algorithm: Algorithm,
-        learner: PpoLearner,
+        learner: Learner,
         threads: usize,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
@@ -169,14 +170,7 @@ impl Trainer {
         let collectors = (0..experiment.worlds)
             .map(|world| Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone()))
             .collect();
-        Ok(Self {
-            experiment: experiment.clone(),
-            algorithm,
-            threads,
-            learner,
-            collectors,
-            progress: Progress::default(),
-        })
+        Ok(Self { experiment: experiment.clone(), threads, learner, collectors, progress: Progress::default() })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -187,7 +181,7 @@ impl Trainer {
     pub fn update(&mut self) -> Result<UpdateReport, TrainError> {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
-        let steps = self.experiment.ppo.num_steps;
+        let steps = self.experiment.rollout_steps();
         let collected = on_threads(&mut self.collectors, self.threads, |world| world.collect(&policy, latent, steps));
         let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
         for part in collected {
@@ -208,7 +202,7 @@ impl Trainer {
 
     /// Before the first update of SCORE, the policy must be the decoder, to the bit.
     fn initial_kl(&self, rollout: &Rollout) -> Result<Option<f32>, LearnError> {
-        let copied = self.algorithm.needs_skills() && self.experiment.score.init_from_decoder;
+        let copied = self.experiment.algorithm.needs_skills() && self.experiment.score.init_from_decoder;
         if self.progress.updates > 0 || !copied {
             return Ok(None);
         }
@@ -237,11 +231,6 @@ impl Trainer {
         &self.experiment
     }
 
-    /// The algorithm.
-    pub fn algorithm(&self) -> Algorithm {
-        self.algorithm
-    }
-
     /// The policy as it is now.
     pub fn policy(&self) -> Policy {
         self.learner.policy()
@@ -264,32 +253,6 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     check_mode(game, &experiment.train.mode)?;
     check_mode(game, &experiment.test.mode)?;
     Ok(())
-}
-
-fn new_learner(
-    game: &dyn Game,
-    experiment: &Experiment,
-    algorithm: Algorithm,
-    skills: Option<&SkillModel>,
-    device: DeviceKind,
-) -> Result<PpoLearner, TrainError> {
-    let (obs_dim, action_space) = (game.observation().len(), game.actions());
-    let config = experiment.ppo.clone();
-    if !algorithm.needs_skills() {
-        let spec = PolicySpec { obs_dim, latent: 0, action_space };
-        return Ok(PpoLearner::new(config, spec, experiment.seed, device)?);
-    }
-    let skills = skills.ok_or(TrainError::NoSkills(algorithm))?;
-    if (skills.obs_dim(), skills.action_space()) != (obs_dim, action_space) {
-        return Err(TrainError::ForeignSkills {
-            game: game.name().to_owned(),
-            model_obs: skills.obs_dim(),
-            model_actions: skills.action_space(),
-            game_obs: obs_dim,
-            game_actions: action_space,
-        });
-    }
-    Ok(PpoLearner::with_skill(config, experiment.score.clone(), skills, experiment.seed, device)?)
 }
 
 impl Progress {
@@ -325,7 +288,7 @@ impl Progress {
         }
     }
 
-    fn report(&self, learner: UpdateMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
+    fn report(&self, learner: LearnerMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
         UpdateReport {
             update: self.updates,
             step: self.steps,

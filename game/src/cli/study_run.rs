@@ -1,0 +1,211 @@
+//! One run of a study: skills, training and measurement, each taken up where it was left.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bevy_playbot::{
+    eval::Player,
+    game::Game,
+    learner::{Dataset, DeviceKind, SkillModel},
+    policy::ActionDraw,
+    report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
+    train::{
+        Experiment, Trainer,
+        checkpoint::Which,
+        run_dir::{RunDir, write_atomically},
+        study::StudyRun,
+    },
+};
+use serde_json::{Value, json};
+
+use super::{
+    error::CliError,
+    eval::cloning,
+    experiment, interrupt, learn_skills, methods,
+    train::{create_run, drive},
+};
+use crate::registry;
+
+const RESULT: &str = "result.json";
+
+/// Where the runs of a study live, and how they are computed.
+pub struct Bench {
+    /// Folder of all runs.
+    pub folder: PathBuf,
+    /// Replace what is there instead of going on with it.
+    pub force: bool,
+    /// Where to compute.
+    pub device: DeviceKind,
+    /// Threads.
+    pub threads: usize,
+    /// Skill models that this process has learned already.
+    learned: BTreeSet<String>,
+    /// The recordings that were read last, and their game and path.
+    demos: Option<((String, PathBuf), Dataset)>,
+}
+
+/// What came of a run, or `None` after Ctrl-C.
+pub type Ended = Option<(StudyResult, SuccessCurve)>;
+
+impl Bench {
+    pub fn new(folder: &Path, force: bool, device: DeviceKind, threads: usize) -> Self {
+        Self { folder: folder.into(), force, device, threads, learned: BTreeSet::new(), demos: None }
+    }
+
+    /// Brings a run to its end. `on_step` hears the steps of its training as it goes on.
+    ///
+    /// # Errors
+    ///
+    /// The folder holds a run with other settings, or learning, training, measuring or saving fails.
+    pub fn run(&mut self, run: &StudyRun, title: &str, on_step: impl FnMut(u64)) -> Result<Ended, CliError> {
+        let game = registry::game(&run.experiment.game)?;
+        let folder = self.folder.join(run.id());
+        let dir = self.open(run, &folder)?;
+        if !self.force && folder.join(RESULT).exists() {
+            return Ok(Some((read_result(&folder.join(RESULT))?, success_curve(&folder)?)));
+        }
+        let Some((player, training, curve)) = self.player(game, run, &dir, title, on_step)? else { return Ok(None) };
+        let experiment = &run.experiment;
+        let plan = methods::plan(experiment, &experiment.test, experiment.eval.episodes_per_level, self.threads);
+        let measured = methods::measure(game, &run.id(), &player, &plan)?;
+        let result = StudyResult {
+            variant: run.variant.clone(),
+            algorithm: experiment.algorithm,
+            seed: experiment.seed,
+            training,
+            test: TestResult::from(&measured.summary),
+        };
+        write_atomically(&folder.join(RESULT), json!(result).to_string().as_bytes())?;
+        Ok(Some((result, curve)))
+    }
+
+    /// The folder of a run: a new one, or the one that is there if it holds the same run.
+    fn open(&self, run: &StudyRun, folder: &Path) -> Result<RunDir, CliError> {
+        if self.force || !folder.exists() {
+            return Ok(create_run(folder, &run.experiment, self.force)?);
+        }
+        if !folder.join("run.json").exists() && is_unborn(folder) {
+            // The program was stopped while it made the folder.
+            fs::remove_dir_all(folder).map_err(|error| io_error("remove", folder, &error))?;
+            return Ok(create_run(folder, &run.experiment, false)?);
+        }
+        let (dir, saved, _) = RunDir::open(folder)?;
+        if saved == run.experiment {
+            return Ok(dir);
+        }
+        Err(CliError::Usage(format!(
+            "{} holds a run with other settings: choose another folder with --runs, or replace all with --force",
+            folder.display()
+        )))
+    }
+
+    /// Trains what has to be trained.
+    fn player(
+        &mut self,
+        game: &dyn Game,
+        run: &StudyRun,
+        dir: &RunDir,
+        title: &str,
+        mut on_step: impl FnMut(u64),
+    ) -> Result<Option<(Player, Option<TrainingResult>, SuccessCurve)>, CliError> {
+        let experiment = &run.experiment;
+        let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let begun = dir.checkpoint(Which::Last).is_ok();
+        let skills = match experiment.algorithm.needs_skills() && !begun {
+            true => match self.skills(game, run)? {
+                Some(skills) => Some(skills),
+                None => return Ok(None),
+            },
+            false => None,
+        };
+        if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
+            return Ok(Some((cloning(skills, experiment, draw), None, Vec::new())));
+        }
+        let mut trainer = if begun {
+            dir.resume(game, experiment, self.device, self.threads)?
+        } else {
+            Trainer::new(game, experiment, skills.as_ref(), self.device, self.threads)?
+        };
+        if !drive(dir, &mut trainer, title, |report| on_step(report.step))? {
+            return Ok(None);
+        }
+        let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
+        let training = training_result(dir.path(), experiment, trainer.steps())?;
+        Ok(Some((player, Some(training), success_curve(dir.path())?)))
+    }
+
+    /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
+    fn skills(&mut self, game: &dyn Game, run: &StudyRun) -> Result<Option<SkillModel>, CliError> {
+        let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
+        let file = self.folder.join(&name);
+        let is_new = self.force && !self.learned.contains(&name);
+        if is_new || !file.exists() {
+            let demos = self.demos(game, &run.experiment)?;
+            let model = learn_skills::learn(&run.experiment, demos, self.device, |_, _| Ok(()))?;
+            if interrupt::asked() {
+                return Ok(None);
+            }
+            model.save(&file)?;
+            self.learned.insert(name);
+        }
+        Ok(Some(SkillModel::load(&file, self.device)?))
+    }
+
+    fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
+        let key = (experiment.game.clone(), experiment::resolve(&experiment.demos));
+        match &self.demos {
+            Some((known, dataset)) if *known == key => Ok(dataset.clone()),
+            _ => {
+                let dataset = learn_skills::read_demos(game, &key.1)?;
+                self.demos = Some((key, dataset.clone()));
+                Ok(dataset)
+            }
+        }
+    }
+}
+
+/// Whether a folder holds at most what is written before `run.json`.
+fn is_unborn(folder: &Path) -> bool {
+    let first = ["experiment.ron", "experiment.tmp", "run.tmp"];
+    fs::read_dir(folder).is_ok_and(|entries| {
+        entries.flatten().all(|entry| first.iter().any(|name| entry.file_name().to_str() == Some(name)))
+    })
+}
+
+fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, CliError> {
+    let lines = metrics(run)?;
+    let last = |tag: &str| lines.last().and_then(|line| line[tag].as_f64());
+    Ok(TrainingResult {
+        steps,
+        steps_to_threshold: steps_to_reach(&success_curve(run)?, experiment.study.threshold),
+        success: last("charts/success_rate"),
+        episodic_return: last("charts/episodic_return"),
+    })
+}
+
+/// The success rate of the last 100 training episodes, from the metrics of a run; empty if it was not trained.
+fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
+    let point = |line: &Value| Some((line["step"].as_u64()?, line["charts/success_rate"].as_f64()?));
+    Ok(metrics(run)?.iter().filter_map(point).collect())
+}
+
+fn metrics(run: &Path) -> Result<Vec<Value>, CliError> {
+    let path = run.join("metrics.jsonl");
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let text = fs::read_to_string(&path).map_err(|error| io_error("read", &path, &error))?;
+    text.lines().map(|line| serde_json::from_str(line).map_err(|error| io_error("read", &path, &error))).collect()
+}
+
+fn read_result(path: &Path) -> Result<StudyResult, CliError> {
+    let text = fs::read_to_string(path).map_err(|error| io_error("read", path, &error))?;
+    serde_json::from_str(&text).map_err(|error| io_error("read", path, &error))
+}
+
+fn io_error(action: &str, path: &Path, error: &impl ToString) -> CliError {
+    CliError::Io(format!("cannot {action} {}: {}", path.display(), error.to_string()))
+}

@@ -1,0 +1,133 @@
+//! What a study found: the results of its runs, and what they come to over the seeds.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    chart::{Chart, Curve},
+    statistics::mean_curve,
+};
+use crate::{
+    eval::EvalSummary,
+    train::{Algorithm, Experiment},
+};
+
+/// A learning curve: steps and success rates over the last 100 training episodes.
+pub type SuccessCurve = Vec<(u64, f64)>;
+
+/// What one run of a study came to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StudyResult {
+    /// Name of the variant.
+    pub variant: String,
+    /// How its policy was made.
+    pub algorithm: Algorithm,
+    /// The seed.
+    pub seed: u64,
+    /// The training; `None` where there is none, as in behaviour cloning.
+    pub training: Option<TrainingResult>,
+    /// The measurement on the held-out levels.
+    pub test: TestResult,
+}
+
+/// What a training came to. Rates and means are those of the last 100 training episodes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainingResult {
+    /// Environment steps.
+    pub steps: u64,
+    /// The first step at which the success rate was at the threshold; `None` if it never was.
+    pub steps_to_threshold: Option<u64>,
+    /// Success rate at the end; `None` if no episode ended.
+    pub success: Option<f64>,
+    /// Mean return at the end; `None` if no episode ended.
+    pub episodic_return: Option<f64>,
+}
+
+/// A measurement on held-out levels, each played equally often. Standard errors are over episodes, taken as independent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TestResult {
+    /// Episodes.
+    pub episodes: u64,
+    /// Share of episodes that reached the level's aim.
+    pub success: f64,
+    /// Its standard error √(p (1 − p) / n).
+    pub success_se: f64,
+    /// Mean return.
+    pub return_mean: f64,
+    /// Its standard error.
+    pub return_se: f64,
+    /// Mean length, ticks.
+    pub length_mean: f64,
+}
+
+impl From<&EvalSummary> for TestResult {
+    fn from(summary: &EvalSummary) -> Self {
+        let p = summary.success;
+        Self {
+            episodes: summary.episodes,
+            success: p,
+            success_se: (p * (1.0 - p) / summary.episodes as f64).sqrt(),
+            return_mean: summary.return_mean,
+            return_se: summary.return_se,
+            length_mean: summary.length_mean,
+        }
+    }
+}
+
+/// A study that is done. It says nothing of the machine or the time: the same study gives the same bytes.
+#[derive(Clone, Debug, Serialize)]
+pub struct StudyReport {
+    /// The command that made it.
+    pub command: String,
+    /// The experiment with its variants.
+    pub experiment: Experiment,
+    /// The runs, variant by variant.
+    pub results: Vec<StudyResult>,
+    /// The learning curve of each run, in the same order; empty without training.
+    #[serde(skip)]
+    pub curves: Vec<SuccessCurve>,
+}
+
+impl StudyReport {
+    /// Names of the variants, in their order.
+    pub(super) fn variants(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self.results.iter().map(|result| result.variant.as_str()).collect();
+        names.dedup();
+        names
+    }
+
+    /// The results of one variant.
+    pub(super) fn of(&self, variant: &str) -> Vec<&StudyResult> {
+        self.results.iter().filter(|result| result.variant == variant).collect()
+    }
+
+    /// Success over steps: the mean of each variant that was trained, with the spread over its seeds.
+    pub fn chart(&self) -> Chart {
+        let curves = self.variants().into_iter().filter_map(|variant| {
+            let runs = self.results.iter().zip(&self.curves).filter(|(result, _)| result.variant == variant);
+            let seeds: Vec<SuccessCurve> = runs.map(|(_, curve)| curve.clone()).filter(|c| !c.is_empty()).collect();
+            if seeds.is_empty() {
+                return None;
+            }
+            let mean = mean_curve(&seeds);
+            let line = Curve::new(variant, mean.iter().map(|point| (point.step as f64, point.mean)).collect());
+            let band = mean.iter().map(|point| (point.low, point.high)).collect();
+            Some(if seeds.len() > 1 { line.with_band(band) } else { line })
+        });
+        Chart {
+            title: format!("{}: success in training on {}", self.experiment.game, self.experiment.train),
+            x_label: "environment steps".to_owned(),
+            y_label: "success rate of the last 100 training episodes, mean and spread over the seeds".to_owned(),
+            curves: curves.collect(),
+            marks: Vec::new(),
+        }
+    }
+
+    /// Command, experiment and the numbers of every run.
+    ///
+    /// # Errors
+    ///
+    /// The path of the demonstrations is not Unicode.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self).map(|text| text + "\n")
+    }
+}

@@ -1,0 +1,149 @@
+//! `--set key=value`: an experiment with single values changed.
+
+use super::{
+    config::Experiment,
+    config_error::{ConfigError, unknown_key},
+    config_keys::{Keys, Origin, Value, check_syntax},
+};
+
+impl Experiment {
+    /// This experiment with each `key=value` put into it, in order. A key in a section has its path, such as
+    /// `ppo.lr=0.0003`; values are written as in a file, and texts may lack their quotes: `train=hard:0..31`. A whole
+    /// section is changed key by key: `ppo=(lr: 0.0003, epochs: 4)`.
+    ///
+    /// Whether the values go together is for [`check`](Self::check) to say.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError::Set`] with the text that does not fit: no `=`, an unknown key, or a value of the wrong type.
+    pub fn with_set<S: AsRef<str>>(&self, sets: &[S]) -> Result<Self, ConfigError> {
+        sets.iter().try_fold(self.clone(), |experiment, set| put(&experiment, set.as_ref()))
+    }
+}
+
+fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
+    let origin = Origin::Set(set.to_owned());
+    let refuse = |message: String| origin.error((1, 1), message);
+    let Some((key, text)) = set.split_once('=') else {
+        return Err(refuse("write key=value, such as ppo.lr=0.0003".to_owned()));
+    };
+    let (key, text) = (key.trim(), text.trim());
+    if key == "base" {
+        return Err(refuse("`base` names what a file is built on: write it into an experiment file".to_owned()));
+    }
+    let mut keys = Keys::of_experiment(experiment, &origin)?;
+    if Keys::all().is_section(key) && text.starts_with('(') {
+        let section = Keys::of_set(key, text, &origin)?;
+        section.check_names()?;
+        return keys.overlaid(&section).parse(&origin);
+    }
+    let Some(example) = Keys::all().text(key) else {
+        return Err(refuse(unknown_key(key)));
+    };
+    let text = if example.starts_with('"') && !text.starts_with('"') {
+        ron::to_string(text).map_err(|error| refuse(error.to_string()))?
+    } else {
+        text.to_owned()
+    };
+    check_syntax(&text).map_err(|error| refuse(format!("`{text}` is not a value: {}", error.code)))?;
+    keys.put(key.to_owned(), Value { text, origin: origin.clone() });
+    keys.parse(&origin)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use playbot_learner::{AlphaKind, StdKind, nn::Activation};
+
+    use super::*;
+    use crate::train::{Algorithm, config_file::parse_experiment};
+
+    fn experiment() -> Experiment {
+        let text = r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos/coinrun", steps: 1000,
+            ppo: (gamma: 0.5, epochs: 7))"#;
+        parse_experiment(text, Path::new("x.ron")).expect("valid")
+    }
+
+    fn error(set: &str) -> String {
+        experiment().with_set(&[set]).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn values_of_every_kind_are_set_and_nothing_else_is() {
+        let sets = [
+            "score.kl=false",
+            "arenas=32",
+            "score.kl_coef = 0.3",
+            "ppo.lr=1",
+            "ppo.hidden=[64,64]",
+            "ppo.activation=Tanh",
+            "score.alpha=Off",
+            "skills.prior_std=Vector",
+            "ppo.total_updates=Some(3)",
+            "train=hard:0..31",
+            "test=\"hard:70..80\"",
+            "demos=my recordings/a",
+            "algorithm=bc",
+            "seeds=[4, 5]",
+            "variants=[(name: \"a\", set: [\"score.kl=true\"])]",
+        ];
+        let mut expected = experiment();
+        expected.score.kl = false;
+        expected.arenas = 32;
+        expected.score.kl_coef = 0.3;
+        expected.ppo.lr = 1.0;
+        expected.ppo.hidden = vec![64, 64];
+        expected.ppo.activation = Activation::Tanh;
+        expected.score.alpha = AlphaKind::Off;
+        expected.skills.prior_std = StdKind::Vector;
+        expected.ppo.total_updates = Some(3);
+        expected.train = "hard:0..31".parse().expect("a split");
+        expected.test = "hard:70..80".parse().expect("a split");
+        expected.demos = "my recordings/a".into();
+        expected.algorithm = Algorithm::BehaviourCloning;
+        expected.seeds = vec![4, 5];
+        expected.variants = vec![crate::train::config::Variant { name: "a".into(), set: vec!["score.kl=true".into()] }];
+        let changed = experiment().with_set(&sets).expect("valid");
+        assert_eq!(changed, expected);
+        let back = changed.with_set(&["ppo.total_updates=None"]).expect("valid");
+        assert_eq!(back.ppo.total_updates, None);
+        assert_eq!(back.with_set(&["ppo.total_updates=9"]).expect("Some is understood").ppo.total_updates, Some(9));
+    }
+
+    #[test]
+    fn a_section_is_changed_key_by_key_and_the_last_one_wins() {
+        let changed = experiment().with_set(&["ppo=(lr: 0.25, epochs: 2)", "ppo.lr=0.5"]).expect("valid");
+        assert_eq!((changed.ppo.lr, changed.ppo.epochs, changed.ppo.gamma), (0.5, 2, 0.5));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named_with_what_was_given() {
+        for (set, words) in [
+            ("ppo.lr", "write key=value"),
+            ("ppo.gama=1", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
+            ("kl_coef=1", "did you mean `score.kl_coef`?"),
+            ("pop.lr=1", "did you mean `ppo.lr`?"),
+            ("ppo.qqq=1", "valid keys in `ppo`: activation"),
+            ("steps.more=1", "did you mean `steps`"),
+            ("ppo=3", "`ppo` is a section"),
+            ("ppo=(gama: 1)", "did you mean `ppo.gamma`?"),
+            ("ppo.lr=fast", "`ppo.lr` must be a number such as 0.0005, not fast"),
+            ("ppo.lr=", "`ppo.lr` must be a number"),
+            ("arenas=-3", "`arenas` must be a whole number such as 64, not -3"),
+            ("score.kl=yes", "`score.kl` must be true or false, not yes"),
+            ("ppo.hidden=[64,a]", "`ppo.hidden` must be a list in square brackets, not [64,a]"),
+            ("ppo.activation=Rellu", "did you mean `Relu`?"),
+            ("ppo.total_updates=soon", "`ppo.total_updates` must be None or Some(value), not soon"),
+            ("train=hard", "`hard` is not a range of levels"),
+            ("algorithm=score", "unknown algorithm `score`"),
+            ("base=[]", "experiment file"),
+            // Nothing that would reach beyond the value.
+            ("ppo.lr=0.1, gamma: 0.9", "is not a value"),
+            ("ppo.lr=0.1), score: (kl: false", "is not a value"),
+        ] {
+            let text = error(set);
+            assert!(text.starts_with(&format!("`{set}`: ")) && text.contains(words), "{text}");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! A study: the variants of an experiment, each with every seed.
+
+use std::collections::BTreeSet;
+
+use thiserror::Error;
+
+use super::{
+    config::{Experiment, ExperimentError, Variant},
+    config_error::ConfigError,
+};
+
+/// One training (or none, for behaviour cloning) and one measurement of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyRun {
+    /// Name of the variant.
+    pub variant: String,
+    /// What to run, with its seed; without variants.
+    pub experiment: Experiment,
+}
+
+/// A study makes no sense.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    /// Two variants have the same name.
+    #[error("two variants are called `{0}`: give each a name of its own")]
+    SameName(String),
+    /// A name cannot be that of a folder.
+    #[error(
+        "`{0}` cannot be the name of a variant: use letters, digits, `-`, `_` and `.`, and begin with a letter or digit"
+    )]
+    BadName(String),
+    /// The same seed is there twice.
+    #[error("seed {0} is there twice: another run with it would be the same run")]
+    SameSeed(u64),
+    /// A variant does not fit.
+    #[error("variant `{variant}`: {source}")]
+    Config {
+        /// Its name.
+        variant: String,
+        /// What does not fit.
+        source: ConfigError,
+    },
+    /// The values of a variant do not go together.
+    #[error("variant `{variant}`: {source}")]
+    Values {
+        /// Its name.
+        variant: String,
+        /// Why.
+        source: ExperimentError,
+    },
+}
+
+impl StudyRun {
+    /// Name of its folder.
+    pub fn id(&self) -> String {
+        format!("{}-seed{}", self.variant, self.experiment.seed)
+    }
+
+    /// Name of the file of its skill model, which it shares with every run of the same skill settings, demonstrations
+    /// and seed.
+    ///
+    /// # Errors
+    ///
+    /// The path of the demonstrations is not Unicode.
+    pub fn skill_file(&self) -> Result<String, ron::Error> {
+        let run = &self.experiment;
+        let settings = ron::to_string(&(&run.game, run.observation, &run.demos, &run.skills))?;
+        Ok(format!("skills-{:08x}-seed{}.safetensors", crc32fast::hash(settings.as_bytes()), run.seed))
+    }
+}
+
+/// The runs of a study, variant by variant: an experiment without variants is compared with nothing, under the name of
+/// its algorithm. What a variant changes is applied last, over everything else.
+///
+/// # Errors
+///
+/// [`StudyError`] with the variant that does not fit; every one is checked before anything is run.
+pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> {
+    let seeds = if experiment.seeds.is_empty() { vec![experiment.seed] } else { experiment.seeds.clone() };
+    let mut known = BTreeSet::new();
+    if let Some(twice) = seeds.iter().find(|seed| !known.insert(**seed)) {
+        return Err(StudyError::SameSeed(*twice));
+    }
+    let mut runs = Vec::new();
+    for variant in variants(experiment)? {
+        let changed = experiment
+            .without_study()
+            .with_set(&variant.set)
+            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source })?
+            .without_study();
+        changed.check().map_err(|source| StudyError::Values { variant: variant.name.clone(), source })?;
+        runs.extend(seeds.iter().map(|&seed| StudyRun {
+            variant: variant.name.clone(),
+            experiment: Experiment { seed, ..changed.clone() },
+        }));
+    }
+    Ok(runs)
+}
+
+fn variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyError> {
+    if experiment.variants.is_empty() {
+        return Ok(vec![Variant { name: experiment.algorithm.name().to_owned(), set: Vec::new() }]);
+    }
+    let mut known = BTreeSet::new();
+    for Variant { name, .. } in &experiment.variants {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if !name.starts_with(|c: char| c.is_ascii_alphanumeric()) || !name.chars().all(is_plain) {
+            return Err(StudyError::BadName(name.clone()));
+        }
+        if !known.insert(name.as_str()) {
+            return Err(StudyError::SameName(name.clone()));
+        }
+    }
+    Ok(experiment.variants.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::train::{Algorithm, config_file::parse_experiment};
+
+    fn experiment(variants: &str) -> Experiment {
+        let text = format!(
+            r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos", steps: 1000, seeds: [3, 5],
+            variants: [{variants}])"#
+        );
+        parse_experiment(&text, Path::new("x.ron")).expect("valid")
+    }
+
+    fn error(variants: &str) -> String {
+        study_runs(&experiment(variants)).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn every_variant_runs_with_every_seed_and_shares_skills_where_it_can() {
+        let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false", "seed=9"]),
+            (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"])"#;
+        let runs = study_runs(&experiment(variants)).expect("valid");
+        let ids: Vec<String> = runs.iter().map(StudyRun::id).collect();
+        let expected = ["full", "no-kl", "short", "ppo"].map(|name| [3, 5].map(|seed| format!("{name}-seed{seed}")));
+        assert_eq!(ids, expected.concat());
+        assert!(runs.iter().all(|run| run.experiment.variants.is_empty() && run.experiment.seeds.is_empty()));
+        assert!(!runs[2].experiment.score.kl && runs[0].experiment.score.kl);
+        assert_eq!(runs[7].experiment.algorithm, Algorithm::Ppo);
+        let skills: Vec<String> = runs.iter().map(|run| run.skill_file().expect("Unicode")).collect();
+        assert_eq!((&skills[0], &skills[1]), (&skills[2], &skills[3]), "the same skill settings");
+        assert_ne!(skills[0], skills[1], "other seeds");
+        assert_ne!(skills[0], skills[4], "other windows");
+    }
+
+    #[test]
+    fn an_experiment_without_variants_is_its_own_only_one() {
+        let mut experiment = experiment("");
+        experiment.seeds.clear();
+        let runs = study_runs(&experiment).expect("valid");
+        assert_eq!(runs.iter().map(StudyRun::id).collect::<Vec<_>>(), ["score-ppo-seed1"]);
+    }
+
+    #[test]
+    fn a_variant_that_does_not_fit_is_named_before_anything_runs() {
+        let text = error(r#"(name: "a"), (name: "b", set: ["score.kll=false"])"#);
+        assert!(text.contains("variant `b`") && text.contains("`score.kl`"), "{text}");
+        let text = error(r#"(name: "b", set: ["ppo.minibatches=7"])"#);
+        assert!(text.contains("variant `b`") && text.contains("must divide"), "{text}");
+        assert!(error(r#"(name: "a"), (name: "a")"#).contains("two variants"));
+        assert!(error(r#"(name: "../a")"#).contains("letters, digits"));
+        let mut twice = experiment("");
+        twice.seeds = vec![1, 2, 1];
+        assert!(study_runs(&twice).expect_err("twice").to_string().contains("seed 1"));
+    }
+}
