@@ -24,6 +24,11 @@ pub trait Game: Send + Sync {
     /// Actions of every agent.
     fn actions(&self) -> ActionSpace;
 
+    /// Names of the discrete choices, or of the dimensions of continuous actions, for people; may be empty.
+    fn action_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Observation of every agent.
     fn observation(&self) -> ObservationSpace;
 

@@ -91,6 +91,7 @@ pub mod level;
 pub mod observation;
 pub mod plugin;
 pub mod policy;
+pub mod policy_file;
 pub mod prelude;
 pub mod report;
 pub mod reward;

@@ -1,7 +1,7 @@
 //! Skills: what the policy is asked to do for the next few ticks.
 
 use bevy::prelude::*;
-use playbot_learner::{Prior, SkillDraw};
+use playbot_learner::{Prior, SkillDraw, SkillSource};
 
 use crate::{
     agent::{Agent, AgentOrder},
@@ -22,6 +22,12 @@ pub struct SkillPrior {
     pub horizon: u32,
     /// A random draw, or the mean.
     pub draw: SkillDraw,
+}
+
+impl From<&SkillSource> for SkillPrior {
+    fn from(skills: &SkillSource) -> Self {
+        Self { prior: skills.prior.clone(), horizon: skills.horizon as u32, draw: skills.draw }
+    }
 }
 
 /// The skill an agent is following.

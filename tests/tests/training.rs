@@ -28,6 +28,7 @@ const EXPERIMENT: &str = r#"(
     steps: 2048, arenas: 8, worlds: 2,
     skills: (window: 3, epochs: 4, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2, lr: 0.003),
     ppo: (num_steps: 32, minibatches: 4, hidden: [16, 16], lr: 0.003),
+    sac: (num_steps: 4, batch: 32, buffer: 512, learning_starts: 200, hidden: [16, 16], updates_per_step: 0.1),
     score: (horizon: 3),
 )"#;
 
@@ -67,12 +68,13 @@ fn skills(folder: &Path) -> SkillModel {
 
 fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer {
     let skills = algorithm.needs_skills().then_some(skills);
-    Trainer::new(&Corridor, &experiment(), algorithm, skills, DeviceKind::Flex, threads).expect("fits")
+    let experiment = Experiment { algorithm, ..experiment() };
+    Trainer::new(&Corridor, &experiment, skills, DeviceKind::Flex, threads).expect("fits")
 }
 
 /// Trains to the end in `folder` and returns the bytes of metrics and checkpoint.
 fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
-    let run = RunDir::create(folder, trainer.experiment(), &info(trainer.algorithm()), false)
+    let run = RunDir::create(folder, trainer.experiment(), &info(trainer.experiment().algorithm), false)
         .or_else(|error| match error {
             RunError::Exists(_) => RunDir::open(folder).map(|(run, ..)| run),
             other => Err(other),
@@ -122,8 +124,8 @@ fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
             (folder.path().join(format!("{algorithm}-w")), folder.path().join(format!("{algorithm}-h")));
         train(&whole, trainer(algorithm, &skills, 2), None);
         train(&halved, trainer(algorithm, &skills, 2), Some(3));
-        let (run, experiment, info) = RunDir::open(&halved).expect("readable");
-        let resumed = run.resume(&Corridor, &experiment, &info, DeviceKind::Flex, 2).expect("a checkpoint");
+        let (run, experiment, _) = RunDir::open(&halved).expect("readable");
+        let resumed = run.resume(&Corridor, &experiment, DeviceKind::Flex, 2).expect("a checkpoint");
         assert_eq!(resumed.updates(), 3);
         train(&halved, resumed, None);
         assert!(bytes(&whole) == bytes(&halved), "{algorithm}: stopping in the middle changed the result");
@@ -144,8 +146,9 @@ fn ppo_learns_the_corridor() {
     let folder = tempfile::tempdir().expect("a folder");
     let skills = skills(folder.path());
     let mut experiment = experiment();
+    experiment.algorithm = Algorithm::Ppo;
     experiment.steps = 8192;
-    let mut trainer = Trainer::new(&Corridor, &experiment, Algorithm::Ppo, None, DeviceKind::Flex, 2).expect("fits");
+    let mut trainer = Trainer::new(&Corridor, &experiment, None, DeviceKind::Flex, 2).expect("fits");
     let mut last = None;
     while !trainer.is_done() {
         last = trainer.update().expect("learns").success_rate;
@@ -157,7 +160,7 @@ fn ppo_learns_the_corridor() {
 #[test]
 fn skills_are_asked_for_and_must_fit() {
     let refuse = |experiment: &Experiment, skills: Option<&SkillModel>| {
-        let made = Trainer::new(&Corridor, experiment, Algorithm::ScorePpo, skills, DeviceKind::Flex, 1);
+        let made = Trainer::new(&Corridor, experiment, skills, DeviceKind::Flex, 1);
         made.err().expect("must be refused")
     };
     assert!(matches!(refuse(&experiment(), None), TrainError::NoSkills(_)));
@@ -174,7 +177,7 @@ fn skills_and_policies_of_another_game_are_refused() {
     let mut foreign = experiment();
     foreign.train = "hard:0..7".parse().expect("a split");
     foreign.test = "hard:8..15".parse().expect("a split");
-    let made = Trainer::new(&coinrun, &foreign, Algorithm::ScorePpo, Some(&skills), DeviceKind::Flex, 1);
+    let made = Trainer::new(&coinrun, &foreign, Some(&skills), DeviceKind::Flex, 1);
     let text = made.err().expect("must be refused").to_string();
     assert!(text.contains("2 observation values") && text.contains("`coinrun` has 563"), "{text}");
 
@@ -209,8 +212,7 @@ fn an_existing_run_is_not_overwritten() {
     assert!(text.contains("--resume") && text.contains("--force"), "{text}");
     RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), true).expect("forced");
     let nothing = RunDir::open(&path).expect("readable").0;
-    let resumed =
-        nothing.resume(&Corridor, &experiment(), &info(Algorithm::Ppo), DeviceKind::Flex, 1).err().expect("empty");
+    let resumed = nothing.resume(&Corridor, &experiment(), DeviceKind::Flex, 1).err().expect("empty");
     assert!(matches!(resumed, RunError::NoCheckpoint { .. }), "{resumed}");
 }
 

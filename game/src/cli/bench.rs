@@ -139,10 +139,11 @@ fn train(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
     let mut experiment = ExperimentArgs::default().load([])?;
     experiment.arenas = args.arenas;
     experiment.worlds = args.threads as u32;
+    experiment.algorithm = Algorithm::Ppo;
     experiment.ppo.num_steps = 256;
     experiment.ppo.epochs = 3;
     experiment.ppo.minibatches = 8;
-    let mut trainer = Trainer::new(game, &experiment, Algorithm::Ppo, None, DeviceKind::default(), args.threads)?;
+    let mut trainer = Trainer::new(game, &experiment, None, DeviceKind::default(), args.threads)?;
     trainer.update()?;
     trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
     let (start, before) = (Instant::now(), trainer.steps());

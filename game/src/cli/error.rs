@@ -7,6 +7,7 @@ use bevy_playbot::{
     fault::Fault,
     game::UnknownName,
     learner::{FileError, LearnError},
+    policy_file::{ExportError, PolicyMisfit},
     split::SplitError,
     train::{
         config::ExperimentError, config_file::ConfigError, run_dir::RunError, study::StudyError, trainer::TrainError,
@@ -41,7 +42,7 @@ pub enum CliError {
     )]
     Diverged {
         /// What ran away.
-        error: TrainError,
+        error: Box<TrainError>,
         /// Environment steps of the checkpoint.
         step: u64,
         /// Its folder.
@@ -54,7 +55,7 @@ pub enum CliError {
     )]
     NotSaved {
         /// Why.
-        error: RunError,
+        error: Box<RunError>,
         /// Folder of the run.
         run: PathBuf,
     },
@@ -82,6 +83,10 @@ pub enum CliError {
     File(#[from] FileError),
     #[error(transparent)]
     Fault(#[from] Fault),
+    #[error(transparent)]
+    Misfit(#[from] PolicyMisfit),
+    #[error(transparent)]
+    Export(#[from] ExportError),
 }
 
 impl CliError {
@@ -94,20 +99,21 @@ impl CliError {
             | Self::Config(_)
             | Self::Experiment(_)
             | Self::Study(_)
-            | Self::Demo(_) => 3,
-            Self::File(error) => file_code(error),
-            Self::Run(error) | Self::NotSaved { error, .. } => match error {
-                RunError::Io { .. } => 2,
-                RunError::Learner(error) => file_code(error),
-                RunError::Train(error) => train_code(error),
-                _ => 3,
-            },
+            | Self::Demo(_)
+            | Self::Misfit(_) => 3,
+            Self::File(error) | Self::Export(ExportError::File(error)) => file_code(error),
+            Self::Run(error) => run_code(error),
+            Self::NotSaved { error, .. } => run_code(error),
             Self::Train(error) => train_code(error),
             Self::Verify(VerifyError::Fault(_)) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),
             Self::Verify(_) => 3,
-            Self::BrokenPipe | Self::Io(_) | Self::Fault(_) | Self::Diverged { .. } => 2,
+            Self::BrokenPipe
+            | Self::Io(_)
+            | Self::Fault(_)
+            | Self::Export(ExportError::Fault(_))
+            | Self::Diverged { .. } => 2,
         }
     }
 }
@@ -115,6 +121,15 @@ impl CliError {
 /// A setting can be put right by the caller; a loss that is no number cannot.
 fn learn_code(error: &LearnError) -> u8 {
     if matches!(error, LearnError::NotFinite { .. }) { 2 } else { 3 }
+}
+
+fn run_code(error: &RunError) -> u8 {
+    match error {
+        RunError::Io { .. } => 2,
+        RunError::Learner(error) => file_code(error),
+        RunError::Train(error) => train_code(error),
+        _ => 3,
+    }
 }
 
 /// A file that is not there or not what it should be was named by the caller; a disk that fails was not.

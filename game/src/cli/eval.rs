@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     eval::Player,
     game::{Game, check_mode},
-    learner::{DeviceKind, PpoLearner, SkillModel},
+    learner::{DeviceKind, PolicyFile, SkillModel, SkillSource},
     policy::ActionDraw,
+    policy_file::check_policy,
     report::to_text_table,
     skill_prior::SkillPrior,
     split::LevelSplit,
-    train::{Experiment, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
+    train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
 };
 
 use super::{
@@ -37,6 +38,9 @@ pub struct Args {
     /// Skill model: measures behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Vec<PathBuf>,
+    /// Policy file, as written by `playbot policy export`; may be given several times.
+    #[arg(long)]
+    policy: Vec<PathBuf>,
     /// Bot of the game, such as random, right-jump or search; may be given several times.
     #[arg(long)]
     bot: Vec<String>,
@@ -66,9 +70,10 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
-    if args.run.is_empty() && args.skills.is_empty() && args.bot.is_empty() {
+    if args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty() && args.bot.is_empty() {
         return Err(CliError::Usage(
-            "nobody to measure: name a --run, a --skills file or a --bot (see `playbot eval --help`)".to_owned(),
+            "nobody to measure: name a --run, a --skills file, a --policy or a --bot (see `playbot eval --help`)"
+                .to_owned(),
         ));
     }
     let experiment = read_experiment(&args)?;
@@ -110,13 +115,9 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut players = Vec::new();
     for path in &args.run {
-        let (run, own, info) = RunDir::open(path)?;
-        let learner = PpoLearner::load(&run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
-        let prior = learner.prior().map(|prior| SkillPrior {
-            prior,
-            horizon: own.score.horizon as u32,
-            draw: own.score.skill_draw,
-        });
+        let (run, _, info) = RunDir::open(path)?;
+        let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
+        let prior = learner.skills().as_ref().map(SkillPrior::from);
         players.push((
             named(info.algorithm.name(), path, args.run.len()),
             Player::Policy { policy: learner.policy(), prior, draw },
@@ -125,6 +126,13 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
         players.push((named("bc", path, args.skills.len()), cloning(&model, experiment, draw)));
+    }
+    for path in &args.policy {
+        let file = PolicyFile::load(path, args.device)?;
+        check_policy(game, &file)?;
+        let prior = file.skills.as_ref().map(SkillPrior::from);
+        let name = named(&file.card.algorithm, path, args.policy.len());
+        players.push((name, Player::Policy { policy: file.policy, prior, draw }));
     }
     for name in &args.bot {
         players.push((name.clone(), methods::bot(game, name)?));
@@ -144,9 +152,14 @@ fn named(method: &str, path: &Path, of: usize) -> String {
 
 /// Behaviour cloning: the decoder under the prior, without any reinforcement learning.
 pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
-    let (horizon, skill_draw) = (experiment.score.horizon as u32, experiment.score.skill_draw);
-    let prior = SkillPrior { prior: model.prior(), horizon, draw: skill_draw };
-    Player::Policy { policy: model.policy(), prior: Some(prior), draw }
+    let skills = cloning_skills(model, experiment);
+    Player::Policy { policy: model.policy(), prior: Some(SkillPrior::from(&skills)), draw }
+}
+
+/// The skills of behaviour cloning, held and drawn as the experiment says.
+pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
+    let (horizon, draw) = (experiment.score.horizon, experiment.score.skill_draw);
+    SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
 }
 
 fn check_fit(

@@ -11,6 +11,7 @@ mod interrupt;
 mod learn_skills;
 mod level;
 mod methods;
+mod policy;
 mod progress;
 mod quickstart;
 mod record;
@@ -46,6 +47,7 @@ Examples:
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
+  playbot policy export --run runs/first --out coinrun.policy
   playbot config show --set ppo.lr=0.0003          an experiment with all its values
   playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
 
@@ -69,6 +71,8 @@ enum Verb {
     Config(config::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
+    /// Make and look at policy files.
+    Policy(policy::Args),
     /// Show a level.
     Level(level::Args),
     /// Play given actions and print the state after each.
@@ -115,6 +119,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Study(args) => study::run(args),
         Verb::Config(args) => config::run(args),
         Verb::Eval(args) => eval::run(args),
+        Verb::Policy(args) => policy::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),
         Verb::Bench(args) => bench::run(args),

@@ -165,7 +165,7 @@ fn train_one(
 ) -> Result<Trained, CliError> {
     let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
-    let mut trainer = Trainer::new(game, &experiment, algorithm, skills, DeviceKind::default(), args.threads)?;
+    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads)?;
     let run = create_run(&args.run.join(algorithm.name()), &experiment, true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {

@@ -125,10 +125,9 @@ impl Runner {
             return Ok(Some((cloning(skills, experiment, draw), None, Vec::new())));
         }
         let mut trainer = if begun {
-            let info = RunDir::open(dir.path())?.2;
-            dir.resume(game, experiment, &info, self.device, self.threads)?
+            dir.resume(game, experiment, self.device, self.threads)?
         } else {
-            Trainer::new(game, experiment, experiment.algorithm, skills.as_ref(), self.device, self.threads)?
+            Trainer::new(game, experiment, skills.as_ref(), self.device, self.threads)?
         };
         if !drive(dir, &mut trainer, title, |report| on_step(report.step))? {
             return Ok(None);

@@ -30,7 +30,7 @@ use crate::registry;
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
-    /// score-ppo or ppo, instead of the experiment's.
+    /// score-ppo, ppo, score-sac or sac, instead of the experiment's.
     #[arg(long, conflicts_with = "resume")]
     algorithm: Option<Algorithm>,
     /// Skill model, as written by `playbot learn-skills`.
@@ -85,13 +85,13 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
         Some(path) => Some(SkillModel::load(path, args.device)?),
         None => None,
     };
-    let trainer = Trainer::new(game, &experiment, experiment.algorithm, skills.as_ref(), args.device, args.threads)?;
+    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.device, args.threads)?;
     let run = create_run(&args.run, &experiment, args.force)?;
     Ok((run, trainer))
 }
 
 fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
-    let (run, saved, info) = RunDir::open(&args.run)?;
+    let (run, saved, _) = RunDir::open(&args.run)?;
     let game = registry::game(&saved.game)?;
     let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
     let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
@@ -99,7 +99,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
         experiment.check()?;
         run.write_experiment(&experiment)?;
     }
-    let trainer = run.resume(game, &experiment, &info, args.device, args.threads)?;
+    let trainer = run.resume(game, &experiment, args.device, args.threads)?;
     eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
     Ok((run, trainer))
 }
@@ -159,14 +159,14 @@ pub fn drive(
 }
 
 fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
-    run.save(trainer).map_err(|error| CliError::NotSaved { error, run: run.path().into() })
+    run.save(trainer).map_err(|error| CliError::NotSaved { error: error.into(), run: run.path().into() })
 }
 
 /// The error of a training, with the checkpoint that is left if its numbers ran away.
 fn stopped_by(run: &RunDir, error: TrainError) -> CliError {
     match (&error, run.checkpoint(Which::Last)) {
         (TrainError::Learn(LearnError::NotFinite { .. }), Ok(checkpoint)) => {
-            CliError::Diverged { error, step: checkpoint.summary.step, checkpoint: checkpoint.path }
+            CliError::Diverged { error: error.into(), step: checkpoint.summary.step, checkpoint: checkpoint.path }
         }
         _ => error.into(),
     }

@@ -60,6 +60,12 @@ impl Game for CoinRun {
         ActionSpace::Discrete(usize::from(ACTIONS))
     }
 
+    fn action_names(&self) -> Vec<String> {
+        let names = ["left+down", "left", "left+jump", "down", "none", "jump", "right+down", "right", "right+jump"];
+        let unused = ["D", "A", "W", "S", "Q", "E"].map(|key| format!("none ({key})"));
+        names.map(str::to_owned).into_iter().chain(unused).collect()
+    }
+
     fn observation(&self) -> ObservationSpace {
         (**SPACE).clone()
     }

@@ -79,6 +79,21 @@ pub enum FileError {
         /// What is wrong with it.
         detail: String,
     },
+    /// The file was written by a newer version of this program.
+    #[error(
+        "{path}: is a {kind} of format {found}, but this program reads format {readable} only: it was written by a newer \
+         version; update this program"
+    )]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
+        /// Its format.
+        found: u32,
+        /// The format that can be read.
+        readable: u32,
+    },
     /// A tensor that the model needs is not in the file.
     #[error("{path}: tensor `{name}` is missing")]
     MissingTensor {
@@ -106,6 +121,23 @@ pub enum FileError {
         expected: Vec<usize>,
         /// The file's shape.
         found: Vec<usize>,
+    },
+    /// A policy does not say of an example what it said when the file was written.
+    #[error(
+        "{path}: example {example}: {what} is {found}, but was {expected} when the file was written: the file is damaged, \
+         or this program computes policies in another way; export the policy again"
+    )]
+    Example {
+        /// The file.
+        path: PathBuf,
+        /// Number of the example, from 0.
+        example: usize,
+        /// Which output.
+        what: &'static str,
+        /// What the file says.
+        expected: f32,
+        /// What came out.
+        found: f32,
     },
     /// The description in the file does not make a valid learner.
     #[error("{path}: {source}")]

@@ -4,7 +4,7 @@ use crate::nn::{Adam, ParamVisitor, Parameters, host};
 use crate::{FileError, LearnError};
 use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io::Write;
@@ -12,6 +12,13 @@ use std::path::{Path, PathBuf};
 
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";
+
+/// What every description begins with.
+#[derive(Deserialize)]
+struct Format {
+    kind: String,
+    version: u32,
+}
 
 /// A tensor in host memory.
 #[derive(Clone, Debug)]
@@ -50,6 +57,18 @@ impl TensorFile {
         self.tensors.insert(name.to_owned(), Stored { shape, dtype: Dtype::F64, bytes });
     }
 
+    /// Adds a vector of whole numbers.
+    pub(crate) fn put_u32(&mut self, name: &str, values: &[u32]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.tensors.insert(name.to_owned(), Stored { shape: vec![values.len()], dtype: Dtype::U32, bytes });
+    }
+
+    /// Adds a vector of flags, as bytes 0 and 1.
+    pub(crate) fn put_flags(&mut self, name: &str, values: &[bool]) {
+        let bytes = values.iter().map(|&flag| u8::from(flag)).collect();
+        self.tensors.insert(name.to_owned(), Stored { shape: vec![values.len()], dtype: Dtype::U8, bytes });
+    }
+
     /// Adds all parameters of `network`.
     pub(crate) fn put_network<M: Parameters + Clone>(&mut self, prefix: &str, network: &M) -> Result<(), FileError> {
         let mut writer = Put { file: self, error: None };
@@ -82,15 +101,20 @@ impl TensorFile {
 
     /// Reads a whole file.
     pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
-        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
         let bytes = fs::read(path).map_err(|source| FileError::Io { path: path.to_owned(), source })?;
-        let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Takes a whole file from memory; `path` is for messages.
+    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
+        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
         let description = metadata
             .metadata()
             .as_ref()
             .and_then(|map| map.get(DESCRIPTION).cloned())
             .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry")))?;
-        let views = SafeTensors::deserialize(&bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let views = SafeTensors::deserialize(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
         let tensors = views
             .iter()
             .map(|(name, view)| {
@@ -119,6 +143,18 @@ impl TensorFile {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
+    /// Takes out a vector of `len` whole numbers.
+    pub(crate) fn take_u32(&mut self, name: &str, len: usize) -> Result<Vec<u32>, FileError> {
+        let bytes = self.take_bytes(name, Some(&[len]), Dtype::U32)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out a vector of `len` flags.
+    pub(crate) fn take_flags(&mut self, name: &str, len: usize) -> Result<Vec<bool>, FileError> {
+        let bytes = self.take_bytes(name, Some(&[len]), Dtype::U8)?;
+        Ok(bytes.into_iter().map(|byte| byte != 0).collect())
+    }
+
     /// Takes out all parameters of `network`, which gives their shapes, and puts them on `device`.
     pub(crate) fn take_network<M: Parameters>(
         &mut self,
@@ -131,17 +167,18 @@ impl TensorFile {
         reader.error.map_or(Ok(()), Err)
     }
 
-    /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`.
+    /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`, called by `prefix`.
     pub(crate) fn take_adam<M: Parameters>(
         &mut self,
         adam: &mut Adam,
+        prefix: &str,
         network: &mut M,
         steps: u64,
     ) -> Result<(), FileError> {
         adam.steps = steps;
         let mut names = Names(Vec::new());
         if steps > 0 {
-            network.visit("", &mut names);
+            network.visit(prefix, &mut names);
         }
         for (name, shape) in names.0 {
             let m = self.take(&format!("adam.m.{name}"), &shape)?;
@@ -151,13 +188,23 @@ impl TensorFile {
         Ok(())
     }
 
-    /// `Ok` if the file calls itself a `kind` of `version`.
-    pub(crate) fn check_kind(&self, (kind, version): (&str, u32), found: (&str, u32)) -> Result<(), FileError> {
-        if found == (kind, version) {
-            return Ok(());
+    /// `Ok` if the file calls itself a `kind` of `version`. Comes before [`Self::description`], which a newer version may
+    /// have changed.
+    pub(crate) fn check_format(&self, kind: &'static str, version: u32) -> Result<(), FileError> {
+        let found: Format = self.description()?;
+        if found.kind != kind {
+            return Err(self.format(format!("is a {}, expected a {kind}", found.kind)));
         }
-        let (found, other) = found;
-        Err(self.format(format!("is a {found} of version {other}, expected a {kind} of version {version}")))
+        if found.version > version {
+            let path = self.path.clone();
+            return Err(FileError::Newer { path, kind, found: found.version, readable: version });
+        }
+        if found.version < version {
+            let detail =
+                format!("is a {kind} of the old format {}, this program reads format {version}", found.version);
+            return Err(self.format(detail));
+        }
+        Ok(())
     }
 
     /// Fails if any tensor was not taken out.
@@ -166,6 +213,11 @@ impl TensorFile {
             None => Ok(()),
             Some(name) => Err(FileError::ExtraTensor { path: self.path, name }),
         }
+    }
+
+    /// The file's name.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// An error about this file's contents.

@@ -9,6 +9,8 @@
 //!   batch of observations. The decoder under the prior is one ([`SkillModel::policy`]): behaviour cloning.
 //! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO: the policy sees
 //!   the skill z, starts as a copy of the decoder, and pays for leaving it where the decoder is sure ([`ScoreConfig`]).
+//! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps what was
+//!   played and learns from it again and again.
 //!
 //! Rows are flat `f32` slices in host memory, row-major. All randomness comes from generators that the caller owns or
 //! from the named [`rng::Streams`] of one seed: the same seed gives the same numbers, whatever the number of threads.
@@ -37,15 +39,17 @@ pub mod norm;
 pub mod policy;
 pub mod ppo;
 pub mod rng;
+pub mod sac;
 pub mod score;
 pub mod skill;
 mod space;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
-pub use policy::{Policy, PolicyOutput, StdKind};
+pub use policy::{Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
 pub use ppo::{EndStates, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
 pub use rng::{RngState, Streams};
+pub use sac::{EntropyCoef, SacConfig, SacLearner, SacMetrics};
 pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
 pub use skill::{
     Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel, SkillProgress,

@@ -141,6 +141,26 @@ impl Actions {
         Ok(())
     }
 
+    /// Puts row `row` of `other` at `at`, in place of the action there or behind the last one.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if `other` is of another kind or width.
+    pub(crate) fn write(&mut self, at: usize, other: &Self, row: usize) -> Result<(), LearnError> {
+        if at == self.len() {
+            return self.extend_rows(other, row, row + 1);
+        }
+        match (self, other) {
+            (Self::Discrete(to), Self::Discrete(from)) => to[at] = from[row],
+            (Self::Continuous { dim, values }, Self::Continuous { dim: d, values: from }) if dim == d => {
+                values[at * *d..(at + 1) * *d].copy_from_slice(&from[row * *d..(row + 1) * *d]);
+            }
+            (all, other) => {
+                return Err(LearnError::Action(format!("{} among {}", other.kind(), all.kind())));
+            }
+        }
+        Ok(())
+    }
+
     /// The actions at `rows`, in that order.
     pub(crate) fn gather(&self, rows: &[usize]) -> Self {
         match self {

@@ -14,26 +14,37 @@ pub enum Algorithm {
     ScorePpo,
     /// PPO without skills: the same network, steps and tuning.
     Ppo,
+    /// SAC with skills: the decoder's penalty under SAC.
+    ScoreSac,
+    /// SAC without skills.
+    Sac,
     /// Behaviour cloning: the skill model's decoder under its prior, as learned from demonstrations.
     BehaviourCloning,
 }
 
 impl Algorithm {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::ScorePpo, Self::Ppo, Self::BehaviourCloning];
+    pub const ALL: [Self; 5] = [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac, Self::BehaviourCloning];
 
     /// Name on the command line, in files and in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::ScorePpo => "score-ppo",
             Self::Ppo => "ppo",
+            Self::ScoreSac => "score-sac",
+            Self::Sac => "sac",
             Self::BehaviourCloning => "bc",
         }
     }
 
     /// Whether a skill model is needed.
     pub fn needs_skills(self) -> bool {
-        self != Self::Ppo
+        matches!(self, Self::ScorePpo | Self::ScoreSac | Self::BehaviourCloning)
+    }
+
+    /// Whether it is of SAC's family, whose settings are the experiment's `sac`; `ppo` belongs to the other.
+    pub fn is_sac(self) -> bool {
+        matches!(self, Self::ScoreSac | Self::Sac)
     }
 
     /// Whether it learns from play; the others are ready as soon as they have their skills.

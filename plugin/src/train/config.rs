@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use playbot_learner::{PpoConfig, ScoreConfig, SkillConfig};
+use playbot_learner::{PpoConfig, SacConfig, ScoreConfig, SkillConfig};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -13,8 +13,8 @@ use crate::split::LevelSplit;
 /// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
 /// defaults.
 ///
-/// Networks belong to what they are part of: `ppo.hidden` and `ppo.activation` are those of actor and critic,
-/// `skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden` and `skills.gru_layers` those of the skill model. A
+/// Networks belong to what they are part of: `ppo.hidden` and `ppo.activation` (or `sac.…`) are those of actor and
+/// critic, `skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden` and `skills.gru_layers` those of the skill model. A
 /// policy that starts as a copy of the decoder has the decoder's layers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,9 +51,12 @@ pub struct Experiment {
     /// The skill model.
     #[serde(default)]
     pub skills: SkillConfig,
-    /// The learner.
+    /// The learner of score-ppo and ppo.
     #[serde(default)]
     pub ppo: PpoConfig,
+    /// The learner of score-sac and sac.
+    #[serde(default)]
+    pub sac: SacConfig,
     /// The three steps of SCORE.
     #[serde(default)]
     pub score: ScoreConfig,
@@ -195,6 +198,7 @@ impl Experiment {
         self.skills.validate().map_err(settings)?;
         self.score.validate().map_err(settings)?;
         self.ppo_config().validate().map_err(settings)?;
+        self.sac.validate().map_err(settings)?;
         self.check_batches()
     }
 
@@ -207,8 +211,8 @@ impl Experiment {
             let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
             return refuse("worlds", worlds, why);
         }
-        let (batch, minibatches) = (self.steps_per_update(), self.ppo.minibatches as u64);
-        if !batch.is_multiple_of(minibatches) {
+        let (batch, minibatches) = (arenas * self.ppo.num_steps as u64, self.ppo.minibatches as u64);
+        if !self.algorithm.is_sac() && !batch.is_multiple_of(minibatches) {
             let (steps, near) = (self.ppo.num_steps, nearest_divisor(batch, minibatches));
             let why = format!("must divide `arenas` × `ppo.num_steps` = {arenas} × {steps} = {batch}; {near} does");
             return refuse("ppo.minibatches", minibatches, why);
@@ -231,9 +235,14 @@ impl Experiment {
         config
     }
 
+    /// Ticks of one rollout.
+    pub fn rollout_steps(&self) -> usize {
+        if self.algorithm.is_sac() { self.sac.num_steps } else { self.ppo.num_steps }
+    }
+
     /// Environment steps of one rollout.
     pub fn steps_per_update(&self) -> u64 {
-        u64::from(self.arenas) * self.ppo.num_steps as u64
+        u64::from(self.arenas) * self.rollout_steps() as u64
     }
 
     /// Rollouts, and so updates, of the whole training.

@@ -9,6 +9,7 @@ mod config_error;
 pub mod config_file;
 mod config_keys;
 mod config_set;
+pub mod learner;
 pub mod presets;
 mod ron_keys;
 pub mod run_dir;
@@ -17,4 +18,5 @@ pub mod trainer;
 pub mod worlds;
 
 pub use config::{Algorithm, Experiment};
+pub use learner::{Learner, LearnerMetrics};
 pub use trainer::{Trainer, UpdateReport};

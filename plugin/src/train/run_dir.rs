@@ -14,7 +14,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{DeviceKind, FileError, PpoLearner};
+use playbot_learner::{DeviceKind, FileError};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use thiserror::Error;
@@ -24,6 +24,7 @@ use super::{
     checkpoint::{self, Checkpoint, Which},
     config::{Algorithm, Experiment},
     config_file::{ConfigError, read_experiment},
+    learner::Learner,
     trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
@@ -230,13 +231,12 @@ impl RunDir {
         &self,
         game: &dyn Game,
         experiment: &Experiment,
-        info: &RunInfo,
         device: DeviceKind,
         threads: usize,
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
-        let (learner, state) = self.last_readable(device)?;
-        let mut trainer = Trainer::with_learner(game, experiment, info.algorithm, learner, threads)?;
+        let (learner, state) = self.last_readable(experiment.algorithm, device)?;
+        let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
         for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
@@ -247,10 +247,10 @@ impl RunDir {
         Ok(trainer)
     }
 
-    fn last_readable(&self, device: DeviceKind) -> Result<(PpoLearner, TrainState), RunError> {
+    fn last_readable(&self, algorithm: Algorithm, device: DeviceKind) -> Result<(Learner, TrainState), RunError> {
         let mut first_error = None;
         for checkpoint in checkpoint::list(&self.path)?.iter().rev() {
-            match read_checkpoint(checkpoint, device) {
+            match read_checkpoint(checkpoint, algorithm, device) {
                 Ok(read) => return Ok(read),
                 Err(error) => {
                     tracing::warn!("checkpoint of step {} cannot be read: {error}", checkpoint.summary.step);
@@ -262,8 +262,12 @@ impl RunDir {
     }
 }
 
-fn read_checkpoint(checkpoint: &Checkpoint, device: DeviceKind) -> Result<(PpoLearner, TrainState), RunError> {
-    let learner = PpoLearner::load(&checkpoint.learner_file(), device)?;
+fn read_checkpoint(
+    checkpoint: &Checkpoint,
+    algorithm: Algorithm,
+    device: DeviceKind,
+) -> Result<(Learner, TrainState), RunError> {
+    let learner = Learner::load(algorithm, &checkpoint.learner_file(), device)?;
     let path = checkpoint.arenas_file();
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let state = serde_json::from_str(&text).map_err(|error| damaged(&path, &error))?;

@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Instant};
 
 use bevy::prelude::World;
-use playbot_learner::{DeviceKind, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SkillModel, UpdateMetrics};
+use playbot_learner::{DeviceKind, LearnError, Policy, Rollout, SkillModel};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -12,6 +12,7 @@ use super::{
     checkpoint::CheckpointSummary,
     collect::Collector,
     config::{Algorithm, Experiment, ExperimentError},
+    learner::{Learner, LearnerMetrics},
     worlds::on_threads,
 };
 use crate::{
@@ -94,7 +95,7 @@ pub struct UpdateReport {
     /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
     pub initial_kl: Option<f32>,
     /// What the learner reports.
-    pub learner: UpdateMetrics,
+    pub learner: LearnerMetrics,
     /// Where the time went.
     pub timing: Timing,
 }
@@ -125,9 +126,8 @@ pub struct Timing {
 /// One algorithm being trained on one experiment.
 pub struct Trainer {
     experiment: Experiment,
-    algorithm: Algorithm,
     threads: usize,
-    pub(crate) learner: PpoLearner,
+    pub(crate) learner: Learner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
 }
@@ -149,37 +149,28 @@ impl Trainer {
     pub fn new(
         game: &dyn Game,
         experiment: &Experiment,
-        algorithm: Algorithm,
         skills: Option<&SkillModel>,
         device: DeviceKind,
         threads: usize,
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
-        let learner = new_learner(game, experiment, algorithm, skills, device)?;
-        Self::with_learner(game, experiment, algorithm, learner, threads)
+        let learner = Learner::new(game, experiment, skills, device)?;
+        Self::with_learner(game, experiment, learner, threads)
     }
 
     /// A trainer around a learner that exists already, for an experiment that was checked.
     pub(crate) fn with_learner(
         game: &dyn Game,
         experiment: &Experiment,
-        algorithm: Algorithm,
-        learner: PpoLearner,
+        learner: Learner,
         threads: usize,
     ) -> Result<Self, TrainError> {
-        let prior = skill_prior(experiment, &learner);
+        let prior = learner.skills().as_ref().map(SkillPrior::from);
         let share = experiment.arenas / experiment.worlds;
         let collectors = (0..experiment.worlds)
             .map(|world| Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone()))
             .collect();
-        Ok(Self {
-            experiment: experiment.clone(),
-            algorithm,
-            threads,
-            learner,
-            collectors,
-            progress: Progress::default(),
-        })
+        Ok(Self { experiment: experiment.clone(), threads, learner, collectors, progress: Progress::default() })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -190,7 +181,7 @@ impl Trainer {
     pub fn update(&mut self) -> Result<UpdateReport, TrainError> {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
-        let steps = self.experiment.ppo.num_steps;
+        let steps = self.experiment.rollout_steps();
         let collected = on_threads(&mut self.collectors, self.threads, |world| world.collect(&policy, latent, steps));
         let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
         for part in collected {
@@ -211,7 +202,7 @@ impl Trainer {
 
     /// Before the first update of SCORE, the policy must be the decoder, to the bit.
     fn initial_kl(&self, rollout: &Rollout) -> Result<Option<f32>, LearnError> {
-        let copied = self.algorithm.needs_skills() && self.experiment.score.init_from_decoder;
+        let copied = self.experiment.algorithm.needs_skills() && self.experiment.score.init_from_decoder;
         if self.progress.updates > 0 || !copied {
             return Ok(None);
         }
@@ -240,11 +231,6 @@ impl Trainer {
         &self.experiment
     }
 
-    /// The algorithm.
-    pub fn algorithm(&self) -> Algorithm {
-        self.algorithm
-    }
-
     /// The policy as it is now.
     pub fn policy(&self) -> Policy {
         self.learner.policy()
@@ -257,7 +243,7 @@ impl Trainer {
 
     /// Where the policy's skills come from, if it has any.
     pub fn skill_prior(&self) -> Option<SkillPrior> {
-        skill_prior(&self.experiment, &self.learner)
+        self.learner.skills().as_ref().map(SkillPrior::from)
     }
 }
 
@@ -267,40 +253,6 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     check_mode(game, &experiment.train.mode)?;
     check_mode(game, &experiment.test.mode)?;
     Ok(())
-}
-
-fn new_learner(
-    game: &dyn Game,
-    experiment: &Experiment,
-    algorithm: Algorithm,
-    skills: Option<&SkillModel>,
-    device: DeviceKind,
-) -> Result<PpoLearner, TrainError> {
-    let (obs_dim, action_space) = (game.observation().len(), game.actions());
-    let config = experiment.ppo_config();
-    if !algorithm.needs_skills() {
-        let spec = PolicySpec { obs_dim, latent: 0, action_space };
-        return Ok(PpoLearner::new(config, spec, experiment.seed, device)?);
-    }
-    if !algorithm.is_trained() {
-        return Err(TrainError::NotTrained(algorithm));
-    }
-    let skills = skills.ok_or(TrainError::NoSkills(algorithm))?;
-    if (skills.obs_dim(), skills.action_space()) != (obs_dim, action_space) {
-        return Err(TrainError::ForeignSkills {
-            game: game.name().to_owned(),
-            model_obs: skills.obs_dim(),
-            model_actions: skills.action_space(),
-            game_obs: obs_dim,
-            game_actions: action_space,
-        });
-    }
-    Ok(PpoLearner::with_skill(config, experiment.score.clone(), skills, experiment.seed, device)?)
-}
-
-fn skill_prior(experiment: &Experiment, learner: &PpoLearner) -> Option<SkillPrior> {
-    let (horizon, draw) = (experiment.score.horizon as u32, experiment.score.skill_draw);
-    learner.prior().map(|prior| SkillPrior { prior, horizon, draw })
 }
 
 impl Progress {
@@ -336,7 +288,7 @@ impl Progress {
         }
     }
 
-    fn report(&self, learner: UpdateMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
+    fn report(&self, learner: LearnerMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
         UpdateReport {
             update: self.updates,
             step: self.steps,

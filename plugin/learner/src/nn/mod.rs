@@ -14,6 +14,7 @@ mod linear;
 mod mlp;
 mod params;
 mod sample;
+mod squash;
 mod tensors;
 
 pub use activation::Activation;
@@ -26,5 +27,8 @@ pub use linear::Linear;
 pub use mlp::Mlp;
 pub(crate) use params::path;
 pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
-pub use sample::{argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
-pub(crate) use tensors::{host, matrix, scalar, vector};
+pub use sample::{
+    argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
+};
+pub use squash::{LogProbForm, SquashedDraw, SquashedGaussian, bounded_log_std};
+pub(crate) use tensors::{finite, host, matrix, scalar, vector};

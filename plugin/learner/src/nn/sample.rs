@@ -57,6 +57,17 @@ pub fn gaussian_log_prob(mean: &[f32], log_std: &[f32], value: &[f32]) -> f32 {
     terms.sum::<f64>() as f32
 }
 
+/// The log-density of tanh(`pre_tanh`) where `pre_tanh` is normal, summed over dimensions:
+/// ln N(x) - ln(1 - tanh² x), with ln(1 - tanh² x) = 2 (ln 2 - |x| - ln(1 + e^(-2|x|))).
+pub fn squashed_log_prob(mean: &[f32], log_std: &[f32], pre_tanh: &[f32]) -> f32 {
+    let slope = |x: f32| {
+        let x = f64::from(x).abs();
+        2.0 * (std::f64::consts::LN_2 - x - (-2.0 * x).exp().ln_1p())
+    };
+    let slopes: f64 = pre_tanh.iter().map(|&x| slope(x)).sum();
+    (f64::from(gaussian_log_prob(mean, log_std, pre_tanh)) - slopes) as f32
+}
+
 fn max(values: &[f32]) -> f64 {
     f64::from(values.iter().copied().fold(f32::NEG_INFINITY, f32::max))
 }

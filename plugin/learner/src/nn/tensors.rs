@@ -23,3 +23,12 @@ pub(crate) fn host<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, LearnE
 pub(crate) fn scalar(tensor: Tensor<1>) -> Result<f32, LearnError> {
     tensor.try_into_scalar::<f32>().map_err(|e| LearnError::Device(e.to_string()))
 }
+
+/// The number of a `[1]` tensor, tracked or not, which must be finite; `steps` optimizer steps were done before.
+pub(crate) fn finite(name: &str, tensor: &Tensor<1>, steps: u64) -> Result<f64, LearnError> {
+    let value = scalar(tensor.clone().inner())?;
+    if value.is_finite() {
+        return Ok(f64::from(value));
+    }
+    Err(LearnError::NotFinite { tensor: name.to_owned(), steps })
+}

@@ -10,8 +10,8 @@ const CLIP: f64 = 10.0;
 /// Mean and scale per dimension, fixed at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObsStats {
-    mean: Vec<f64>,
-    inv_std: Vec<f64>,
+    pub(crate) mean: Vec<f64>,
+    pub(crate) inv_std: Vec<f64>,
 }
 
 impl ObsStats {

@@ -33,25 +33,51 @@ impl RewardNormalizer {
     /// # Errors
     /// [`LearnError::Shape`] if `envs` is not what it was in earlier calls, or the lengths differ.
     pub fn normalize(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<Vec<f32>, LearnError> {
+        let mut out = Vec::with_capacity(rewards.len());
+        self.each_step(rewards, done, envs, |scaler, rewards| out.extend(rewards.iter().map(|&r| scaler.scale(r))))?;
+        Ok(out)
+    }
+
+    /// Only takes in what [`Self::normalize`] does: for learners that keep raw rewards and scale them when they read
+    /// them ([`Self::scale`]).
+    ///
+    /// # Errors
+    /// As [`Self::normalize`].
+    pub fn update(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<(), LearnError> {
+        self.each_step(rewards, done, envs, |_, _| {})
+    }
+
+    /// A reward by the present variance: clip(r/√(var + 1e-8), ±10).
+    pub fn scale(&self, reward: f32) -> f32 {
+        let scale = 1.0 / (self.stats.var[0] + EPS).sqrt();
+        (f64::from(reward) * scale).clamp(-CLIP, CLIP) as f32
+    }
+
+    /// Takes in the rewards step by step and calls `seen` with each step's after it was taken in.
+    fn each_step(
+        &mut self,
+        rewards: &[f32],
+        done: &[bool],
+        envs: usize,
+        mut seen: impl FnMut(&Self, &[f32]),
+    ) -> Result<(), LearnError> {
         if self.returns.is_empty() {
             self.returns = vec![0.0; envs];
         }
         LearnError::check("environments of the reward normaliser", self.returns.len(), envs)?;
         LearnError::check("episode ends", rewards.len(), done.len())?;
-        let mut out = Vec::with_capacity(rewards.len());
         for (rewards, done) in rewards.chunks_exact(envs).zip(done.chunks_exact(envs)) {
             for (g, &r) in self.returns.iter_mut().zip(rewards) {
                 *g = self.gamma * *g + f64::from(r);
             }
             self.stats.update(self.returns.iter().copied(), envs);
-            let scale = 1.0 / (self.stats.var[0] + EPS).sqrt();
-            out.extend(rewards.iter().map(|&r| (f64::from(r) * scale).clamp(-CLIP, CLIP) as f32));
+            seen(self, rewards);
             for (g, &done) in self.returns.iter_mut().zip(done) {
                 if done {
                     *g = 0.0;
                 }
             }
         }
-        Ok(out)
+        Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The network that gives a distribution over actions.
 
 use crate::ActionSpace;
-use crate::nn::{Activation, Dist, Linear, Mlp, ParamVisitor, Parameters, path, vector};
+use crate::nn::{Activation, Dist, Linear, Mlp, ParamVisitor, Parameters, bounded_log_std, path, vector};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,14 @@ pub enum LogStd {
     Vector(Tensor<1>),
     /// From the last hidden layer.
     State(Linear),
+    /// From the last hidden layer and bounded smoothly, for a squashed Gaussian: the action is the tanh of the normal
+    /// number (Haarnoja et al. 2018, "Soft actor-critic algorithms and applications").
+    Squashed {
+        /// Gives the raw number under [`bounded_log_std`].
+        layer: Linear,
+        /// Bounds of ln σ.
+        range: (f64, f64),
+    },
 }
 
 /// Sizes of an actor or critic.
@@ -77,6 +85,26 @@ impl Actor {
         Self { net, log_std }
     }
 
+    /// Logits, or a squashed Gaussian with ln σ within `log_std_range`. Orthogonal weights as in [`Self::new`].
+    pub fn squashed<R: Rng + ?Sized>(
+        shape: &NetShape,
+        space: ActionSpace,
+        log_std_range: (f64, f64),
+        rng: &mut R,
+        device: &Device,
+    ) -> Self {
+        let mut actor = Self::new(shape, space, StdKind::State, rng, device);
+        if let LogStd::State(layer) = actor.log_std {
+            actor.log_std = LogStd::Squashed { layer, range: log_std_range };
+        }
+        actor
+    }
+
+    /// Whether its actions are the tanh of the normal numbers whose distribution [`Self::forward`] gives.
+    pub fn is_squashed(&self) -> bool {
+        matches!(self.log_std, LogStd::Squashed { .. })
+    }
+
     /// The distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`.
     pub fn forward(&self, x: Tensor<2>) -> Dist {
         self.head(self.net.features(x))
@@ -97,6 +125,9 @@ impl Actor {
                 let (low, high) = LOG_STD_RANGE;
                 Dist::Gaussian { mean: head, log_std: layer.forward(features).clamp(low, high) }
             }
+            LogStd::Squashed { layer, range } => {
+                Dist::Gaussian { mean: head, log_std: bounded_log_std(layer.forward(features), *range) }
+            }
         }
     }
 }
@@ -107,7 +138,7 @@ impl Parameters for Actor {
         match &mut self.log_std {
             LogStd::None => {}
             LogStd::Vector(tensor) => visitor.visit(&path(prefix, "log_std"), tensor),
-            LogStd::State(layer) => layer.visit(&path(prefix, "log_std"), visitor),
+            LogStd::State(layer) | LogStd::Squashed { layer, .. } => layer.visit(&path(prefix, "log_std"), visitor),
         }
     }
 }

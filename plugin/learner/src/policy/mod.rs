@@ -2,12 +2,14 @@
 
 mod actor;
 mod critic;
+mod file;
 mod join;
 mod output;
 mod snapshot;
 
 pub use actor::{Actor, LogStd, NetShape, StdKind};
 pub use critic::Critic;
+pub use file::{PolicyCard, PolicyFile, SkillSource};
 pub(crate) use join::joined_rows;
 pub use output::PolicyOutput;
 pub use snapshot::Policy;

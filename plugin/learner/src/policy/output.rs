@@ -1,6 +1,8 @@
 //! What a policy says about a batch of observations.
 
-use crate::nn::{argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
+use crate::nn::{
+    argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
+};
 use crate::{Action, ActionSpace, LearnError};
 use rand::Rng;
 
@@ -9,6 +11,8 @@ use rand::Rng;
 pub struct PolicyOutput {
     /// What the rows act in.
     pub space: ActionSpace,
+    /// Whether a continuous action is the tanh of a normal number, which `head` and `log_std` then describe.
+    pub squashed: bool,
     /// Normalised log-probabilities (discrete) or means (continuous), `n * dim`.
     pub head: Vec<f32>,
     /// Logarithms of the standard deviations, `n * dim`; empty if discrete.
@@ -43,24 +47,31 @@ impl PolicyOutput {
             }
             ActionSpace::Continuous(_) => {
                 let action = sample_gaussian(head, self.stds(row), rng);
+                if self.squashed {
+                    let log_prob = squashed_log_prob(head, self.stds(row), &action);
+                    return (Action::Continuous(squash(&action)), log_prob);
+                }
                 let log_prob = gaussian_log_prob(head, self.stds(row), &action);
                 (Action::Continuous(action), log_prob)
             }
         }
     }
 
-    /// The most likely action of `row`: the first of the most likely choices, or the mean.
+    /// The most likely action of `row`: the first of the most likely choices, or the mean (squashed: its tanh, the
+    /// median).
     ///
     /// # Panics
     /// If `row` is not below [`Self::len`].
     pub fn greedy(&self, row: usize) -> Action {
         match self.space {
             ActionSpace::Discrete(_) => Action::Discrete(argmax(self.head(row))),
+            ActionSpace::Continuous(_) if self.squashed => Action::Continuous(squash(self.head(row))),
             ActionSpace::Continuous(_) => Action::Continuous(self.head(row).to_vec()),
         }
     }
 
-    /// Log-probability (or log-density) of `action` in `row`.
+    /// Log-probability (or log-density) of `action` in `row`. A squashed action beyond ±(1 - 1e-6), where single
+    /// precision cannot tell the normal number any more, counts as lying there; one beyond ±1 has density 0.
     ///
     /// # Errors
     /// [`LearnError::Action`] if the action is not in the space.
@@ -71,6 +82,12 @@ impl PolicyOutput {
         match (self.space, action) {
             (ActionSpace::Discrete(n), Action::Discrete(a)) if (*a as usize) < n => {
                 Ok(categorical_log_prob(self.head(row), *a))
+            }
+            (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n && self.squashed => {
+                if a.iter().any(|x| x.abs() > 1.0) {
+                    return Ok(f32::NEG_INFINITY);
+                }
+                Ok(squashed_log_prob(self.head(row), self.stds(row), &unsquash(a)))
             }
             (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n => {
                 Ok(gaussian_log_prob(self.head(row), self.stds(row), a))
@@ -87,5 +104,66 @@ impl PolicyOutput {
     fn stds(&self, row: usize) -> &[f32] {
         let dim = self.space.dim();
         &self.log_std[row * dim..(row + 1) * dim]
+    }
+}
+
+fn squash(numbers: &[f32]) -> Vec<f32> {
+    numbers.iter().map(|x| x.tanh()).collect()
+}
+
+fn unsquash(action: &[f32]) -> Vec<f32> {
+    let edge = 1.0 - 1e-6;
+    action.iter().map(|&a| f64::from(a).clamp(-edge, edge).atanh() as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Streams;
+
+    fn output(mean: f32, std: f32) -> PolicyOutput {
+        PolicyOutput {
+            space: ActionSpace::Continuous(1),
+            squashed: true,
+            head: vec![mean],
+            log_std: vec![std.ln()],
+            values: vec![0.0],
+        }
+    }
+
+    #[test]
+    fn squashed_densities_add_up_to_one() {
+        let output = output(0.4, 0.7);
+        let n = 20_000;
+        let width = 2.0 / n as f32;
+        let density = |i: usize| {
+            let action = -1.0 + (i as f32 + 0.5) * width;
+            f64::from(output.log_prob(0, &Action::Continuous(vec![action])).expect("fits")).exp()
+        };
+        let total: f64 = (0..n).map(density).sum::<f64>() * f64::from(width);
+        assert!((total - 1.0).abs() < 1e-3, "{total}");
+        assert_eq!(output.log_prob(0, &Action::Continuous(vec![1.5])).expect("fits"), f32::NEG_INFINITY);
+    }
+
+    #[test]
+    fn squashed_draws_carry_their_own_density() {
+        let output = output(-0.3, 0.5);
+        let mut rng = Streams::new(1).stream("draw", 0);
+        let mut below = 0;
+        for _ in 0..4000 {
+            let (action, log_prob) = output.sample(0, &mut rng);
+            assert!((output.log_prob(0, &action).expect("fits") - log_prob).abs() < 1e-3);
+            let Action::Continuous(a) = action else { panic!("continuous") };
+            assert!(a[0].abs() <= 1.0);
+            below += usize::from(a[0] < (-0.3f32).tanh());
+        }
+        assert!((1850..2150).contains(&below), "half of the draws lie below the median: {below}");
+        assert_eq!(output.greedy(0), Action::Continuous(vec![(-0.3f32).tanh()]));
+    }
+
+    #[test]
+    fn the_edge_of_a_squashed_action_has_a_finite_density() {
+        let output = output(9.0, 1.0);
+        assert!(output.log_prob(0, &Action::Continuous(vec![1.0])).expect("fits").is_finite());
     }
 }

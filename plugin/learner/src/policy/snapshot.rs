@@ -13,12 +13,12 @@ use std::sync::Arc;
 /// are in the batch or on the number of threads.
 #[derive(Clone, Debug)]
 pub struct Policy {
-    actor: Actor,
-    critic: Option<Critic>,
-    stats: Option<Arc<ObsStats>>,
-    space: ActionSpace,
-    obs_dim: usize,
-    latent: usize,
+    pub(super) actor: Actor,
+    pub(super) critic: Option<Critic>,
+    pub(super) stats: Option<Arc<ObsStats>>,
+    pub(super) space: ActionSpace,
+    pub(super) obs_dim: usize,
+    pub(super) latent: usize,
     device: Device,
 }
 
@@ -67,7 +67,7 @@ impl Policy {
     pub fn forward(&self, z: &[f32], obs: &[f32], n: usize) -> Result<PolicyOutput, LearnError> {
         if n == 0 {
             let (head, log_std, values) = Default::default();
-            return Ok(PolicyOutput { space: self.space, head, log_std, values });
+            return Ok(self.output(head, log_std, values));
         }
         let x = self.inputs(z, obs, n)?;
         let dist = self.actor.forward(x.clone()).to_host()?;
@@ -90,7 +90,11 @@ impl Policy {
                 return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: 0 });
             }
         }
-        Ok(PolicyOutput { space: self.space, head, log_std, values })
+        Ok(self.output(head, log_std, values))
+    }
+
+    fn output(&self, head: Vec<f32>, log_std: Vec<f32>, values: Vec<f32>) -> PolicyOutput {
+        PolicyOutput { space: self.space, squashed: self.actor.is_squashed(), head, log_std, values }
     }
 
     /// Only the values of [`Self::forward`]; zeros if there is no critic.

@@ -2,19 +2,11 @@
 
 use super::{PpoBatch, Rollout, normalize_advantages};
 use crate::Actions;
-use crate::nn::{ActionRows, Dist, HostDist, matrix, vector};
+use crate::nn::{ActionRows, matrix, vector};
 use crate::norm::ObsStats;
 use crate::policy::joined_rows;
+use crate::score::{DecoderBatch, DecoderRows};
 use burn::tensor::{Device, Tensor};
-
-/// The frozen decoder's side of a rollout.
-#[derive(Debug)]
-pub(super) struct DecoderRows {
-    /// The decoder's distributions.
-    pub(super) dist: HostDist,
-    /// α of each row.
-    pub(super) alpha: Vec<f32>,
-}
 
 /// Everything an update reads, one entry per row.
 #[derive(Debug)]
@@ -38,17 +30,6 @@ pub struct Minibatch {
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
     pub decoder: Option<DecoderBatch>,
-}
-
-/// The frozen decoder's side of a minibatch.
-#[derive(Clone, Debug)]
-pub struct DecoderBatch {
-    /// Its distributions.
-    pub dist: Dist,
-    /// α of each row, `[n]`.
-    pub alpha: Tensor<1>,
-    /// Mean of α.
-    pub alpha_mean: f64,
 }
 
 impl Prepared<'_> {
@@ -77,15 +58,7 @@ impl Prepared<'_> {
                 old_values: vector(pick(&rollout.values), device),
                 returns: vector(pick(&self.returns), device),
             },
-            decoder: self.decoder.as_ref().map(|decoder| {
-                let alpha = pick(&decoder.alpha);
-                let sum: f64 = alpha.iter().map(|&a| f64::from(a)).sum();
-                DecoderBatch {
-                    dist: decoder.dist.rows(rows, device),
-                    alpha_mean: sum / alpha.len() as f64,
-                    alpha: vector(alpha, device),
-                }
-            }),
+            decoder: self.decoder.as_ref().map(|decoder| decoder.batch(rows, device)),
         }
     }
 }

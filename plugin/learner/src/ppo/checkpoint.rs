@@ -1,11 +1,10 @@
 //! A learner's complete state in one file.
 
-use super::frozen::FrozenSkill;
 use super::{PolicySpec, PpoConfig, PpoLearner};
 use crate::file::TensorFile;
 use crate::nn::tracked;
-use crate::norm::RunningStats;
-use crate::score::ScoreConfig;
+use crate::norm::{put_normalizers, take_normalizers};
+use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::SkillDescription;
 use crate::{DeviceKind, FileError};
 use serde::{Deserialize, Serialize};
@@ -53,17 +52,10 @@ impl PpoLearner {
         let mut file = TensorFile::new(path, &header)?;
         file.put_network("", &self.nets)?;
         if let Some(skill) = &self.skill {
-            file.put_network("decoder", &skill.decoder)?;
-            file.put_network("prior", &skill.prior)?;
+            skill.put(&mut file)?;
         }
         file.put_adam(&self.adam);
-        if let Some(normalizer) = &self.observations {
-            put_stats(&mut file, "obs_norm", &normalizer.stats);
-        }
-        if let Some(normalizer) = &self.rewards {
-            put_stats(&mut file, "reward_norm", &normalizer.stats);
-            file.put_f64("reward_norm.returns", &normalizer.returns);
-        }
+        put_normalizers(&mut file, self.observations.as_ref(), self.rewards.as_ref());
         file.write()
     }
 
@@ -73,48 +65,20 @@ impl PpoLearner {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
+        file.check_format(KIND, VERSION)?;
         let header: Header = file.description()?;
-        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
-        let skill = match (header.score, header.skill) {
-            (Some(config), Some(description)) => {
-                let nets = description.nets(device).map_err(|e| file.learner(e))?;
-                Some(FrozenSkill { config, description, decoder: nets.decoder, prior: nets.prior })
-            }
-            _ => None,
-        };
+        let skill = FrozenSkill::described(header.score, header.skill, device).map_err(|e| file.learner(e))?;
         let mut learner =
             Self::build(header.config, header.spec, skill, header.seed, device).map_err(|e| file.learner(e))?;
-        let plain = device.plain();
-        file.take_network("", &mut learner.nets, &plain)?;
+        file.take_network("", &mut learner.nets, &device.plain())?;
         learner.nets = tracked(&learner.nets);
         if let Some(skill) = &mut learner.skill {
-            file.take_network("decoder", &mut skill.decoder, &plain)?;
-            file.take_network("prior", &mut skill.prior, &plain)?;
+            skill.take(&mut file, device)?;
         }
-        if let Some(normalizer) = &mut learner.observations {
-            take_stats(&mut file, "obs_norm", &mut normalizer.stats)?;
-        }
-        if let Some(normalizer) = &mut learner.rewards {
-            take_stats(&mut file, "reward_norm", &mut normalizer.stats)?;
-            normalizer.returns = file.take_f64("reward_norm.returns", None)?;
-        }
+        take_normalizers(&mut file, learner.observations.as_mut(), learner.rewards.as_mut())?;
         learner.updates = header.updates;
-        file.take_adam(&mut learner.adam, &mut learner.nets, header.adam_steps)?;
+        file.take_adam(&mut learner.adam, "", &mut learner.nets, header.adam_steps)?;
         file.finish()?;
         Ok(learner)
     }
-}
-
-fn put_stats(file: &mut TensorFile, name: &str, stats: &RunningStats) {
-    file.put_f64(&format!("{name}.mean"), &stats.mean);
-    file.put_f64(&format!("{name}.var"), &stats.var);
-    file.put_f64(&format!("{name}.count"), &[stats.count]);
-}
-
-fn take_stats(file: &mut TensorFile, name: &str, stats: &mut RunningStats) -> Result<(), FileError> {
-    let dim = stats.dim();
-    stats.mean = file.take_f64(&format!("{name}.mean"), Some(dim))?;
-    stats.var = file.take_f64(&format!("{name}.var"), Some(dim))?;
-    stats.count = file.take_f64(&format!("{name}.count"), Some(1))?[0];
-    Ok(())
 }

@@ -1,14 +1,13 @@
 //! The learner: PPO, and SCORE-PPO if it is given a skill model.
 
 use super::batch::Prepared;
-use super::frozen::FrozenSkill;
 use super::update::{StepMetrics, gradient_step};
 use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
 use crate::nn::{Adam, AdamConfig, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, Critic, NetShape, Policy, StdKind};
+use crate::policy::{Actor, Critic, NetShape, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
-use crate::score::{PriorKind, ScoreConfig};
+use crate::score::{DecoderRows, FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
 use crate::{DeviceKind, LearnError};
 
@@ -50,12 +49,7 @@ impl PpoLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
-        let skill = FrozenSkill {
-            config: score,
-            description: model.description.clone(),
-            decoder: model.nets.decoder.clone(),
-            prior: model.nets.prior.clone(),
-        };
+        let skill = FrozenSkill::new(score, model);
         Self::build(config, skill.spec(), Some(skill), seed, device)
     }
 
@@ -78,22 +72,14 @@ impl PpoLearner {
             activation: config.activation,
         };
         let plain = device.plain();
-        let fresh = || {
+        let copy = match &skill {
+            Some(skill) => skill.copy(config.norm_obs)?,
+            None => None,
+        };
+        let actor = copy.unwrap_or_else(|| {
             let mut rng = streams.stream("ppo.actor", 0);
             Actor::new(&shape, spec.action_space, StdKind::Vector, &mut rng, &plain)
-        };
-        let actor = match &skill {
-            None => fresh(),
-            Some(skill) => {
-                skill.config.validate()?;
-                if skill.config.init_from_decoder && config.norm_obs {
-                    let text =
-                        "ppo norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
-                    return Err(LearnError::Config(text.to_owned()));
-                }
-                if skill.config.init_from_decoder { skill.decoder.clone() } else { fresh() }
-            }
-        };
+        });
         let critic = Critic::new(&shape, &mut streams.stream("ppo.critic", 0), &plain);
         let adam = AdamConfig { eps: config.adam_eps, ..AdamConfig::default() };
         Ok(Self {
@@ -127,7 +113,7 @@ impl PpoLearner {
 
     /// Width of the skills that a rollout must hold.
     pub fn rollout_latent(&self) -> usize {
-        self.skill.as_ref().map_or(self.spec.latent, |skill| skill.description.config.latent)
+        self.skill.as_ref().map_or(self.spec.latent, FrozenSkill::latent)
     }
 
     /// Updates done.
@@ -142,15 +128,12 @@ impl PpoLearner {
 
     /// Where skills come from, by [`ScoreConfig::prior`]; `None` without a skill model.
     pub fn prior(&self) -> Option<Prior> {
-        let skill = self.skill.as_ref()?;
-        let (latent, tanh) = (skill.description.config.latent, skill.description.config.tanh_latent);
-        Some(match skill.config.prior {
-            PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
-            PriorKind::Learned => {
-                let device = self.device.plain();
-                Prior::learned(&skill.prior, skill.description.obs_dim, latent, tanh, device)
-            }
-        })
+        self.skill.as_ref().map(|skill| skill.prior(self.device))
+    }
+
+    /// Where the policy's skills come from, and its decoder; `None` without a skill model.
+    pub fn skills(&self) -> Option<SkillSource> {
+        self.skill.as_ref().map(|skill| skill.source(self.device))
     }
 
     /// A snapshot of the policy that plays, with its critic.
@@ -159,6 +142,17 @@ impl PpoLearner {
         let widths = (self.spec.obs_dim, self.spec.latent);
         let (actor, critic) = (&self.nets.actor, Some(&self.nets.critic));
         Policy::new(actor, critic, stats, self.spec.action_space, widths, self.device.plain())
+    }
+
+    /// Mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is still a copy
+    /// of the decoder. `None` without a skill model.
+    ///
+    /// # Errors
+    /// [`LearnError::InitialKl`] if the policy should be a copy (no update was done, and
+    /// [`ScoreConfig::init_from_decoder`]) and the divergence is not exactly 0; [`LearnError::Shape`].
+    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
+        let Some(skill) = &self.skill else { return Ok(None) };
+        skill.initial_kl(&self.policy(), self.updates == 0, (z, obs, n), self.device).map(Some)
     }
 
     /// Trains on a rollout: epochs × minibatches gradient steps.
@@ -220,6 +214,13 @@ impl PpoLearner {
         let batch = prepared.minibatch(rows, &self.device.plain());
         let score = self.skill.as_ref().map(|skill| &skill.config);
         gradient_step(&mut self.nets, &mut self.adam, &batch, &self.config, score, lr)
+    }
+
+    /// The decoder's distributions and α for the whole rollout: it is frozen, so once per update is enough.
+    fn decoder_rows(&self, rollout: &Rollout) -> Result<Option<DecoderRows>, LearnError> {
+        let Some(skill) = &self.skill else { return Ok(None) };
+        let mut rng = self.streams.stream("score.own_samples", self.updates);
+        skill.rows((&rollout.z, &rollout.obs), &rollout.actions, false, &mut rng, self.device)
     }
 
     fn check(&self, rollout: &Rollout) -> Result<(), LearnError> {

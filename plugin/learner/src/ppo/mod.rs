@@ -3,7 +3,6 @@
 mod batch;
 mod checkpoint;
 mod config;
-mod frozen;
 mod gae;
 mod learner;
 mod loss;
@@ -12,7 +11,7 @@ mod nets;
 mod rollout;
 mod update;
 
-pub use batch::{DecoderBatch, Minibatch};
+pub use batch::Minibatch;
 pub use config::{PolicySpec, PpoConfig, TimeLimit};
 pub use gae::{Advantages, gae};
 pub use learner::PpoLearner;

@@ -3,9 +3,8 @@
 use super::batch::Minibatch;
 use super::{PpoConfig, PpoNets, ppo_loss, ratio_stats};
 use crate::LearnError;
-use crate::nn::{Adam, NamedGrads, host, scalar};
+use crate::nn::{Adam, NamedGrads, finite, host};
 use crate::score::{ScoreConfig, decoder_kl};
-use burn::tensor::Tensor;
 
 /// What one gradient step looked like, before it was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,37 +63,29 @@ pub fn gradient_step(
     let dist = nets.actor.forward(batch.inputs.clone());
     let values = nets.critic.forward(batch.inputs.clone());
     let loss = ppo_loss(&dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
+    let steps = adam.steps();
     let mut metrics = StepMetrics {
-        policy_loss: read("policy_loss", &loss.policy_loss, adam)?,
-        value_loss: read("value_loss", &loss.value_loss, adam)?,
-        entropy: read("entropy", &loss.entropy, adam)?,
+        policy_loss: finite("policy_loss", &loss.policy_loss, steps)?,
+        value_loss: finite("value_loss", &loss.value_loss, steps)?,
+        entropy: finite("entropy", &loss.entropy, steps)?,
         ..StepMetrics::default()
     };
     let mut total = loss.policy_loss - loss.entropy * config.ent_coef + loss.value_loss * config.vf_coef;
     if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
         let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
         let penalty = (kl.clone() * decoder.alpha.clone()).mean();
-        metrics.decoder_kl = read("decoder_kl", &kl.mean(), adam)?;
-        metrics.kl_penalty = read("kl_penalty", &penalty, adam)?;
+        metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
+        metrics.kl_penalty = finite("kl_penalty", &penalty, steps)?;
         metrics.alpha_mean = decoder.alpha_mean;
         total = total + penalty * score.kl_coef;
     }
     let ratios = ratio_stats(&host(loss.log_ratio.inner())?, config.clip);
     metrics.approx_kl = ratios.approx_kl;
     metrics.clip_fraction = ratios.clip_fraction;
-    metrics.total_loss = read("total_loss", &total, adam)?;
+    metrics.total_loss = finite("total_loss", &total, steps)?;
     let grads = NamedGrads::read(nets, "", &total.backward())?;
     let (norm, scale) = grads.clip_factor(config.max_grad_norm, adam.steps())?;
     metrics.grad_norm = norm;
     adam.step(nets, "", &grads, lr, scale)?;
     Ok(metrics)
-}
-
-/// The number of a `[1]` tensor, which must be finite.
-fn read(name: &str, tensor: &Tensor<1>, adam: &Adam) -> Result<f64, LearnError> {
-    let value = scalar(tensor.clone().inner())?;
-    if value.is_finite() {
-        return Ok(f64::from(value));
-    }
-    Err(LearnError::NotFinite { tensor: name.to_owned(), steps: adam.steps() })
 }

@@ -6,8 +6,15 @@
 
 mod alpha;
 mod config;
+mod decoder;
+mod frozen;
 mod penalty;
+mod unsquash;
 
 pub use alpha::{alphas, own_samples};
 pub use config::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
+pub use decoder::DecoderBatch;
+pub(crate) use decoder::DecoderRows;
+pub(crate) use frozen::FrozenSkill;
 pub use penalty::decoder_kl;
+pub use unsquash::unsquashed;

@@ -60,8 +60,8 @@ impl SkillTrainer {
     /// [`FileError`] says what is wrong with the file or does not fit the demonstrations.
     pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
+        file.check_format(KIND, VERSION)?;
         let header: Header = file.description()?;
-        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
         let skill = header.skill;
         for (what, expected, found) in [
             ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),
@@ -76,7 +76,7 @@ impl SkillTrainer {
         let mut trainer = Self::new(skill.config, dataset, header.seed, device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut trainer.nets, &device.plain())?;
         trainer.nets = tracked(&trainer.nets);
-        file.take_adam(&mut trainer.adam, &mut trainer.nets, header.adam_steps)?;
+        file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;
         trainer.sums.count = header.batches;
         let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
         trainer.sums.total.copy_from_slice(&sums);

@@ -107,8 +107,8 @@ impl SkillModel {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
+        file.check_format(KIND, VERSION)?;
         let header: Header = file.description()?;
-        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
         let description = header.skill;
         let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut nets, &device.plain())?;

@@ -19,9 +19,9 @@ pub enum SkillDraw {
 /// Draws skills for states. Clones share the weights.
 #[derive(Clone, Debug)]
 pub struct Prior {
-    net: Option<(Actor, usize, Device)>,
+    pub(crate) net: Option<(Actor, usize, Device)>,
     latent: usize,
-    tanh: bool,
+    pub(crate) tanh: bool,
 }
 
 impl Prior {

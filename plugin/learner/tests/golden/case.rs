@@ -140,10 +140,9 @@ impl Case {
     /// Asserts that every expected tensor and number was compared, but for those that start with one of `skipped`.
     pub fn finish(&self, skipped: &[&str]) {
         let checked = self.checked.borrow();
-        let tensors = self
-            .tensors
-            .keys()
-            .filter(|name| ["out.", "grad.", "after.", "adam_", "step1_grad."].iter().any(|p| name.starts_with(p)));
+        let tensors = self.tensors.keys().filter(|name| {
+            ["out.", "grad.", "grad_", "after.", "adam_", "step1_grad."].iter().any(|p| name.starts_with(p))
+        });
         let numbers = self.json["expected"].as_object().into_iter().flat_map(|map| map.keys());
         for name in tensors.chain(numbers) {
             let skip = skipped.iter().any(|prefix| name.starts_with(prefix));
@@ -222,7 +221,11 @@ fn their_name(name: &str) -> String {
         .replace("encoder.", "enc.")
         .replace("decoder.head", "dec.mean")
         .replace("decoder.", "dec.")
-        .replace("prior.head", "prior.mean");
+        .replace("prior.head", "prior.mean")
+        .replace("sac_actor.head", "actor.mean")
+        .replace("sac_actor.", "actor.")
+        .replace("target.q1.", "q1_target.")
+        .replace("target.q2.", "q2_target.");
     name.replace("frozen.", "decoder.").replace("gru.uni", "uni").replace("gru.bi", "bi")
 }
 

@@ -9,5 +9,6 @@ mod gru;
 mod kl;
 mod norm;
 mod ppo_loss;
+mod sac;
 mod update;
 mod vae;

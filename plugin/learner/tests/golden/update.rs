@@ -4,11 +4,9 @@ use crate::case::{Case, host};
 use burn::tensor::{Tensor, TensorData};
 use playbot_learner::nn::{ActionRows, Activation, Adam, AdamConfig, ParamVisitor, Parameters, tracked};
 use playbot_learner::policy::{Actor, Critic, NetShape};
-use playbot_learner::ppo::{
-    DecoderBatch, Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages,
-};
+use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages};
 use playbot_learner::rng::Streams;
-use playbot_learner::score::alphas;
+use playbot_learner::score::{DecoderBatch, alphas};
 use playbot_learner::{ActionSpace, Actions, AlphaKind, DeviceKind, PpoConfig, ScoreConfig, StdKind};
 
 fn check(name: &str) {
@@ -178,7 +176,7 @@ impl<'a> Update<'a> {
     }
 }
 
-struct After<'a>(&'a Case);
+pub struct After<'a>(pub &'a Case);
 
 impl ParamVisitor for After<'_> {
     fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
@@ -186,7 +184,7 @@ impl ParamVisitor for After<'_> {
     }
 }
 
-struct Names(Vec<String>);
+pub struct Names(pub Vec<String>);
 
 impl ParamVisitor for Names {
     fn visit<const D: usize>(&mut self, name: &str, _: &mut Tensor<D>) {

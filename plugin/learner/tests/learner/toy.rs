@@ -1,7 +1,9 @@
 //! A corridor, and a driver that plays it.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal};
-use playbot_learner::{Action, ActionSpace, Actions, PolicyOutput, PpoLearner, Rollout, RolloutStep, SkillDraw};
+use playbot_learner::{
+    Action, ActionSpace, Actions, Policy, PolicyOutput, PpoLearner, Prior, Rollout, RolloutStep, SacLearner, SkillDraw,
+};
 
 /// Steps until an episode is cut off.
 const LIMIT: usize = 40;
@@ -45,7 +47,42 @@ impl Corridor {
     }
 }
 
-/// Plays several corridors for PPO.
+/// A learner whose policy can be played.
+pub trait Plays {
+    fn policy(&self) -> Policy;
+    fn rollout_latent(&self) -> usize;
+    fn prior(&self) -> Option<Prior>;
+}
+
+impl Plays for PpoLearner {
+    fn policy(&self) -> Policy {
+        self.policy()
+    }
+
+    fn rollout_latent(&self) -> usize {
+        self.rollout_latent()
+    }
+
+    fn prior(&self) -> Option<Prior> {
+        self.prior()
+    }
+}
+
+impl Plays for SacLearner {
+    fn policy(&self) -> Policy {
+        self.policy()
+    }
+
+    fn rollout_latent(&self) -> usize {
+        self.rollout_latent()
+    }
+
+    fn prior(&self) -> Option<Prior> {
+        self.prior()
+    }
+}
+
+/// Plays several corridors for a learner.
 pub struct Driver {
     corridors: Vec<Corridor>,
     skills: Vec<f32>,
@@ -72,7 +109,7 @@ impl Driver {
     }
 
     /// Draws new skills where the time has come (or for all).
-    fn draw(&mut self, learner: &PpoLearner, obs: &[f32], all: bool) {
+    fn draw(&mut self, learner: &impl Plays, obs: &[f32], all: bool) {
         let Some(prior) = learner.prior() else { return };
         let rngs = &mut self.rngs;
         let fresh = prior
@@ -89,7 +126,7 @@ impl Driver {
     }
 
     /// Plays `steps` ticks with the learner's policy.
-    pub fn rollout(&mut self, learner: &PpoLearner, steps: usize) -> Rollout {
+    pub fn rollout(&mut self, learner: &impl Plays, steps: usize) -> Rollout {
         let envs = self.corridors.len();
         let policy = learner.policy();
         let latent = learner.rollout_latent();
@@ -108,7 +145,8 @@ impl Driver {
                 terminated.push(end);
                 truncated.push(cut);
             }
-            let final_values = policy.values(&self.skills, &self.observe(), envs).expect("finite");
+            let last = self.observe();
+            let final_values = policy.values(&self.skills, &last, envs).expect("finite");
             for (row, corridor) in self.corridors.iter_mut().enumerate() {
                 if terminated[row] || truncated[row] {
                     self.lengths.push(corridor.time);
@@ -127,10 +165,16 @@ impl Driver {
                 final_values: &final_values,
             };
             rollout.push_step(step).expect("discrete");
+            for row in (0..envs).filter(|&row| truncated[row] && !terminated[row]) {
+                let skill = &z[row * latent..(row + 1) * latent];
+                rollout.push_cut(row, &last[row * OBS..(row + 1) * OBS], skill);
+            }
             obs = self.observe();
             self.draw(learner, &obs, false);
         }
         rollout.next_values = policy.values(&self.skills, &obs, envs).expect("finite");
+        rollout.ends.next_z = self.skills.clone();
+        rollout.ends.next_obs = obs;
         rollout
     }
 

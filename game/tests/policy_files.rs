@@ -1,0 +1,158 @@
+//! Policy files: exported by the program, read back by a game, and refused where they do not fit.
+
+use std::{path::Path, process::Command};
+
+use bevy_playbot::{
+    game::build_world,
+    learner::{ActionSpace, DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner},
+    policy_file::{PolicyFile, PolicyMisfit, check_policy, export_policy, install_policy, policy_file},
+    prelude::*,
+};
+use playbot_games::coinrun::CoinRun;
+use serde_json::Value;
+
+fn learner(obs_dim: usize) -> PpoLearner {
+    let spec = PolicySpec { obs_dim, latent: 0, action_space: ActionSpace::Discrete(15) };
+    let config = PpoConfig { hidden: vec![32, 32], norm_obs: true, ..PpoConfig::default() };
+    PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid")
+}
+
+/// A policy file of an untrained policy, written into `folder`.
+fn exported(folder: &Path) -> std::path::PathBuf {
+    let game = CoinRun::default();
+    let about = ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
+    let file = policy_file(&game, learner(563).policy(), None, about);
+    let path = folder.join("bot.policy");
+    export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, &path).expect("writable");
+    path
+}
+
+/// Changes the header of a safetensors file, whose length stands in its first eight bytes.
+fn edit_header(path: &Path, edit: impl FnOnce(&mut Value)) -> Vec<u8> {
+    let bytes = std::fs::read(path).expect("readable");
+    let length = u64::from_le_bytes(bytes[..8].try_into().expect("eight bytes")) as usize;
+    let mut header: Value = serde_json::from_slice(&bytes[8..8 + length]).expect("JSON");
+    edit(&mut header);
+    let header = header.to_string();
+    [&(header.len() as u64).to_le_bytes()[..], header.as_bytes(), &bytes[8 + length..]].concat()
+}
+
+fn read(bytes: &[u8]) -> Result<PolicyFile, FileError> {
+    PolicyFile::from_bytes(Path::new("bot.policy"), bytes, DeviceKind::Flex)
+}
+
+#[test]
+fn a_policy_file_plays_in_a_game() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = exported(folder.path());
+    for device in DeviceKind::ALL {
+        let file = PolicyFile::load(&path, device).expect("sound");
+        let game = CoinRun::default();
+        assert_eq!(check_policy(&game, &file), Ok(()));
+        let (mut world, agents) = build_world(&game, "hard", 1, 0, 1);
+        install_policy(&mut world, &file, ActionDraw::Sample);
+        world.entity_mut(agents[0]).insert((Control::Policy, LevelQueue::Always(0)));
+        world.ticks(20).expect("it decides");
+    }
+}
+
+#[test]
+fn a_policy_file_of_a_newer_version_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let newer = edit_header(&exported(folder.path()), |header| {
+        let text = header["__metadata__"]["playbot"].as_str().expect("a description").to_owned();
+        let mut description: Value = serde_json::from_str(&text).expect("JSON");
+        description["version"] = 2.into();
+        description["something new"] = true.into();
+        header["__metadata__"]["playbot"] = description.to_string().into();
+    });
+    let error = read(&newer).expect_err("too new");
+    assert!(matches!(error, FileError::Newer { found: 2, readable: 1, .. }), "{error}");
+    assert!(error.to_string().contains("update this program"), "{error}");
+}
+
+#[test]
+fn a_policy_that_computes_something_else_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = exported(folder.path());
+    let mut bytes = std::fs::read(&path).expect("readable");
+    // The first tensor by name is the actor's bias or weight: one flipped sign bit in every number changes it.
+    let length = u64::from_le_bytes(bytes[..8].try_into().expect("eight bytes")) as usize;
+    let header: Value = serde_json::from_slice(&bytes[8..8 + length]).expect("JSON");
+    let span = &header["actor.l0.weight"]["data_offsets"];
+    let (from, to) = (span[0].as_u64().expect("offset") as usize, span[1].as_u64().expect("offset") as usize);
+    for at in (8 + length + from + 3..8 + length + to).step_by(4) {
+        bytes[at] ^= 0x80;
+    }
+    let error = read(&bytes).expect_err("another policy");
+    assert!(matches!(error, FileError::Example { .. }), "{error}");
+    assert!(error.to_string().contains("example"), "{error}");
+}
+
+#[test]
+fn torn_and_foreign_files_are_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = exported(folder.path());
+    let bytes = std::fs::read(&path).expect("readable");
+    assert!(read(&bytes[..bytes.len() / 2]).expect_err("torn").to_string().contains("not safetensors"));
+    let renamed = edit_header(&path, |header| {
+        let tensor = header["critic.l1.bias"].take();
+        header.as_object_mut().expect("a map").remove("critic.l1.bias");
+        header["critic.l1.tias"] = tensor;
+    });
+    let error = read(&renamed).expect_err("a tensor is missing").to_string();
+    assert!(error.contains("`critic.l1.bias` is missing"), "{error}");
+    let file = folder.path().join("checkpoint");
+    learner(563).save(&file).expect("writable");
+    let error = PolicyFile::load(&file, DeviceKind::Flex).expect_err("a checkpoint").to_string();
+    assert!(error.contains("expected a policy"), "{error}");
+}
+
+#[test]
+fn a_policy_of_another_game_names_the_difference() {
+    let game = CoinRun::default();
+    let about = || ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
+    let mut file = policy_file(&game, learner(563).policy(), None, about());
+    file.card.observations[7] = "heat".to_owned();
+    let error = check_policy(&game, &file).expect_err("another observation");
+    assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
+    file.card.game_version = 9;
+    assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Version { made_for: 9, now: 1, .. })));
+    file.card.game = "chess".to_owned();
+    assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Game { .. })));
+}
+
+#[test]
+fn the_program_exports_shows_and_measures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let playbot = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder.path()).output();
+        let output = output.expect("the program starts");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned(), errors)
+    };
+    let experiment = r#"(game: "coinrun", train: "hard:0..3", test: "hard:64..67", demos: "none", steps: 512, arenas: 4,
+        ppo: (num_steps: 32, minibatches: 2, hidden: [16]))"#;
+    std::fs::write(folder.path().join("small.ron"), experiment).expect("writable");
+    let done = |(code, _, errors): &(Option<i32>, String, String)| assert_eq!(*code, Some(0), "{errors}");
+    done(&playbot(&["train", "--algorithm", "ppo", "--experiment", "small.ron", "--run", "run"]));
+    done(&playbot(&["policy", "export", "--run", "run", "--out", "bot.policy"]));
+    let again = playbot(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
+    assert_eq!(again.0, Some(3));
+    let shown = playbot(&["policy", "show", "bot.policy", "--json"]);
+    done(&shown);
+    let card: Value = serde_json::from_str(&shown.1).expect("JSON");
+    assert_eq!(card["card"]["actions"][8], "right+jump");
+    assert_eq!(card["card"]["training"], "512 of 512 steps on hard:0..3, seed 1");
+    let measure = |args: &[&str]| {
+        let output = playbot(&[&["eval", "--levels", "hard:64..67", "--json", "--seed", "1"], args].concat());
+        done(&output);
+        let row: Value = serde_json::from_str(&output.1).expect("JSON");
+        (row["return_mean"].clone(), row["length_mean"].clone())
+    };
+    assert_eq!(
+        measure(&["--policy", "bot.policy", "--experiment", "small.ron"]),
+        measure(&["--run", "run"]),
+        "the file plays otherwise than the run it was made of"
+    );
+}

@@ -1,0 +1,62 @@
+//! What plays before anything was learned.
+
+use crate::nn::{Activation, Linear, Mlp, matrix, vector};
+use crate::policy::{Actor, LogStd};
+use crate::{ActionSpace, PolicySpec};
+use burn::tensor::Device;
+
+/// σ at which the tanh of a normal number is nearly uniform: that of the logistic distribution whose tanh is exactly
+/// uniform, π/(2√3). The density in [-0.98, 0.98] lies between 0.44 and 0.62 instead of at 0.5.
+const NEARLY_UNIFORM: f64 = 0.906_899_682_117_108_9;
+
+/// A policy that ignores what it sees: uniform over choices, nearly uniform over vectors in [-1, 1].
+pub(super) fn explorer(spec: PolicySpec, device: &Device) -> Actor {
+    let (inputs, dim) = (spec.latent + spec.obs_dim, spec.action_space.dim());
+    let zeros = || Linear {
+        weight: matrix(vec![0.0; inputs * dim], inputs, dim, device),
+        bias: vector(vec![0.0; dim], device),
+    };
+    let log_std = match spec.action_space {
+        ActionSpace::Discrete(_) => LogStd::None,
+        ActionSpace::Continuous(_) => {
+            // In the middle of the range, where the zeros lead.
+            let middle = NEARLY_UNIFORM.ln();
+            LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
+        }
+    };
+    Actor { net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::policy::Policy;
+    use crate::rng::Streams;
+    use crate::{Action, DeviceKind};
+
+    /// How 20,000 actions fall into five bins.
+    fn counts(space: ActionSpace) -> [usize; 5] {
+        let spec = PolicySpec { obs_dim: 2, latent: 1, action_space: space };
+        let device = DeviceKind::Flex.plain();
+        let policy = Policy::new(&explorer(spec, &device), None, None, space, (2, 1), device);
+        let output = policy.forward(&[5.0], &[-3.0, 4.0], 1).expect("finite");
+        let mut rng = Streams::new(1).stream("draw", 0);
+        let mut counts = [0; 5];
+        for _ in 0..20_000 {
+            let bin = match output.sample(0, &mut rng).0 {
+                Action::Discrete(choice) => choice as usize,
+                Action::Continuous(vector) => ((vector[1] + 1.0) * 2.5) as usize,
+            };
+            counts[bin.min(4)] += 1;
+        }
+        counts
+    }
+
+    #[test]
+    fn choices_are_equally_likely_and_vectors_nearly() {
+        let choices = counts(ActionSpace::Discrete(5));
+        assert!(choices.iter().all(|n| (3800..4200).contains(n)), "{choices:?}");
+        let vectors = counts(ActionSpace::Continuous(2));
+        assert!(vectors.iter().all(|n| (3300..4700).contains(n)), "{vectors:?}");
+    }
+}

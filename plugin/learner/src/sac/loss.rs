@@ -1,0 +1,33 @@
+//! The losses of SAC, as pure functions of tensors, `[n]` per row.
+//!
+//! Continuous and discrete actions share one form. With V = E\[min(Q₁, Q₂) - α ln π\] the actor maximises mean(V), and
+//! critics learn y = r + γ V'. For continuous actions the expectation is one draw; for discrete ones it is the sum over
+//! all choices (Christodoulou 2019, "Soft actor-critic for discrete action settings").
+
+use burn::tensor::Tensor;
+
+/// V of one draw per row: min(Q₁, Q₂) - α ln π(a).
+pub fn soft_value(log_prob: Tensor<1>, q1: Tensor<1>, q2: Tensor<1>, alpha: f64) -> Tensor<1> {
+    q1.min_pair(q2) - log_prob * alpha
+}
+
+/// V over all choices: Σ π (min(Q₁, Q₂) - α ln π), all inputs `[n, choices]`. The gradient flows through π and ln π.
+pub fn soft_value_of_choices(log_probs: Tensor<2>, q1: Tensor<2>, q2: Tensor<2>, alpha: f64) -> Tensor<1> {
+    let values = q1.min_pair(q2) - log_probs.clone() * alpha;
+    (log_probs.exp() * values).sum_dim(1).squeeze_dim(1)
+}
+
+/// y = r + γ V', where `continues` is 1 for rows whose next state counts and 0 for the others.
+pub fn q_target(rewards: Tensor<1>, continues: Tensor<1>, next_values: Tensor<1>, gamma: f64) -> Tensor<1> {
+    rewards + continues * next_values * gamma
+}
+
+/// mean((Q - y)²), `[1]`.
+pub fn critic_loss(q: Tensor<1>, target: Tensor<1>) -> Tensor<1> {
+    (q - target).square().mean()
+}
+
+/// mean(-α (ln π + target entropy)), `[1]`, where `log_prob` is ln π of a draw or E\[ln π\], and constant.
+pub fn alpha_loss(log_alpha: Tensor<1>, log_prob: Tensor<1>, target_entropy: f64) -> Tensor<1> {
+    (log_prob + target_entropy).mean() * log_alpha.exp().neg()
+}

@@ -1,0 +1,110 @@
+//! What an update reports.
+
+use super::{ActorStep, AlphaStep, CriticStep};
+use serde::{Deserialize, Serialize};
+
+/// Means over all gradient steps of an update; `None` for what was not done or not measured.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
+pub struct SacMetrics {
+    /// Transitions taken in so far.
+    pub transitions: u64,
+    /// Gradient steps of the critics so far.
+    pub gradient_steps: u64,
+    /// Mean squared error of a critic, the mean of both.
+    pub qf_loss: Option<f32>,
+    /// Mean value of the transitions' actions by the critics.
+    pub qf_values: Option<f32>,
+    /// Norm of the critics' gradient.
+    pub critic_grad_norm: Option<f32>,
+    /// -mean(V) of the actor, without SCORE's penalty.
+    pub actor_loss: Option<f32>,
+    /// Estimated entropy of the policy in nats (differential if continuous, so that it may be negative).
+    pub entropy: Option<f32>,
+    /// Norm of the actor's gradient.
+    pub actor_grad_norm: Option<f32>,
+    /// Loss of α; `None` where it is fixed.
+    pub alpha_loss: Option<f32>,
+    /// α at the end of the update; `None` without a gradient step.
+    pub entropy_coef: Option<f32>,
+    /// Mean divergence between decoder and policy in nats, not weighted; `None` without a penalty.
+    pub decoder_kl: Option<f32>,
+    /// Mean of the decoder's confidence; `None` without a penalty.
+    pub alpha_mean: Option<f32>,
+}
+
+impl SacMetrics {
+    /// The numbers by their TensorBoard tags; what was not measured is left out.
+    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
+        let counters =
+            [("charts/transitions", self.transitions as f64), ("charts/gradient_steps", self.gradient_steps as f64)];
+        let measured = [
+            ("charts/entropy_coef", self.entropy_coef),
+            ("losses/qf_loss", self.qf_loss),
+            ("losses/qf_values", self.qf_values),
+            ("losses/critic_grad_norm", self.critic_grad_norm),
+            ("losses/actor_loss", self.actor_loss),
+            ("losses/entropy", self.entropy),
+            ("losses/actor_grad_norm", self.actor_grad_norm),
+            ("losses/alpha_loss", self.alpha_loss),
+            ("score/decoder_kl", self.decoder_kl),
+            ("score/alpha_mean", self.alpha_mean),
+        ];
+        let measured = measured.into_iter().filter_map(|(tag, value)| Some((tag, f64::from(value?))));
+        counters.into_iter().chain(measured).collect()
+    }
+}
+
+/// Sums over the gradient steps of an update.
+#[derive(Default)]
+pub(super) struct Sums {
+    critics: (CriticStep, u64),
+    actor: (ActorStep, u64),
+    alpha: (AlphaStep, u64),
+}
+
+impl Sums {
+    pub(super) fn add_critics(&mut self, step: &CriticStep) {
+        let (sum, count) = &mut self.critics;
+        sum.q1_loss += step.q1_loss;
+        sum.q2_loss += step.q2_loss;
+        sum.q_values += step.q_values;
+        sum.grad_norm += step.grad_norm;
+        *count += 1;
+    }
+
+    pub(super) fn add_actor(&mut self, step: &ActorStep) {
+        let (sum, count) = &mut self.actor;
+        sum.actor_loss += step.actor_loss;
+        sum.entropy += step.entropy;
+        sum.decoder_kl += step.decoder_kl;
+        sum.confidence += step.confidence;
+        sum.grad_norm += step.grad_norm;
+        *count += 1;
+    }
+
+    pub(super) fn add_alpha(&mut self, step: &AlphaStep) {
+        let (sum, count) = &mut self.alpha;
+        sum.alpha_loss += step.alpha_loss;
+        *count += 1;
+    }
+
+    /// The means; counters and α are left to the caller.
+    pub(super) fn means(&self, penalised: bool) -> SacMetrics {
+        let mean = |total: f64, count: u64| (count > 0).then(|| (total / count as f64) as f32);
+        let (critics, n) = &self.critics;
+        let (actor, m) = &self.actor;
+        let (alpha, k) = &self.alpha;
+        SacMetrics {
+            qf_loss: mean(0.5 * (critics.q1_loss + critics.q2_loss), *n),
+            qf_values: mean(critics.q_values, *n),
+            critic_grad_norm: mean(critics.grad_norm, *n),
+            actor_loss: mean(actor.actor_loss, *m),
+            entropy: mean(actor.entropy, *m),
+            actor_grad_norm: mean(actor.grad_norm, *m),
+            alpha_loss: mean(alpha.alpha_loss, *k),
+            decoder_kl: mean(actor.decoder_kl, *m).filter(|_| penalised),
+            alpha_mean: mean(actor.confidence, *m).filter(|_| penalised),
+            ..SacMetrics::default()
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! From rollouts to transitions.
+
+use crate::{LearnError, Rollout};
+
+/// One step of one environment: row `row` of a rollout and the state it led to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Transition<'a> {
+    /// The rollout's row, for everything but the next state.
+    pub(super) row: usize,
+    /// The observation after the action; `None` after a termination, where there is none.
+    pub(super) next_obs: Option<&'a [f32]>,
+    /// The skill under which that observation is judged; `None` likewise.
+    pub(super) next_z: Option<&'a [f32]>,
+}
+
+/// `Ok` if the rollout holds the states where episodes were cut off and where it stops.
+///
+/// # Errors
+/// [`LearnError::Shape`] names the first length that does not fit; [`LearnError::Config`] names a row.
+pub(super) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
+    let ends = &rollout.ends;
+    let cuts = ends.cut_rows.len();
+    let mut listed = ends.cut_rows.iter().copied();
+    for row in (0..rollout.rows()).filter(|&row| is_cut(rollout, row)) {
+        if listed.next() != Some(row) {
+            let text = format!("rollout ends: row {row} cuts an episode off, and its last observation is not there");
+            return Err(LearnError::Config(text));
+        }
+    }
+    if let Some(row) = listed.next() {
+        return Err(LearnError::Config(format!("rollout ends: row {row} is listed but cuts no episode off")));
+    }
+    for (name, expected, found) in [
+        ("rollout ends cut_obs", cuts * rollout.obs_dim, ends.cut_obs.len()),
+        ("rollout ends cut_z", cuts * rollout.latent, ends.cut_z.len()),
+        ("rollout ends next_obs", rollout.envs * rollout.obs_dim, ends.next_obs.len()),
+        ("rollout ends next_z", rollout.envs * rollout.latent, ends.next_z.len()),
+    ] {
+        LearnError::check(name, expected, found)?;
+    }
+    Ok(())
+}
+
+/// The transitions of a checked rollout, in order of its rows.
+///
+/// The next state is the same environment's next row; where the episode was cut off it is the episode's own last
+/// state, and behind the last row where the rollout stopped. A row with both flags terminated.
+pub(super) fn transitions(rollout: &Rollout) -> impl Iterator<Item = Transition<'_>> {
+    let ends = &rollout.ends;
+    let mut cut = 0;
+    (0..rollout.rows()).map(move |row| {
+        let next = |obs, z, at: usize| -> (Option<&[f32]>, Option<&[f32]>) {
+            (Some(slice(obs, rollout.obs_dim, at)), Some(slice(z, rollout.latent, at)))
+        };
+        let following = row + rollout.envs;
+        let (next_obs, next_z) = if rollout.terminated[row] {
+            (None, None)
+        } else if is_cut(rollout, row) {
+            cut += 1;
+            next(&ends.cut_obs, &ends.cut_z, cut - 1)
+        } else if following < rollout.rows() {
+            next(&rollout.obs, &rollout.z, following)
+        } else {
+            next(&ends.next_obs, &ends.next_z, following - rollout.rows())
+        };
+        Transition { row, next_obs, next_z }
+    })
+}
+
+fn is_cut(rollout: &Rollout, row: usize) -> bool {
+    rollout.truncated[row] && !rollout.terminated[row]
+}
+
+/// Row `at` of a flat matrix.
+pub(super) fn slice(values: &[f32], width: usize, at: usize) -> &[f32] {
+    &values[at * width..(at + 1) * width]
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::{ActionSpace, Actions, EndStates};
+
+    /// Two environments, three steps, observations 0 to 5 and skills 10 to 15. Environment 0 is cut off at step 0 (its
+    /// last observation is 50), environment 1 terminates at step 1 with both flags set.
+    pub(in crate::sac) fn rollout() -> Rollout {
+        let numbers = |base: f32| (0..6u8).map(|i| base + f32::from(i)).collect::<Vec<f32>>();
+        let at = |rows: &[usize]| (0..6).map(|row| rows.contains(&row)).collect::<Vec<bool>>();
+        Rollout {
+            steps: 3,
+            obs: numbers(0.0),
+            z: numbers(10.0),
+            actions: Actions::Discrete(vec![0, 1, 2, 0, 1, 2]),
+            log_probs: vec![0.0; 6],
+            values: vec![0.0; 6],
+            rewards: numbers(20.0),
+            terminated: at(&[3]),
+            truncated: at(&[0, 3]),
+            final_values: vec![0.0; 6],
+            next_values: vec![0.0; 2],
+            ends: EndStates {
+                cut_rows: vec![0],
+                cut_obs: vec![50.0],
+                cut_z: vec![60.0],
+                next_obs: vec![70.0, 71.0],
+                next_z: vec![80.0, 81.0],
+            },
+            ..Rollout::new(2, 1, 1, &ActionSpace::Discrete(3))
+        }
+    }
+
+    #[test]
+    fn every_row_leads_to_its_own_next_state() {
+        let rollout = rollout();
+        rollout.check().expect("it fits");
+        check_ends(&rollout).expect("it fits");
+        let next: Vec<_> =
+            transitions(&rollout).map(|t| t.next_obs.zip(t.next_z).map(|(obs, z)| (obs[0], z[0]))).collect();
+        let expected = [
+            Some((50.0, 60.0)), // cut off: not the row below, which shows the next episode
+            Some((3.0, 13.0)),
+            Some((4.0, 14.0)),
+            None, // terminated, though also cut off
+            Some((70.0, 80.0)),
+            Some((71.0, 81.0)),
+        ];
+        assert_eq!(next, expected);
+        assert!(transitions(&rollout).map(|t| t.row).eq(0..6));
+    }
+
+    #[test]
+    fn ends_that_do_not_fit_are_named() {
+        let after = |change: fn(&mut Rollout)| {
+            let mut rollout = rollout();
+            change(&mut rollout);
+            check_ends(&rollout).expect_err("does not fit").to_string()
+        };
+        assert!(after(|r| r.ends = EndStates::default()).contains("row 0"));
+        assert!(after(|r| r.ends.cut_rows.push(3)).contains("row 3"));
+        assert!(after(|r| r.truncated[4] = true).contains("row 4"));
+        assert!(after(|r| r.ends.cut_obs.clear()).contains("cut_obs"));
+        assert!(after(|r| r.ends.next_z.clear()).contains("next_z"));
+    }
+}

@@ -1,0 +1,228 @@
+//! The gradient steps of SAC: critics, actor, α.
+
+use super::{SacNets, alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
+use crate::LearnError;
+use crate::nn::{
+    ActionRows, Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen,
+};
+use crate::sac::Critics;
+use crate::score::{DecoderBatch, ScoreConfig, decoder_kl};
+use burn::tensor::{Gradients, Tensor};
+
+/// One batch of transitions on the device.
+#[derive(Clone, Debug)]
+pub struct SacBatch {
+    /// What the actor reads, `[n, latent + obs_dim]`.
+    pub inputs: Tensor<2>,
+    /// The actions taken.
+    pub actions: ActionRows,
+    /// What they earned, `[n]`.
+    pub rewards: Tensor<1>,
+    /// 1 where the value of the next state counts, 0 where the episode was over, `[n]`.
+    pub continues: Tensor<1>,
+    /// The next states as the actor reads them, `[n, latent + obs_dim]`; any numbers where they do not count.
+    pub next_inputs: Tensor<2>,
+    /// Constants of the penalty, if there is one.
+    pub decoder: Option<DecoderBatch>,
+}
+
+/// What a step of the critics looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CriticStep {
+    /// Mean squared error of Q₁.
+    pub q1_loss: f64,
+    /// Mean squared error of Q₂.
+    pub q2_loss: f64,
+    /// Mean of Q₁ and Q₂ over the batch.
+    pub q_values: f64,
+    /// Norm of the gradient.
+    pub grad_norm: f64,
+}
+
+/// What a step of the actor looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ActorStep {
+    /// -mean(V), without the penalty.
+    pub actor_loss: f64,
+    /// Estimate of the entropy in nats, -mean(ln π): exact for discrete actions.
+    pub entropy: f64,
+    /// Mean divergence between decoder and policy, not weighted.
+    pub decoder_kl: f64,
+    /// mean(α · divergence), α being the decoder's confidence, without kl_coef.
+    pub kl_penalty: f64,
+    /// Mean of the decoder's confidence.
+    pub confidence: f64,
+    /// Norm of the gradient.
+    pub grad_norm: f64,
+}
+
+/// What a step of α looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AlphaStep {
+    /// mean(-α (ln π + target entropy)).
+    pub alpha_loss: f64,
+    /// Mean of ln π.
+    pub log_prob: f64,
+}
+
+/// What the policy does in each row.
+enum Choice {
+    /// ln π of all choices.
+    Choices(Tensor<2>),
+    /// A draw.
+    Draw(SquashedDraw),
+}
+
+impl Choice {
+    fn new(dist: Dist, noise: Option<&Tensor<2>>) -> Result<Self, LearnError> {
+        match (dist, noise) {
+            (Dist::Categorical { log_probs }, _) => Ok(Self::Choices(log_probs)),
+            (Dist::Gaussian { mean, log_std }, Some(noise)) => {
+                let device = noise.device();
+                let squashed = SquashedGaussian::unit(mean, log_std, &device);
+                Ok(Self::Draw(squashed.draw(noise.clone(), LogProbForm::Eps)))
+            }
+            _ => Err(LearnError::Action("noise is needed to draw continuous actions".to_owned())),
+        }
+    }
+
+    /// V under `critics`, `[n]`.
+    fn soft_value(&self, critics: &Critics, inputs: Tensor<2>, alpha: f64) -> Tensor<1> {
+        match self {
+            Self::Choices(log_probs) => {
+                let (q1, q2) = critics.of_choices(inputs);
+                soft_value_of_choices(log_probs.clone(), q1, q2, alpha)
+            }
+            Self::Draw(draw) => {
+                let (q1, q2) = critics.of_vectors(inputs, draw.action.clone());
+                soft_value(draw.log_prob.clone(), q1, q2, alpha)
+            }
+        }
+    }
+
+    /// ln π of the draw, or E\[ln π\], `[n]`.
+    fn log_prob(&self) -> Tensor<1> {
+        match self {
+            Self::Choices(log_probs) => (log_probs.clone().exp() * log_probs.clone()).sum_dim(1).squeeze_dim(1),
+            Self::Draw(draw) => draw.log_prob.clone(),
+        }
+    }
+}
+
+/// y = r + γ V' of each row, V' being the target critics' soft value of the actor's choice in the next state.
+///
+/// `noise` is standard normal, `[n, dim]`, and needed for continuous actions only (here and below).
+///
+/// # Errors
+/// [`LearnError::Action`] without the noise that is needed.
+pub fn target_of(
+    nets: &SacNets,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    alpha: f64,
+    gamma: f64,
+) -> Result<Tensor<1>, LearnError> {
+    let choice = Choice::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), noise)?;
+    let next = choice.soft_value(&nets.targets, batch.next_inputs.clone(), alpha);
+    Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
+}
+
+/// One step of Adam on both critics.
+///
+/// # Errors
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite; [`LearnError::Action`] as
+/// [`target_of`].
+pub fn critic_step(
+    nets: &mut SacNets,
+    adam: &mut Adam,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    (alpha, gamma): (f64, f64),
+    lr: f64,
+) -> Result<CriticStep, LearnError> {
+    let target = target_of(nets, batch, noise, alpha, gamma)?;
+    let (q1, q2) = nets.critics.of_actions(batch.inputs.clone(), &batch.actions);
+    let values = ((q1.clone() + q2.clone()) * 0.5).mean();
+    let (loss1, loss2) = (critic_loss(q1, target.clone()), critic_loss(q2, target));
+    let steps = adam.steps();
+    let (q1_loss, q2_loss) = (finite("q1_loss", &loss1, steps)?, finite("q2_loss", &loss2, steps)?);
+    let q_values = finite("q_values", &values, steps)?;
+    let grad_norm = descend(&mut nets.critics, "", adam, &(loss1 + loss2).backward(), lr)?;
+    Ok(CriticStep { q1_loss, q2_loss, q_values, grad_norm })
+}
+
+/// One step of Adam on the actor, under the present critics.
+///
+/// With a decoder in `batch` and settings of SCORE, kl_coef · mean(confidence · divergence) is added to the loss. A
+/// squashed policy is compared before its tanh (see [`crate::score::unsquashed`]).
+///
+/// # Errors
+/// As [`critic_step`].
+pub fn actor_step(
+    nets: &mut SacNets,
+    adam: &mut Adam,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    alpha: f64,
+    score: Option<&ScoreConfig>,
+    lr: f64,
+) -> Result<ActorStep, LearnError> {
+    let dist = nets.actor.forward(batch.inputs.clone());
+    let choice = Choice::new(dist.clone(), noise)?;
+    let loss = choice.soft_value(&frozen(&nets.critics), batch.inputs.clone(), alpha).mean().neg();
+    let steps = adam.steps();
+    let mut metrics = ActorStep {
+        actor_loss: finite("actor_loss", &loss, steps)?,
+        entropy: -finite("log_prob", &choice.log_prob().mean(), steps)?,
+        ..ActorStep::default()
+    };
+    let mut total = loss;
+    if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
+        let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
+        let penalty = (kl.clone() * decoder.alpha.clone()).mean();
+        metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
+        metrics.kl_penalty = finite("kl_penalty", &penalty, steps)?;
+        metrics.confidence = decoder.alpha_mean;
+        total = total + penalty * score.kl_coef;
+    }
+    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, &total.backward(), lr)?;
+    Ok(metrics)
+}
+
+/// One step of Adam on ln α, under the present actor.
+///
+/// # Errors
+/// As [`critic_step`].
+pub fn alpha_step(
+    nets: &mut SacNets,
+    adam: &mut Adam,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    target_entropy: f64,
+    lr: f64,
+) -> Result<AlphaStep, LearnError> {
+    let choice = Choice::new(frozen(&nets.actor).forward(batch.inputs.clone()), noise)?;
+    let log_prob = choice.log_prob();
+    let loss = alpha_loss(nets.log_alpha.0.clone(), log_prob.clone(), target_entropy);
+    let steps = adam.steps();
+    let metrics = AlphaStep {
+        alpha_loss: finite("alpha_loss", &loss, steps)?,
+        log_prob: finite("log_prob", &log_prob.mean(), steps)?,
+    };
+    descend(&mut nets.log_alpha, "", adam, &loss.backward(), lr)?;
+    Ok(metrics)
+}
+
+/// One step of Adam without clipping; gives the gradient's norm.
+fn descend<M: Parameters>(
+    network: &mut M,
+    prefix: &str,
+    adam: &mut Adam,
+    gradients: &Gradients,
+    lr: f64,
+) -> Result<f64, LearnError> {
+    let grads = NamedGrads::read(network, prefix, gradients)?;
+    let (norm, scale) = grads.clip_factor(f64::INFINITY, adam.steps())?;
+    adam.step(network, prefix, &grads, lr, scale)?;
+    Ok(norm)
+}

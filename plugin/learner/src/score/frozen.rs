@@ -1,0 +1,171 @@
+//! The frozen skill model behind SCORE.
+
+use super::decoder::DecoderRows;
+use super::{AlphaKind, PriorKind, ScoreConfig, alphas, decoder_kl, own_samples, unsquashed};
+use crate::file::TensorFile;
+use crate::nn::{HostDist, matrix, scalar};
+use crate::policy::{Actor, Policy, SkillSource, joined_rows};
+use crate::skill::{Prior, SkillDescription, SkillModel};
+use crate::{Actions, DeviceKind, FileError, LearnError, PolicyOutput, PolicySpec};
+use rand::Rng;
+
+/// Rows that the frozen decoder reads at a time.
+const DECODER_CHUNK: usize = 2048;
+
+/// A skill model's decoder and prior, which do not learn any more.
+#[derive(Clone, Debug)]
+pub(crate) struct FrozenSkill {
+    pub(crate) config: ScoreConfig,
+    pub(crate) description: SkillDescription,
+    decoder: Actor,
+    prior: Actor,
+}
+
+impl FrozenSkill {
+    /// `model`, used as `config` says.
+    pub(crate) fn new(config: ScoreConfig, model: &SkillModel) -> Self {
+        Self {
+            config,
+            description: model.description.clone(),
+            decoder: model.nets.decoder.clone(),
+            prior: model.nets.prior.clone(),
+        }
+    }
+
+    /// Networks of the right sizes, to be filled by [`Self::take`]; `None` if the file was of a learner without skills.
+    pub(crate) fn described(
+        config: Option<ScoreConfig>,
+        description: Option<SkillDescription>,
+        device: DeviceKind,
+    ) -> Result<Option<Self>, LearnError> {
+        let Some((config, description)) = config.zip(description) else { return Ok(None) };
+        let nets = description.nets(device)?;
+        Ok(Some(Self { config, description, decoder: nets.decoder, prior: nets.prior }))
+    }
+
+    /// Adds the weights of decoder and prior to a file.
+    pub(crate) fn put(&self, file: &mut TensorFile) -> Result<(), FileError> {
+        file.put_network("decoder", &self.decoder)?;
+        file.put_network("prior", &self.prior)
+    }
+
+    /// Takes the weights of decoder and prior out of a file.
+    pub(crate) fn take(&mut self, file: &mut TensorFile, device: DeviceKind) -> Result<(), FileError> {
+        file.take_network("decoder", &mut self.decoder, &device.plain())?;
+        file.take_network("prior", &mut self.prior, &device.plain())
+    }
+
+    /// What a policy tied to this skill model reads and does.
+    pub(crate) fn spec(&self) -> PolicySpec {
+        PolicySpec {
+            obs_dim: self.description.obs_dim,
+            latent: if self.config.condition { self.latent() } else { 0 },
+            action_space: self.description.action_space,
+        }
+    }
+
+    /// Width of a skill.
+    pub(crate) fn latent(&self) -> usize {
+        self.description.config.latent
+    }
+
+    /// Where skills come from, by [`ScoreConfig::prior`].
+    pub(crate) fn prior(&self, device: DeviceKind) -> Prior {
+        let (latent, tanh) = (self.latent(), self.description.config.tanh_latent);
+        match self.config.prior {
+            PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
+            PriorKind::Learned => Prior::learned(&self.prior, self.description.obs_dim, latent, tanh, device.plain()),
+        }
+    }
+
+    /// Prior and decoder with the horizon and the draw, as a policy needs them in play.
+    pub(crate) fn source(&self, device: DeviceKind) -> SkillSource {
+        let (horizon, draw) = (self.config.horizon, self.config.skill_draw);
+        SkillSource { prior: self.prior(device), decoder: self.decoder_policy(device), horizon, draw }
+    }
+
+    fn decoder_policy(&self, device: DeviceKind) -> Policy {
+        let widths = (self.description.obs_dim, self.latent());
+        Policy::new(&self.decoder, None, None, self.description.action_space, widths, device.plain())
+    }
+
+    /// The copy of the decoder that a policy starts as, if it shall.
+    pub(crate) fn copy(&self, norm_obs: bool) -> Result<Option<Actor>, LearnError> {
+        self.config.validate()?;
+        if !self.config.init_from_decoder {
+            return Ok(None);
+        }
+        if norm_obs {
+            let text = "norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
+            return Err(LearnError::Config(text.to_owned()));
+        }
+        Ok(Some(self.decoder.clone()))
+    }
+
+    /// Mean divergence between decoder and `policy` over `n` rows, in nats, which must be exactly 0 for a copy that is
+    /// `untrained`.
+    pub(crate) fn initial_kl(
+        &self,
+        policy: &Policy,
+        untrained: bool,
+        (z, obs, n): (&[f32], &[f32], usize),
+        device: DeviceKind,
+    ) -> Result<f32, LearnError> {
+        if n == 0 {
+            return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
+        }
+        let played = policy.forward(z, obs, n)?;
+        let squashed = played.squashed;
+        let space = self.description.action_space;
+        let host = |output: PolicyOutput| {
+            let log_std = (!output.log_std.is_empty()).then_some(output.log_std);
+            HostDist { dim: space.dim(), head: output.head, log_std }
+        };
+        let mut decoded = host(self.decoder_policy(device).forward(z, obs, n)?);
+        if squashed {
+            decoded = unsquashed(&decoded);
+        }
+        let rows: Vec<usize> = (0..n).collect();
+        let dist = |host: HostDist| host.rows(&rows, &device.plain());
+        let kl = decoder_kl(&dist(decoded), &dist(host(played)), self.config.kl_direction)?;
+        let kl = scalar(kl.mean())?;
+        if self.config.init_from_decoder && untrained && kl != 0.0 {
+            return Err(LearnError::InitialKl { kl });
+        }
+        Ok(kl)
+    }
+
+    /// The decoder's distributions and α for rows of skills `z` and raw observations `obs` in which `actions` were
+    /// taken; `None` if there is no penalty. `squashed`: the policy is a squashed Gaussian.
+    pub(crate) fn rows<R: Rng + ?Sized>(
+        &self,
+        (z, obs): (&[f32], &[f32]),
+        actions: &Actions,
+        squashed: bool,
+        own_samples_from: &mut R,
+        device: DeviceKind,
+    ) -> Result<Option<DecoderRows>, LearnError> {
+        if !self.config.kl {
+            return Ok(None);
+        }
+        let (n, latent, obs_dim) = (actions.len(), self.latent(), self.description.obs_dim);
+        let device = device.plain();
+        let mut dist = HostDist { dim: self.description.action_space.dim(), head: Vec::new(), log_std: None };
+        for start in (0..n).step_by(DECODER_CHUNK) {
+            let rows = start..(start + DECODER_CHUNK).min(n);
+            let len = rows.len();
+            let inputs = joined_rows(z, latent, obs, obs_dim, None, rows);
+            let part = self.decoder.forward(matrix(inputs, len, latent + obs_dim, &device)).to_host()?;
+            dist.head.extend(part.head);
+            if let Some(stds) = part.log_std {
+                dist.log_std.get_or_insert_default().extend(stds);
+            }
+        }
+        let alpha = match self.config.alpha {
+            AlphaKind::OwnSample => alphas(AlphaKind::OwnSample, &dist, &own_samples(&dist, own_samples_from))?,
+            kind => alphas(kind, &dist, actions)?,
+        };
+        let dist = if squashed { unsquashed(&dist) } else { dist };
+        Ok(Some(DecoderRows { dist, alpha }))
+    }
+}

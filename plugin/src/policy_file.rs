@@ -1,0 +1,179 @@
+//! Policies that a game ships with: checked against the game, and put to work.
+
+use std::path::Path;
+
+use bevy::prelude::*;
+use playbot_learner::{FileError, Policy};
+pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};
+use thiserror::Error;
+
+use crate::{
+    action::ActionSpace,
+    fault::Fault,
+    game::Game,
+    policy::{ActionDraw, ActivePolicy},
+    skill_prior::SkillPrior,
+    split::LevelSplit,
+    train::collect::Collector,
+};
+
+/// Arenas and ticks of the short play from which a file's examples are taken.
+const EXAMPLE_ARENAS: u32 = 4;
+const EXAMPLE_TICKS: usize = 32;
+/// Every so many of its rows becomes an example.
+const EXAMPLE_STRIDE: usize = 9;
+
+/// A policy file does not fit the game.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum PolicyMisfit {
+    /// It was made for another game.
+    #[error("the policy was made for the game `{made_for}`, not for `{game}`")]
+    Game {
+        /// The policy's game.
+        made_for: String,
+        /// This game.
+        game: String,
+    },
+    /// The rules have changed since.
+    #[error(
+        "the policy was made for version {made_for} of `{game}`, whose rules are at version {now}: train and export it \
+         again"
+    )]
+    Version {
+        /// This game.
+        game: String,
+        /// Version that the policy knows.
+        made_for: u32,
+        /// Version of the game.
+        now: u32,
+    },
+    /// The observation has changed.
+    #[error(
+        "the policy reads {made_for} observation values and `{game}` gives {now}; the first difference is at number \
+         {at}: `{expected}` there, `{found}` here"
+    )]
+    Observation {
+        /// This game.
+        game: String,
+        /// Values that the policy reads.
+        made_for: usize,
+        /// Values of the game.
+        now: usize,
+        /// Number of the first value that differs, from 0.
+        at: usize,
+        /// Its name in the policy; empty if there is none.
+        expected: String,
+        /// Its name in the game; empty if there is none.
+        found: String,
+    },
+    /// The actions have changed.
+    #[error("the policy acts in {made_for:?}, `{game}` in {now:?}")]
+    Actions {
+        /// This game.
+        game: String,
+        /// The policy's actions.
+        made_for: ActionSpace,
+        /// The game's actions.
+        now: ActionSpace,
+    },
+}
+
+/// Checks that a policy was made for this game, these rules, this observation and these actions.
+///
+/// # Errors
+///
+/// [`PolicyMisfit`] with the first difference.
+pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+    let (card, name) = (&file.card, game.name().to_owned());
+    if card.game != name {
+        return Err(PolicyMisfit::Game { made_for: card.game.clone(), game: name });
+    }
+    if card.game_version != game.version() {
+        return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version() });
+    }
+    let names = game.observation().names;
+    let longest = names.len().max(card.observations.len());
+    if let Some(at) = (0..longest).find(|&at| names.get(at) != card.observations.get(at)) {
+        let name_at = |names: &[String]| names.get(at).cloned().unwrap_or_default();
+        return Err(PolicyMisfit::Observation {
+            game: name,
+            made_for: card.observations.len(),
+            now: names.len(),
+            at,
+            expected: name_at(&card.observations),
+            found: name_at(&names),
+        });
+    }
+    if file.policy.action_space() != game.actions() {
+        return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions() });
+    }
+    Ok(())
+}
+
+/// Lets a policy, with its skills, drive every agent of this World that is under
+/// [`Control::Policy`](crate::control::Control::Policy).
+pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
+    world.insert_resource(ActivePolicy { policy: file.policy.clone(), draw });
+    match &file.skills {
+        Some(skills) => world.insert_resource(SkillPrior::from(skills)),
+        None => {
+            world.remove_resource::<SkillPrior>();
+        }
+    }
+}
+
+/// A policy could not be exported.
+#[derive(Debug, Error)]
+pub enum ExportError {
+    /// The game broke its contract while the examples were played.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The file could not be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// A policy for this game, with the card filled in from it.
+pub fn policy_file(
+    game: &dyn Game,
+    policy: Policy,
+    skills: Option<SkillSource>,
+    (algorithm, training, code): (String, String, String),
+) -> PolicyFile {
+    let card = PolicyCard {
+        game: game.name().to_owned(),
+        game_version: game.version(),
+        observations: game.observation().names,
+        actions: game.action_names(),
+        algorithm,
+        training,
+        code,
+    };
+    PolicyFile { card, policy, skills }
+}
+
+/// Writes a policy file. Its examples come from a short play on `levels`.
+///
+/// # Errors
+///
+/// [`ExportError`].
+pub fn export_policy(
+    game: &dyn Game,
+    file: &PolicyFile,
+    levels: &LevelSplit,
+    seed: u64,
+    path: &Path,
+) -> Result<(), ExportError> {
+    let prior = file.skills.as_ref().map(SkillPrior::from);
+    let latent = file.policy.latent();
+    let (rollout, _) =
+        Collector::new(game, levels, seed, 0, EXAMPLE_ARENAS, prior).collect(&file.policy, latent, EXAMPLE_TICKS)?;
+    let (mut obs, mut z) = (Vec::new(), Vec::new());
+    let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
+    let n = rows.len();
+    for row in rows {
+        obs.extend_from_slice(&rollout.obs[row * rollout.obs_dim..(row + 1) * rollout.obs_dim]);
+        z.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
+    }
+    Ok(file.save(path, &obs, &z, n)?)
+}
