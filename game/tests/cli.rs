@@ -37,6 +37,17 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["bench", "--case", "nonsense"], "sim/coinrun/vector"),
         (&["train", "--run", "r", "--algorithm", "pp"], "did you mean `ppo`?"),
         (&["fly"], "unrecognized subcommand"),
+        (&["train", "--run", "r", "--set", "ppo.gama=1"], "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
+        (&["train", "--run", "r", "--set", "ppo.lr"], "write key=value"),
+        (&["quickstart", "--set", "ppo.lr=fast"], "`ppo.lr` must be a number such as 0.0005, not fast"),
+        (&["learn-skills", "--out", "s", "--set", "skills.prior_std=Sate"], "did you mean `State`?"),
+        (&["eval", "--bot", "random", "--set", "eval.episodes_per_level=0"], "at least one episode"),
+        (&["eval", "--bot", "random", "--set", "test=hard"], "mode:first..last"),
+        (&["train", "--run", "r", "--algorithm", "bc"], "playbot eval --skills"),
+        (&["config", "show", "--set", "ppo.minibatches=7"], "64 × 128 = 8192; 8 does"),
+        (&["config", "presets", "skil-paper"], "did you mean `skill-paper`?"),
+        (&["study", "--out", "o", "--seeds", "1,1"], "seed 1 is there twice"),
+        (&["study", "--out", "o", "--set", "variants=[(name: \"a\", set: [\"kl=false\"])]"], "variant `a`"),
     ] {
         let output = playbot(folder.path(), args);
         assert_eq!(code(&output), 3, "{args:?}: {}", errors(&output));
@@ -55,6 +66,27 @@ fn an_unknown_key_names_file_line_and_neighbour() {
     let errors = errors(&output);
     assert!(errors.contains("bad.ron:3:") && errors.contains("`trian`") && errors.contains("`train`"), "{errors}");
     assert!(!folder.path().join("r").exists(), "nothing is written for a bad experiment");
+}
+
+#[test]
+fn an_experiment_can_be_shown_with_all_its_values_and_read_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let show = |args: &[&str]| {
+        let output = playbot(folder.path(), &[&["config", "show"], args].concat());
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        String::from_utf8(output.stdout).expect("Unicode")
+    };
+    std::fs::write(folder.path().join("least.ron"), "(base: [\"d4rl-ppo\"], game: \"coinrun\", train: \"hard:0..3\", test: \"hard:4..5\", demos: \"d\", steps: 9, ppo: (epochs: 2))").expect("writable");
+    let shown = show(&["--experiment", "least.ron", "--set", "score.kl_coef=0.25"]);
+    for line in
+        ["steps: 9,", "epochs: 2,", "num_steps: 2048,", "kl_coef: 0.25,", "algorithm: \"score-ppo\",", "horizon: 8,"]
+    {
+        assert!(shown.contains(line), "{line}: {shown}");
+    }
+    std::fs::write(folder.path().join("shown.ron"), &shown).expect("writable");
+    assert_eq!(show(&["--experiment", "shown.ron"]), shown);
+    let presets = playbot(folder.path(), &["config", "presets", "--json"]);
+    assert!(lines(&presets).iter().any(|preset| preset["name"] == "skill-paper"));
 }
 
 #[test]

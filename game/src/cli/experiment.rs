@@ -17,7 +17,7 @@ pub const COINRUN: &str = include_str!("../../../assets/experiments/coinrun.ron"
 /// Which experiment, and what to change in it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct ExperimentArgs {
-    /// Experiment file; without one the run's own where a run is read, otherwise the built-in CoinRun experiment.
+    /// Experiment file; the built-in CoinRun experiment (for `eval --run` the run's own) if none is named.
     #[arg(long, value_name = "FILE")]
     pub experiment: Option<PathBuf>,
     /// Change a value of the experiment, such as ppo.lr=0.0003; may be given several times.

@@ -20,7 +20,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::ExperimentArgs,
     interrupt, progress,
-    study_run::Bench,
+    study_run::Runner,
 };
 use crate::registry;
 
@@ -72,8 +72,8 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
             .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
     }
     interrupt::listen();
-    let mut bench = Bench::new(&folder, args.force, args.device, args.threads);
-    let Some(report) = all(&mut bench, &runs, command(&args), experiment)? else {
+    let mut runner = Runner::new(&folder, args.force, args.device, args.threads);
+    let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
         eprintln!("stopped and saved: go on with `{} --resume`", restart(&args));
         return Ok(Outcome::Pass);
     };
@@ -89,7 +89,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 
 /// Every run, one after the other; `None` after Ctrl-C.
 fn all(
-    bench: &mut Bench,
+    runner: &mut Runner,
     runs: &[StudyRun],
     command: String,
     experiment: Experiment,
@@ -101,7 +101,7 @@ fn all(
     for (index, run) in runs.iter().enumerate() {
         let id = run.id();
         whole.set_message(format!("run {} of {}", index + 1, runs.len()));
-        let ended = bench.run(run, &id, |step| whole.set_position(done + step.min(steps(run))))?;
+        let ended = runner.run(run, &id, |step| whole.set_position(done + step.min(steps(run))))?;
         let Some((result, curve)) = ended.filter(|_| !interrupt::asked() || index + 1 == runs.len()) else {
             return Ok(None);
         };

@@ -32,7 +32,7 @@ use crate::registry;
 const RESULT: &str = "result.json";
 
 /// Where the runs of a study live, and how they are computed.
-pub struct Bench {
+pub struct Runner {
     /// Folder of all runs.
     pub folder: PathBuf,
     /// Replace what is there instead of going on with it.
@@ -50,7 +50,7 @@ pub struct Bench {
 /// What came of a run, or `None` after Ctrl-C.
 pub type Ended = Option<(StudyResult, SuccessCurve)>;
 
-impl Bench {
+impl Runner {
     pub fn new(folder: &Path, force: bool, device: DeviceKind, threads: usize) -> Self {
         Self { folder: folder.into(), force, device, threads, learned: BTreeSet::new(), demos: None }
     }

@@ -37,14 +37,17 @@ impl StudyReport {
         seeds.sort_unstable();
         seeds.dedup();
         let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+        let times = match experiment.eval.episodes_per_level {
+            1 => "once".to_owned(),
+            n => format!("{n} times"),
+        };
         format!(
-            "Trained on {} for {} environment steps, measured on {}, each level {} times. Means ± standard deviations \
+            "Trained on {} for {} environment steps, measured on {}, each level {times}. Means ± standard deviations \
              over the seeds {}. Training figures are those of the last 100 episodes; the steps are those until their \
              success rate first was {}.",
             experiment.train,
             fixed(experiment.steps as f64, 0),
             experiment.test,
-            experiment.eval.episodes_per_level,
             seeds.join(", "),
             percent(experiment.study.threshold),
         )

@@ -197,8 +197,8 @@ impl Experiment {
         let settings = |error: playbot_learner::LearnError| ExperimentError::Settings(error.to_string());
         self.skills.validate().map_err(settings)?;
         self.score.validate().map_err(settings)?;
-        self.ppo_config().validate().map_err(settings)?;
         self.sac.validate().map_err(settings)?;
+        self.ppo_config().validate().map_err(settings)?;
         self.check_batches()
     }
 
@@ -229,7 +229,7 @@ impl Experiment {
     /// the experiment says otherwise.
     pub fn ppo_config(&self) -> PpoConfig {
         let mut config = self.ppo.clone();
-        if config.anneal_lr && config.num_steps > 0 && self.arenas > 0 {
+        if config.anneal_lr && self.steps_per_update() > 0 {
             config.total_updates = config.total_updates.or_else(|| Some(self.updates()));
         }
         config

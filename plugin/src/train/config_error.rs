@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::{config::ExperimentError, config_keys::Keys};
+use super::{config::ExperimentError, config_keys::Keys, ron_keys::word};
 use crate::game::nearest;
 
 /// An experiment cannot be used.
@@ -110,10 +110,15 @@ pub(super) fn type_message(
         ron::Error::MissingStructField { field, .. } => format!("`{field}` is missing in `{key}`"),
         ron::Error::NoSuchEnumVariant { expected, found, .. } => one_of(key, found, expected),
         other => match valid_names() {
-            Some(names) => one_of(key, text, names),
-            None => format!("`{key}` must be {}, not {text} ({other})", kind(Keys::all().text(key))),
+            Some(names) if !names.contains(&word(text)) => one_of(key, text, names),
+            _ => format!("`{key}` must be {}, not {text} ({other})", kind(Keys::all().text(key))),
         },
     }
+}
+
+/// What to say about a text that is no value at all.
+pub(super) fn no_value(key: &str, text: &str, error: &ron::Error) -> String {
+    format!("`{key}` must be {}; `{text}` is not a value ({error})", kind(Keys::all().text(key)))
 }
 
 fn one_of(key: &str, found: &str, names: &[&str]) -> String {
@@ -127,10 +132,12 @@ fn kind(example: Option<&str>) -> String {
     match example.chars().next() {
         Some('"') => "text in quotes".to_owned(),
         Some('[') => "a list in square brackets".to_owned(),
+        Some('(') => format!("values in round brackets such as {example}"),
         Some('0'..='9' | '-') if example.contains(['.', 'e']) => format!("a number such as {example}"),
         Some('0'..='9') => format!("a whole number such as {example}"),
         _ if matches!(example, "true" | "false") => "true or false".to_owned(),
         _ if example == "None" => "None or Some(value)".to_owned(),
-        _ => "another kind of value".to_owned(),
+        _ if example.contains('(') => format!("something such as {example}"),
+        _ => format!("a name such as {example}"),
     }
 }

@@ -133,7 +133,7 @@ mod tests {
         for (good, bad, line, words) in [
             ("gamma", "gama", "x.ron:4:11:", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
             ("steps:", "step:", "x.ron:3:5:", "unknown key `step`; did you mean `steps`?"),
-            ("ppo: (", "pop: (", "x.ron:4:11:", "did you mean `ppo.gamma`?"),
+            ("ppo: (", "pppo: (", "x.ron:4:5:", "did you mean `ppo`?"),
             ("gamma", "horizon", "x.ron:4:11:", "did you mean `score.horizon`?"),
             ("gamma", "qqq", "x.ron:4:11:", "valid keys in `ppo`: activation, adam_eps, anneal_lr,"),
             ("steps:", "qqq:", "x.ron:3:5:", "valid keys: algorithm, arenas,"),
@@ -183,6 +183,8 @@ mod tests {
             values(&GOOD.replace("ppo: (gamma: 0.99)", "worlds: 3")),
             "`worlds` is 3: must divide `arenas` = 64; 4 does"
         );
+        let idle = "algorithm: \"sac\", sac: (num_steps: 0), ppo: (anneal_lr: true)";
+        assert!(values(&GOOD.replace("ppo: (gamma: 0.99)", idle)).contains("num_steps must be at least 1"));
         assert!(values(&GOOD.replace("gamma: 0.99", "gamma: 1.5")).contains("gamma must lie in 0..1"));
     }
 
@@ -226,6 +228,10 @@ mod tests {
         let rows = d4rl.steps_per_update() / d4rl.ppo.minibatches as u64;
         assert_eq!((d4rl.ppo.lr, rows, d4rl.ppo.num_steps, d4rl.ppo.epochs), (3e-4, 64, 2048, 10));
         assert_eq!(d4rl.ppo_config().total_updates, Some(d4rl.updates()), "the rate falls over the whole training");
+        let sac = with("base: [\"d4rl-sac\"], algorithm: \"sac\", game:").sac;
+        assert_eq!((sac.batch, sac.buffer, sac.tau, sac.gamma), (256, 1_000_000, 0.005, 0.99));
+        let sac = with("base: [\"coinrun-sac\"], algorithm: \"sac\", game:").sac;
+        assert_eq!((sac.batch, sac.buffer, sac.actor_lr, sac.gamma), (64, 10_000, 3e-4, 0.99));
         assert_eq!((d4rl.score.horizon, d4rl.skills.latent_reg), (1, 0.1));
     }
 

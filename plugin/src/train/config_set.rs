@@ -2,7 +2,7 @@
 
 use super::{
     config::Experiment,
-    config_error::{ConfigError, unknown_key},
+    config_error::{ConfigError, no_value, unknown_key},
     config_keys::{Keys, Origin, Value, check_syntax},
 };
 
@@ -45,7 +45,7 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
     } else {
         text.to_owned()
     };
-    check_syntax(&text).map_err(|error| refuse(format!("`{text}` is not a value: {}", error.code)))?;
+    check_syntax(&text).map_err(|error| refuse(no_value(key, &text, &error.code)))?;
     keys.put(key.to_owned(), Value { text, origin: origin.clone() });
     keys.parse(&origin)
 }
@@ -54,7 +54,7 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
 mod tests {
     use std::path::Path;
 
-    use playbot_learner::{AlphaKind, StdKind, nn::Activation};
+    use playbot_learner::{AlphaKind, EntropyCoef, StdKind, nn::Activation};
 
     use super::*;
     use crate::train::{Algorithm, config_file::parse_experiment};
@@ -81,6 +81,8 @@ mod tests {
             "score.alpha=Off",
             "skills.prior_std=Vector",
             "ppo.total_updates=Some(3)",
+            "sac.entropy=Fixed(0.5)",
+            "sac.log_std=(-4, 1)",
             "train=hard:0..31",
             "test=\"hard:70..80\"",
             "demos=my recordings/a",
@@ -98,6 +100,8 @@ mod tests {
         expected.score.alpha = AlphaKind::Off;
         expected.skills.prior_std = StdKind::Vector;
         expected.ppo.total_updates = Some(3);
+        expected.sac.entropy = EntropyCoef::Fixed(0.5);
+        expected.sac.log_std = (-4.0, 1.0);
         expected.train = "hard:0..31".parse().expect("a split");
         expected.test = "hard:70..80".parse().expect("a split");
         expected.demos = "my recordings/a".into();
@@ -125,7 +129,7 @@ mod tests {
             ("kl_coef=1", "did you mean `score.kl_coef`?"),
             ("pop.lr=1", "did you mean `ppo.lr`?"),
             ("ppo.qqq=1", "valid keys in `ppo`: activation"),
-            ("steps.more=1", "did you mean `steps`"),
+            ("steps.more=1", "`steps` has no keys"),
             ("ppo=3", "`ppo` is a section"),
             ("ppo=(gama: 1)", "did you mean `ppo.gamma`?"),
             ("ppo.lr=fast", "`ppo.lr` must be a number such as 0.0005, not fast"),
@@ -134,6 +138,10 @@ mod tests {
             ("score.kl=yes", "`score.kl` must be true or false, not yes"),
             ("ppo.hidden=[64,a]", "`ppo.hidden` must be a list in square brackets, not [64,a]"),
             ("ppo.activation=Rellu", "did you mean `Relu`?"),
+            ("sac.entropy=Fixd(0.2)", "did you mean `Fixed`?"),
+            ("sac.entropy=Fixed(high)", "`sac.entropy` must be something such as Auto("),
+            ("sac.entropy=Auto(initail: 1.0)", "unknown key `initail` in `sac.entropy`; did you mean `initial`?"),
+            ("sac.log_std=3", "values in round brackets such as (-5.0, 2.0), not 3"),
             ("ppo.total_updates=soon", "`ppo.total_updates` must be None or Some(value), not soon"),
             ("train=hard", "`hard` is not a range of levels"),
             ("algorithm=score", "unknown algorithm `score`"),

@@ -18,9 +18,11 @@ macro_rules! presets {
 }
 
 /// All of them.
-pub const PRESETS: [Preset; 6] = presets![
+pub const PRESETS: [Preset; 8] = presets![
     "coinrun-ppo",
+    "coinrun-sac",
     "d4rl-ppo",
+    "d4rl-sac",
     "skill-paper",
     "skill-released",
     "score-released-coinrun",

@@ -49,7 +49,7 @@ fn eat(text: &str, at: usize, token: char) -> Option<usize> {
 }
 
 /// The identifier with which a text begins; empty if there is none.
-fn word(text: &str) -> &str {
+pub(super) fn word(text: &str) -> &str {
     let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
     &text[..end]
 }

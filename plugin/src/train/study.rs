@@ -38,7 +38,7 @@ pub enum StudyError {
         /// Its name.
         variant: String,
         /// What does not fit.
-        source: ConfigError,
+        source: Box<ConfigError>,
     },
     /// The values of a variant do not go together.
     #[error("variant `{variant}`: {source}")]
@@ -86,7 +86,7 @@ pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> 
         let changed = experiment
             .without_study()
             .with_set(&variant.set)
-            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source })?
+            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source: Box::new(source) })?
             .without_study();
         changed.check().map_err(|source| StudyError::Values { variant: variant.name.clone(), source })?;
         runs.extend(seeds.iter().map(|&seed| StudyRun {

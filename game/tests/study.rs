@@ -1,0 +1,110 @@
+//! `playbot study` as its users call it: the same files in one go, after a kill, and when nothing is left to do.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output, Stdio},
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+
+const TINY: &str = r#"(
+    game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "demos", steps: 1024, arenas: 8, worlds: 2,
+    seeds: [1, 2],
+    variants: [
+        (name: "full"),
+        (name: "no-kl", set: ["score.kl=false"]),
+        (name: "plain", set: ["algorithm=ppo"]),
+        (name: "cloned", set: ["algorithm=bc"]),
+    ],
+    skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+    ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
+    eval: (episodes_per_level: 1),
+    checkpoints: (every: 2),
+)"#;
+
+fn command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+    command.args(args).current_dir(folder);
+    command
+}
+
+fn study(folder: &Path, runs: &str, more: &[&str]) -> Output {
+    let args = ["study", "--experiment", "tiny.ron", "--out", "out", "--runs", runs];
+    command(folder, &[&args, more].concat()).output().expect("the program starts")
+}
+
+fn ok(output: Output) -> Output {
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+fn refused(output: &Output, words: &str) {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{errors}");
+    assert!(errors.contains(words), "{errors}");
+}
+
+/// A folder with the tiny experiment and a few recordings.
+fn prepared() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("tiny.ron"), TINY).expect("writable");
+    fs::create_dir(folder.path().join("demos")).expect("writable");
+    let record = ["record", "coinrun", "--levels", "easy:0..7", "--out", "demos/a.demo"];
+    ok(command(folder.path(), &record).output().expect("the program starts"));
+    folder
+}
+
+/// Everything a study writes for its readers.
+fn written(folder: &Path) -> Vec<String> {
+    let read = |name| fs::read_to_string(folder.join("out").join(name)).expect("written");
+    ["table.md", "curves.svg", "results.json"].map(read).into()
+}
+
+#[test]
+fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
+    let folder = prepared();
+    let folder = folder.path();
+    let whole = ok(study(folder, "whole", &[]));
+    let expected = written(folder);
+    let table = String::from_utf8_lossy(&whole.stdout).into_owned();
+    assert_eq!(table.lines().count(), 6, "headings, rule and four variants: {table}");
+    assert!(
+        expected[0].contains(table.trim()) && expected[0].contains("playbot study --experiment tiny.ron --out out")
+    );
+
+    let results: Value = serde_json::from_str(&expected[2]).expect("JSON");
+    let rows = results["results"].as_array().expect("rows");
+    let names: Vec<_> = rows.iter().filter_map(|row| Some((row["variant"].as_str()?, row["seed"].as_u64()?))).collect();
+    let all = ["full", "no-kl", "plain", "cloned"].map(|name| [(name, 1), (name, 2)]);
+    assert_eq!(names, all.concat());
+    assert!(rows.iter().all(|row| row["test"]["episodes"] == 2));
+    assert!(rows[..6].iter().all(|row| row["training"]["steps"] == 1024) && rows[6]["training"].is_null());
+    let models = fs::read_dir(folder.join("whole")).expect("there").flatten();
+    let models = models.filter(|entry| entry.file_name().to_string_lossy().starts_with("skills-")).count();
+    assert_eq!(models, 2, "one for each seed, shared by the variants");
+    let saved = fs::read_to_string(folder.join("whole/no-kl-seed2/experiment.ron")).expect("written");
+    assert!(saved.contains("variants: []") && saved.contains("kl: false") && saved.contains("seed: 2"), "{saved}");
+
+    let args = ["study", "--experiment", "tiny.ron", "--out", "out", "--runs", "killed"];
+    let mut child = command(folder, &args).stderr(Stdio::null()).stdout(Stdio::null()).spawn().expect("starts");
+    let begun = Instant::now();
+    while !folder.join("killed/no-kl-seed1/checkpoints").exists() && begun.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().expect("killed or done");
+    child.wait().expect("ended");
+    assert!(!folder.join("killed/cloned-seed2/result.json").exists(), "it was killed before its end");
+    fs::remove_dir_all(folder.join("out")).expect("there");
+    refused(&study(folder, "killed", &[]), "--resume");
+    ok(study(folder, "killed", &["--resume"]));
+    assert!(written(folder) == expected, "the kill changed the results");
+
+    let metrics = folder.join("killed/full-seed1/metrics.jsonl");
+    let before = fs::metadata(&metrics).and_then(|data| data.modified()).expect("there");
+    ok(study(folder, "killed", &["--resume"]));
+    assert!(written(folder) == expected);
+    assert_eq!(fs::metadata(&metrics).and_then(|data| data.modified()).expect("there"), before, "it ran again");
+    refused(&study(folder, "killed", &["--resume", "--set", "ppo.lr=0.1"]), "other settings");
+}
