@@ -2,6 +2,7 @@
 //!
 //! - [`Chart`] draws [`Curve`]s as SVG.
 //! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`].
+//! - [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
 //!   no network. It follows the reader's light or dark setting and prints.
 //!
@@ -15,6 +16,7 @@ mod line;
 mod mark;
 mod number;
 mod result;
+pub mod statistics;
 mod svg;
 mod table;
 #[cfg(test)]
