@@ -4,7 +4,10 @@ pub mod arena_state;
 pub mod collect;
 pub mod config;
 pub mod config_file;
+pub mod json_lines;
+pub mod metrics_log;
 pub mod run_dir;
+pub mod tensorboard;
 pub mod trainer;
 pub mod worlds;
 

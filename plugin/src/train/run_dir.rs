@@ -5,12 +5,13 @@
 //! runs/<id>/run.json           algorithm, seed, version
 //! runs/<id>/metrics.jsonl      one line per update; the same bytes for the same seed
 //! runs/<id>/timing.jsonl       seconds and steps per second of each update
+//! runs/<id>/tensorboard/       both, as an event file for TensorBoard
 //! runs/<id>/checkpoint/        learner.safetensors, arenas.json
 //! ```
 
 use std::{
-    fs::{self, File, OpenOptions},
-    io::{self, BufRead, BufReader, Write},
+    fs::{self, File},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -23,6 +24,7 @@ use super::{
     arena_state::{ArenaState, restore_arenas, save_arenas},
     config::{Algorithm, Experiment},
     config_file::{ConfigError, read_experiment},
+    metrics_log::MetricsLog,
     trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
@@ -72,7 +74,7 @@ pub enum RunError {
     Train(#[from] TrainError),
 }
 
-fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
     move |source| RunError::Io { action, path: path.into(), source }
 }
 
@@ -180,19 +182,18 @@ impl RunDir {
         if current.exists() { current } else { self.path.join("checkpoint.old") }
     }
 
-    /// Appends an update to `metrics.jsonl` and `timing.jsonl`.
+    /// Its metrics.
+    pub fn metrics_log(&self) -> MetricsLog {
+        MetricsLog::new(&self.path)
+    }
+
+    /// Appends an update to the metrics.
     ///
     /// # Errors
     ///
     /// [`RunError::Io`].
     pub fn log(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
-        append_line(&self.path.join("metrics.jsonl"), &metrics_line(report))?;
-        let timing = report.timing;
-        let sps = steps_per_update as f64 / (timing.collect_s + timing.learn_s);
-        let line = json!({
-            "step": report.step, "charts/SPS": sps, "collect_s": timing.collect_s, "learn_s": timing.learn_s,
-        });
-        append_line(&self.path.join("timing.jsonl"), &line)
+        self.metrics_log().append(report, steps_per_update)
     }
 
     /// Saves learner and arenas. The previous checkpoint stays until the new one is whole.
@@ -246,9 +247,7 @@ impl RunDir {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
         trainer.progress = state.progress;
-        for name in ["metrics.jsonl", "timing.jsonl"] {
-            drop_lines_after(&self.path.join(name), trainer.progress.steps)?;
-        }
+        self.metrics_log().rewind(trainer.progress.steps)?;
         Ok(trainer)
     }
 }
@@ -268,32 +267,4 @@ fn remove_if_there(folder: &Path) -> Result<(), RunError> {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", folder)(error)),
         _ => Ok(()),
     }
-}
-
-fn append_line(path: &Path, line: &serde_json::Value) -> Result<(), RunError> {
-    let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(io_error("write", path))?;
-    file.write_all(format!("{line}\n").as_bytes()).map_err(io_error("write", path))
-}
-
-/// One update under the names that TensorBoard users know.
-fn metrics_line(report: &UpdateReport) -> serde_json::Value {
-    let mut line = json!({ "step": report.step, "update": report.update });
-    for (tag, value) in report.scalars() {
-        line[tag] = json!(value);
-    }
-    line
-}
-
-fn drop_lines_after(path: &Path, step: u64) -> Result<(), RunError> {
-    let Ok(file) = File::open(path) else { return Ok(()) };
-    let mut kept = String::new();
-    for line in BufReader::new(file).lines() {
-        let line = line.map_err(io_error("read", path))?;
-        let parsed: Option<serde_json::Value> = serde_json::from_str(&line).ok();
-        if parsed.and_then(|value| value["step"].as_u64()).is_some_and(|at| at <= step) {
-            kept.push_str(&line);
-            kept.push('\n');
-        }
-    }
-    write_atomically(path, kept.as_bytes())
 }
