@@ -94,6 +94,7 @@ pub mod policy;
 pub mod prelude;
 pub mod report;
 pub mod reward;
+pub mod runs;
 pub mod skill_prior;
 pub mod split;
 pub mod stage_clock;
