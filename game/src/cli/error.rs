@@ -7,6 +7,7 @@ use bevy_playbot::{
     fault::Fault,
     game::UnknownName,
     learner::{FileError, LearnError},
+    runs::RunsError,
     split::SplitError,
     train::{config::ExperimentError, config_file::ConfigError, run_dir::RunError, trainer::TrainError},
 };
@@ -43,6 +44,8 @@ pub enum CliError {
     #[error(transparent)]
     Run(#[from] RunError),
     #[error(transparent)]
+    Runs(#[from] RunsError),
+    #[error(transparent)]
     Train(#[from] TrainError),
     #[error(transparent)]
     Demo(#[from] DemoFileError),
@@ -67,17 +70,14 @@ impl CliError {
             | Self::Experiment(_)
             | Self::Demo(_)
             | Self::File(_) => 3,
-            Self::Run(error) => match error {
-                RunError::Io { .. } => 2,
-                RunError::Train(error) => train_code(error),
-                _ => 3,
-            },
+            Self::Run(error) | Self::Runs(RunsError::Run(error)) => run_code(error),
             Self::Train(error) => train_code(error),
             Self::Verify(VerifyError::Fault(_)) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),
             Self::Verify(_) => 3,
-            Self::BrokenPipe | Self::Io(_) | Self::Fault(_) => 2,
+            Self::BrokenPipe | Self::Io(_) | Self::Fault(_) | Self::Runs(RunsError::Io { .. }) => 2,
+            Self::Runs(_) => 3,
         }
     }
 }
@@ -85,6 +85,14 @@ impl CliError {
 /// A setting can be put right by the caller; a loss that is no number cannot.
 fn learn_code(error: &LearnError) -> u8 {
     if matches!(error, LearnError::NotFinite { .. }) { 2 } else { 3 }
+}
+
+fn run_code(error: &RunError) -> u8 {
+    match error {
+        RunError::Io { .. } => 2,
+        RunError::Train(error) => train_code(error),
+        _ => 3,
+    }
 }
 
 fn train_code(error: &TrainError) -> u8 {

@@ -13,6 +13,7 @@ mod methods;
 mod progress;
 mod quickstart;
 mod record;
+mod runs;
 mod trace;
 mod train;
 
@@ -43,6 +44,7 @@ Examples:
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
+  playbot runs compare runs/first runs/second --plot compare.svg
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
 
@@ -60,6 +62,8 @@ enum Verb {
     Train(train::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
+    /// List, show and compare trainings.
+    Runs(runs::Args),
     /// Show a level.
     Level(level::Args),
     /// Play given actions and print the state after each.
@@ -104,6 +108,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),
         Verb::Eval(args) => eval::run(args),
+        Verb::Runs(args) => runs::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),
         Verb::Bench(args) => bench::run(args),
