@@ -22,13 +22,15 @@ const PLOT_HEIGHT: f64 = 250.0;
 const SIZE: f64 = 13.0;
 /// Distance of two lines of text in pixels.
 const LINE: f64 = 17.0;
+/// Space around the charts of a file in pixels.
+const MARGIN: f64 = 12.0;
 /// Space between charts of one file in pixels.
 const GAP: f64 = 20.0;
 /// Length of the piece of line before a label, with its space.
 const KEY: f64 = 26.0;
 
 impl Chart {
-    /// The chart as a complete SVG file: text as text, no fonts or scripts, 720 pixels wide,
+    /// The chart as a complete SVG file: text as text, no fonts or scripts, 720 pixels wide and a margin,
     /// in light or dark colours as the reader prefers.
     pub fn to_svg(&self) -> String {
         to_svg(std::slice::from_ref(self))
@@ -44,15 +46,15 @@ pub fn to_svg(charts: &[Chart]) -> String {
         height += own_height + GAP;
     }
     let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
-    let paper = "<rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n";
+    let paper = format!("<rect class=\"paper\" x=\"-{MARGIN}\" y=\"-{MARGIN}\" width=\"100%\" height=\"100%\"/>\n");
     let style = format!("<style>\n{CHART_STYLE}</style>\n{paper}");
-    element(&titles.join("; "), (height - GAP).max(0.0), &(style + &body))
+    element(&titles.join("; "), (height - GAP).max(0.0), MARGIN, &(style + &body))
 }
 
 /// The chart inside a page that holds [`CHART_STYLE`].
 pub(super) fn draw(chart: &Chart) -> String {
     let (content, height) = content(chart);
-    element(&chart.title, height, &content)
+    element(&chart.title, height, 0.0, &content)
 }
 
 /// Everything in a chart, and its height.
@@ -68,11 +70,13 @@ fn content(chart: &Chart) -> (String, f64) {
     (body, layout.height)
 }
 
-fn element(label: &str, height: f64, body: &str) -> String {
+fn element(label: &str, height: f64, margin: f64, body: &str) -> String {
+    let (width, height, label) = (WIDTH + 2.0 * margin, height + 2.0 * margin, escape(label));
     format!(
-        "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {height:.0}\" \
-         width=\"{WIDTH:.0}\" height=\"{height:.0}\" role=\"img\" aria-label=\"{label}\">\n{body}</svg>\n",
-        label = escape(label),
+        "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{:.0} {:.0} {width:.0} {height:.0}\" \
+         width=\"{width:.0}\" height=\"{height:.0}\" role=\"img\" aria-label=\"{label}\">\n{body}</svg>\n",
+        0.0 - margin,
+        0.0 - margin,
     )
 }
 

@@ -126,7 +126,9 @@ fn charts_of_one_file_stand_below_each_other() {
     };
     let both = to_svg(&charts);
     assert!(both.contains("aria-label=\"Return; Success\"") && both.contains(">Success</text>"));
-    assert_eq!(height(&both), height(&charts[0].to_svg()) + 20.0 + height(&charts[1].to_svg()));
+    // One margin above and one below for both, and a gap between them.
+    let heights = charts.each_ref().map(|chart| height(&chart.to_svg()) - 24.0);
+    assert_eq!(height(&both), heights[0] + 20.0 + heights[1] + 24.0);
     assert_sound(&to_svg(&[]));
 }
 
