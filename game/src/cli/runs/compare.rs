@@ -6,7 +6,7 @@ use std::{
 };
 
 use bevy_playbot::{
-    report::{Chart, Curve, PlainTable, readable, statistics::mean_and_sd},
+    report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole},
     runs::{GroupStatistics, RunGroup, RunRecord, find_runs, group_runs, mean_and_spread},
 };
 use serde_json::json;
@@ -96,12 +96,12 @@ fn table(metric: &str, threshold: Option<f64>, groups: &[GroupStatistics]) -> Pl
         let seeds: Vec<String> = group.seeds.iter().map(u64::to_string).collect();
         let last = match group.seeds.len() {
             1 => readable(group.last_mean),
-            _ => format!("{} ± {}", readable(group.last_mean), readable(group.last_sd)),
+            _ => readable_with_spread(group.last_mean, group.last_sd),
         };
         let mut row = vec![group.label.clone(), seeds.join(" "), last];
         row.extend([readable(group.lowest), readable(group.highest)]);
         row.extend(threshold.map(|_| reached(&group.steps_to_threshold)));
-        row.push(readable(group.steps_per_s.round()));
+        row.push(whole(group.steps_per_s));
         row
     };
     PlainTable { caption: metric.to_owned(), columns, rows: groups.iter().map(row).collect() }
@@ -115,9 +115,9 @@ fn reached(steps: &[Option<u64>]) -> String {
     else {
         return format!("never in {never} of {never}");
     };
-    let mut text = readable(mean_and_sd(&known).0.round());
+    let mut text = whole(mean_and_sd(&known).0);
     if known.len() > 1 {
-        text += &format!(" ({} to {})", readable(least), readable(most));
+        text += &format!(" ({} to {})", whole(least), whole(most));
     }
     if never > 0 {
         text += &format!(", never in {never} of {}", steps.len());

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::SystemTime};
 
 use bevy_playbot::{
-    report::{PlainTable, readable},
+    report::{PlainTable, readable, whole},
     runs::{RunRecord, RunsError, find_runs},
 };
 use serde_json::{Value, json};
@@ -74,11 +74,11 @@ fn row(run: &RunRecord) -> Vec<String> {
         run.experiment.game.clone(),
         run.info.algorithm.name().to_owned(),
         run.info.seed.to_string(),
-        readable(run.curves.last_step() as f64),
-        readable(run.experiment.steps as f64),
+        whole(run.curves.last_step() as f64),
+        whole(run.experiment.steps as f64),
         number(run.curves.last("charts/episodic_return")),
         number(run.curves.last("charts/success_rate")),
-        run.curves.steps_per_s().map_or(UNKNOWN.to_owned(), |value| readable(value.round())),
+        run.curves.steps_per_s().map_or(UNKNOWN.to_owned(), whole),
         age_s(run).map_or(UNKNOWN.to_owned(), |seconds| format!("{} ago", duration(seconds))),
         state.to_owned(),
     ]

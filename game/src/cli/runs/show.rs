@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bevy_playbot::{
-    report::{Chart, Curve, PlainTable, readable, sparkline, to_svg},
+    report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whole},
     runs::{RunRecord, changed_settings},
     train::checkpoint::Checkpoint,
 };
@@ -79,10 +79,9 @@ fn print_head(run: &RunRecord) -> Result<(), CliError> {
         info.revision
     ))?;
     let state = if run.is_finished() { "finished" } else { "not finished" };
-    let speed =
-        run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", readable(speed.round())));
+    let speed = run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", whole(speed)));
     let age = age_s(run).map_or(String::new(), |age| format!(", updated {} ago", duration(age)));
-    let (done, planned) = (readable(run.curves.last_step() as f64), readable(experiment.steps as f64));
+    let (done, planned) = (whole(run.curves.last_step() as f64), whole(experiment.steps as f64));
     print_line(format!("{done} of {planned} steps, {state}{speed}{age}"))?;
     print_line(format!(
         "trained on {}, held out {}, {} arenas in {} Worlds",
@@ -123,7 +122,7 @@ fn metrics(run: &RunRecord) -> PlainTable {
         let Some([first, lowest, highest, last]) = extremes(curve) else {
             return vec![tag.to_owned(), "–".to_owned()];
         };
-        let (low_step, high_step) = (readable(lowest.0 as f64), readable(highest.0 as f64));
+        let (low_step, high_step) = (whole(lowest.0 as f64), whole(highest.0 as f64));
         vec![
             tag.to_owned(),
             readable(first.1),
