@@ -95,6 +95,7 @@ pub mod policy_file;
 pub mod prelude;
 pub mod report;
 pub mod reward;
+pub mod runs;
 pub mod skill_prior;
 pub mod split;
 pub mod stage_clock;

@@ -8,6 +8,7 @@ use bevy_playbot::{
     game::UnknownName,
     learner::{FileError, LearnError},
     policy_file::{ExportError, PolicyMisfit},
+    runs::RunsError,
     split::SplitError,
     train::{
         config::ExperimentError, config_file::ConfigError, run_dir::RunError, study::StudyError, trainer::TrainError,
@@ -72,6 +73,8 @@ pub enum CliError {
     #[error(transparent)]
     Run(#[from] RunError),
     #[error(transparent)]
+    Runs(#[from] RunsError),
+    #[error(transparent)]
     Train(#[from] TrainError),
     #[error(transparent)]
     Demo(#[from] DemoFileError),
@@ -102,7 +105,7 @@ impl CliError {
             | Self::Demo(_)
             | Self::Misfit(_) => 3,
             Self::File(error) | Self::Export(ExportError::File(error)) => file_code(error),
-            Self::Run(error) => run_code(error),
+            Self::Run(error) | Self::Runs(RunsError::Run(error)) => run_code(error),
             Self::NotSaved { error, .. } => run_code(error),
             Self::Train(error) => train_code(error),
             Self::Verify(VerifyError::Fault(_)) => 2,
@@ -113,7 +116,9 @@ impl CliError {
             | Self::Io(_)
             | Self::Fault(_)
             | Self::Export(ExportError::Fault(_))
+            | Self::Runs(RunsError::Io { .. })
             | Self::Diverged { .. } => 2,
+            Self::Runs(_) => 3,
         }
     }
 }

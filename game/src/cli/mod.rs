@@ -15,6 +15,7 @@ mod policy;
 mod progress;
 mod quickstart;
 mod record;
+mod runs;
 mod study;
 mod study_run;
 mod trace;
@@ -50,6 +51,7 @@ Examples:
   playbot policy export --run runs/first --out coinrun.policy
   playbot config show --set ppo.lr=0.0003          an experiment with all its values
   playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
+  playbot runs compare runs/first runs/second --plot compare.svg
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
 
@@ -73,6 +75,8 @@ enum Verb {
     Eval(eval::Args),
     /// Make and look at policy files.
     Policy(policy::Args),
+    /// List, show and compare trainings.
+    Runs(runs::Args),
     /// Show a level.
     Level(level::Args),
     /// Play given actions and print the state after each.
@@ -120,6 +124,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Config(args) => config::run(args),
         Verb::Eval(args) => eval::run(args),
         Verb::Policy(args) => policy::run(args),
+        Verb::Runs(args) => runs::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),
         Verb::Bench(args) => bench::run(args),

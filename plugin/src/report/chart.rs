@@ -10,7 +10,7 @@ pub struct Curve {
     /// The points `(x, y)` in the order they are joined. A point that is not finite is a gap.
     pub points: Vec<(f64, f64)>,
     /// Lower and upper end of a band around the line, one pair for each point: the range over the seeds,
-    /// or mean ± standard error. Pairs that are not finite are left out.
+    /// or mean ± standard deviation. Pairs that are not finite are left out.
     pub band: Option<Vec<(f64, f64)>>,
 }
 

@@ -129,7 +129,7 @@ impl Section {
             out += &table.to_html();
         }
         for chart in &self.charts {
-            let _ = writeln!(out, "<figure>\n{}</figure>", draw(chart, false));
+            let _ = writeln!(out, "<figure>\n{}</figure>", draw(chart));
         }
         for code in &self.code {
             let _ = writeln!(out, "<pre><code>{}</code></pre>", escape(code.trim_end()));

@@ -1,7 +1,7 @@
 //! Reports: results as a table on the console, curves as SVG, and both in one HTML file.
 //!
-//! - [`Chart`] draws [`Curve`]s as SVG.
-//! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`].
+//! - [`Chart`] draws [`Curve`]s as SVG, [`to_svg`] several charts in one file, [`sparkline`] a curve as text.
+//! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`]; a [`PlainTable`] holds any text.
 //! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
 //! - [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
@@ -16,7 +16,9 @@ mod escape;
 mod line;
 mod mark;
 mod number;
+mod plain_text;
 mod result;
+mod sparkline;
 pub mod statistics;
 mod study;
 mod study_table;
@@ -29,7 +31,10 @@ mod text_width;
 
 pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
+pub use number::{readable, readable_with_spread, whole};
 pub use result::{ResultRow, ResultTable};
+pub use sparkline::sparkline;
 pub use study::{StudyReport, StudyResult, SuccessCurve, TestResult, TrainingResult};
+pub use svg::to_svg;
 pub use table::{PlainTable, Table};
 pub use text_table::to_text_table;

@@ -30,6 +30,34 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     out + &fraction
 }
 
+/// `value` without decimals, for counts; NaN is unknown.
+pub fn whole(value: f64) -> String {
+    fixed(value, 0)
+}
+
+/// `value` with about four significant digits, for numbers whose size is not known beforehand; NaN is unknown.
+pub fn readable(value: f64) -> String {
+    let size = value.abs();
+    match size {
+        _ if size == 0.0 || !size.is_finite() => fixed(value, 0),
+        _ if size < 1e-4 => scientific(value),
+        _ => fixed(value, decimals_of(size)),
+    }
+}
+
+/// `mean ± spread`, both with the decimals that [`readable`] gives the larger one.
+pub fn readable_with_spread(mean: f64, spread: f64) -> String {
+    let size = mean.abs().max(spread.abs());
+    if size < 1e-4 || !size.is_finite() {
+        return format!("{} ± {}", readable(mean), readable(spread));
+    }
+    mean_and_error(mean, spread, decimals_of(size))
+}
+
+fn decimals_of(size: f64) -> usize {
+    (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize
+}
+
 /// A share (0 to 1) in percent with one decimal.
 pub(super) fn percent(share: f64) -> String {
     if share.is_nan() { UNKNOWN.to_owned() } else { format!("{}%", fixed(share * 100.0, 1)) }
@@ -87,6 +115,11 @@ mod tests {
         assert_eq!(fixed(-0.001, 1), "0.0");
         assert_eq!(fixed(f64::NAN, 1), "–");
         assert_eq!(percent(0.9744), "97.4%");
+        let shown = [0.0, 8.53125, -0.00312, 0.00002, 81920.4, 1.0, f64::NAN, f64::INFINITY].map(readable);
+        assert_eq!(shown, ["0", "8.531", "−0.003120", "2e−5", "81,920", "1.000", "–", "inf"]);
+        assert_eq!(readable_with_spread(8.53125, 0.04041), "8.531 ± 0.040");
+        assert_eq!(readable_with_spread(0.0, 0.0), "0 ± 0");
+        assert_eq!(readable_with_spread(f64::NAN, f64::NAN), "– ± –");
         assert_eq!(mean_and_error(9.7432, 0.1234, 2), "9.74 ± 0.12");
         assert_eq!(mean_and_error(1234.5, 45.6, 0), "1,234 ± 46");
         assert_eq!(mean_and_error(5.0, f64::NAN, 2), "5.00");

@@ -22,19 +22,43 @@ const PLOT_HEIGHT: f64 = 250.0;
 const SIZE: f64 = 13.0;
 /// Distance of two lines of text in pixels.
 const LINE: f64 = 17.0;
+/// Space around the charts of a file in pixels.
+const MARGIN: f64 = 12.0;
+/// Space between charts of one file in pixels.
+const GAP: f64 = 20.0;
 /// Length of the piece of line before a label, with its space.
 const KEY: f64 = 26.0;
 
 impl Chart {
-    /// The chart as a complete SVG file: text as text, no fonts or scripts, 720 pixels wide,
+    /// The chart as a complete SVG file: text as text, no fonts or scripts, 720 pixels wide and a margin,
     /// in light or dark colours as the reader prefers.
     pub fn to_svg(&self) -> String {
-        draw(self, true)
+        to_svg(std::slice::from_ref(self))
     }
 }
 
-/// The chart inside a page that holds [`CHART_STYLE`] (`alone` = false), or as a file of its own.
-pub(super) fn draw(chart: &Chart, alone: bool) -> String {
+/// Charts below each other as one complete SVG file, see [`Chart::to_svg`].
+pub fn to_svg(charts: &[Chart]) -> String {
+    let (mut body, mut height) = (String::new(), 0.0);
+    for chart in charts {
+        let (content, own_height) = content(chart);
+        let _ = write!(body, "<g transform=\"translate(0 {height:.1})\">\n{content}</g>\n");
+        height += own_height + GAP;
+    }
+    let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
+    let paper = format!("<rect class=\"paper\" x=\"-{MARGIN}\" y=\"-{MARGIN}\" width=\"100%\" height=\"100%\"/>\n");
+    let style = format!("<style>\n{CHART_STYLE}</style>\n{paper}");
+    element(&titles.join("; "), (height - GAP).max(0.0), MARGIN, &(style + &body))
+}
+
+/// The chart inside a page that holds [`CHART_STYLE`].
+pub(super) fn draw(chart: &Chart) -> String {
+    let (content, height) = content(chart);
+    element(&chart.title, height, 0.0, &content)
+}
+
+/// Everything in a chart, and its height.
+fn content(chart: &Chart) -> (String, f64) {
     let layout = Layout::new(chart);
     let mut body = String::new();
     head(chart, &layout, &mut body);
@@ -43,18 +67,17 @@ pub(super) fn draw(chart: &Chart, alone: bool) -> String {
     lines(chart, &layout, &mut body);
     labels(chart, &layout, &mut body);
     foot(chart, &layout, &mut body);
-    let open = format!(
-        "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {h:.0}\" \
-         width=\"{WIDTH:.0}\" height=\"{h:.0}\" role=\"img\" aria-label=\"{label}\">\n",
-        h = layout.height,
-        label = escape(&chart.title),
-    );
-    let style = if alone {
-        format!("<style>\n{CHART_STYLE}</style>\n<rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n")
-    } else {
-        String::new()
-    };
-    format!("{open}{style}{body}</svg>\n")
+    (body, layout.height)
+}
+
+fn element(label: &str, height: f64, margin: f64, body: &str) -> String {
+    let (width, height, label) = (WIDTH + 2.0 * margin, height + 2.0 * margin, escape(label));
+    format!(
+        "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{:.0} {:.0} {width:.0} {height:.0}\" \
+         width=\"{width:.0}\" height=\"{height:.0}\" role=\"img\" aria-label=\"{label}\">\n{body}</svg>\n",
+        0.0 - margin,
+        0.0 - margin,
+    )
 }
 
 /// Where things are. All lengths in pixels.

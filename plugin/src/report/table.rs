@@ -55,19 +55,22 @@ fn wrapped(caption: &str, head: &str, body: &str, key: Option<String>) -> String
     )
 }
 
-fn plain(table: &PlainTable) -> String {
+/// Which columns hold numbers, so far as they hold anything; a table without rows has none.
+pub(super) fn number_columns(table: &PlainTable) -> Vec<bool> {
     let width = table.rows.iter().map(Vec::len).fold(table.columns.len(), usize::max);
-    let cell = |row: &[String], c: usize| row.get(c).map(|t| escape(t)).unwrap_or_default();
-    let is_number = |text: &str| {
+    let is_number = |text: &String| {
         let digits = text.trim_start_matches(['-', '−', '+', '±', '<', '>', '≥', '≤', ' ']);
         digits.starts_with(|c: char| c.is_ascii_digit()) || text.is_empty() || text == UNKNOWN
     };
-    let class: Vec<&str> = (0..width)
-        .map(|c| {
-            let numbers = table.rows.iter().all(|r| r.get(c).is_none_or(|t| is_number(t)));
-            if numbers && !table.rows.is_empty() { " class=\"number\"" } else { "" }
-        })
-        .collect();
+    let numbers = |c: usize| !table.rows.is_empty() && table.rows.iter().all(|r| r.get(c).is_none_or(is_number));
+    (0..width).map(numbers).collect()
+}
+
+fn plain(table: &PlainTable) -> String {
+    let class: Vec<&str> =
+        number_columns(table).into_iter().map(|number| if number { " class=\"number\"" } else { "" }).collect();
+    let width = class.len();
+    let cell = |row: &[String], c: usize| row.get(c).map(|t| escape(t)).unwrap_or_default();
     let row = |tag: &str, cells: &[String]| {
         let cells: String = (0..width).map(|c| format!("<{tag}{}>{}</{tag}>", class[c], cell(cells, c))).collect();
         format!("<tr>{cells}</tr>")

@@ -116,6 +116,23 @@ fn extreme_values_are_drawn_or_gaps() {
 }
 
 #[test]
+fn charts_of_one_file_stand_below_each_other() {
+    let curve = Curve::new("a", vec![(0.0, 0.0), (1.0, 1.0)]);
+    let charts = [chart(vec![curve.clone()]), Chart { title: "Success".into(), ..chart(vec![curve]) }];
+    let height = |svg: &str| -> f64 {
+        assert_sound(svg);
+        let (_, rest) = svg.split_once(" height=\"").expect("a height");
+        rest.split_once('"').and_then(|(height, _)| height.parse().ok()).expect("a number")
+    };
+    let both = to_svg(&charts);
+    assert!(both.contains("aria-label=\"Return; Success\"") && both.contains(">Success</text>"));
+    // One margin above and one below for both, and a gap between them.
+    let heights = charts.each_ref().map(|chart| height(&chart.to_svg()) - 24.0);
+    assert_eq!(height(&both), heights[0] + 20.0 + heights[1] + 24.0);
+    assert_sound(&to_svg(&[]));
+}
+
+#[test]
 fn long_or_many_names_go_below_the_plot() {
     let below = |curves| {
         let svg = chart(curves).to_svg();

@@ -9,11 +9,14 @@ mod config_error;
 pub mod config_file;
 mod config_keys;
 mod config_set;
+pub mod json_lines;
 pub mod learner;
+pub mod metrics_log;
 pub mod presets;
 mod ron_keys;
 pub mod run_dir;
 pub mod study;
+pub mod tensorboard;
 pub mod trainer;
 pub mod worlds;
 

@@ -5,12 +5,13 @@
 //! runs/<id>/run.json           algorithm, seed, version
 //! runs/<id>/metrics.jsonl      one line per update; the same bytes for the same seed
 //! runs/<id>/timing.jsonl       seconds and steps per second of each update
+//! runs/<id>/tensorboard/       both, as an event file for TensorBoard
 //! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`](super::checkpoint)
 //! ```
 
 use std::{
-    fs::{self, File, OpenOptions},
-    io::{self, BufRead, BufReader, Write},
+    fs::{self, File},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -25,6 +26,7 @@ use super::{
     config::{Algorithm, Experiment},
     config_file::{ConfigError, read_experiment},
     learner::Learner,
+    metrics_log::MetricsLog,
     trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
@@ -189,19 +191,18 @@ impl RunDir {
         checkpoint::choose(&self.path, which)
     }
 
-    /// Appends an update to `metrics.jsonl` and `timing.jsonl`.
+    /// Its metrics.
+    pub fn metrics_log(&self) -> MetricsLog {
+        MetricsLog::new(&self.path)
+    }
+
+    /// Appends an update to the metrics.
     ///
     /// # Errors
     ///
     /// [`RunError::Io`].
     pub fn log(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
-        append_line(&self.path.join("metrics.jsonl"), &metrics_line(report))?;
-        let timing = report.timing;
-        let sps = steps_per_update as f64 / (timing.collect_s + timing.learn_s);
-        let line = json!({
-            "step": report.step, "charts/SPS": sps, "collect_s": timing.collect_s, "learn_s": timing.learn_s,
-        });
-        append_line(&self.path.join("timing.jsonl"), &line)
+        self.metrics_log().append(report, steps_per_update)
     }
 
     /// Saves learner and arenas as a new checkpoint; the latest and the best of the earlier ones stay.
@@ -241,9 +242,7 @@ impl RunDir {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
         trainer.progress = state.progress;
-        for name in ["metrics.jsonl", "timing.jsonl"] {
-            drop_lines_after(&self.path.join(name), trainer.progress.steps)?;
-        }
+        self.metrics_log().rewind(trainer.progress.steps)?;
         Ok(trainer)
     }
 
@@ -282,32 +281,4 @@ fn is_run(path: &Path) -> bool {
 
 pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {
     RunError::Damaged { path: path.into(), message: error.to_string() }
-}
-
-fn append_line(path: &Path, line: &serde_json::Value) -> Result<(), RunError> {
-    let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(io_error("write", path))?;
-    file.write_all(format!("{line}\n").as_bytes()).map_err(io_error("write", path))
-}
-
-/// One update under the names that TensorBoard users know.
-fn metrics_line(report: &UpdateReport) -> serde_json::Value {
-    let mut line = json!({ "step": report.step, "update": report.update });
-    for (tag, value) in report.scalars() {
-        line[tag] = json!(value);
-    }
-    line
-}
-
-fn drop_lines_after(path: &Path, step: u64) -> Result<(), RunError> {
-    let Ok(file) = File::open(path) else { return Ok(()) };
-    let mut kept = String::new();
-    for line in BufReader::new(file).lines() {
-        let line = line.map_err(io_error("read", path))?;
-        let parsed: Option<serde_json::Value> = serde_json::from_str(&line).ok();
-        if parsed.and_then(|value| value["step"].as_u64()).is_some_and(|at| at <= step) {
-            kept.push_str(&line);
-            kept.push('\n');
-        }
-    }
-    write_atomically(path, kept.as_bytes())
 }

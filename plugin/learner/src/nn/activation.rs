@@ -1,5 +1,6 @@
 //! The non-linearity between layers.
 
+use super::kernels::{self, has_kernels};
 use burn::tensor::{Tensor, activation};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +19,7 @@ impl Activation {
     pub fn forward<const D: usize>(self, x: Tensor<D>) -> Tensor<D> {
         match self {
             Self::Relu => activation::relu(x),
+            Self::Tanh if has_kernels(&x.device()) => kernels::tanh(x),
             Self::Tanh => x.tanh(),
         }
     }

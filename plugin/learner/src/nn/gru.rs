@@ -1,11 +1,12 @@
 //! A stack of gated recurrent layers, in one or both directions.
 
+use super::kernels::{self, has_kernels};
 use super::params::{ParamVisitor, Parameters, path};
 use super::{init::uniform, tensors};
 use burn::tensor::{Device, Tensor, TensorData, activation::sigmoid};
 use rand::Rng;
 
-/// One recurrent layer. The directions lie side by side in the first dimension and are computed together.
+/// One recurrent layer. The directions lie side by side in the first dimension.
 #[derive(Clone, Debug)]
 pub struct GruLayer {
     /// `[directions, inputs, 3 * hidden]`; the columns are the reset, update and new gates.
@@ -60,103 +61,97 @@ impl Gru {
         Self { layers }
     }
 
-    /// Runs over a sequence, one `[B, inputs]` tensor per time step, from `initial` states (one `[directions, B,
-    /// hidden]` per layer) or zeros.
+    /// Runs over a sequence `[steps * B, inputs]`, time-major (row `t * B + b`), from `initial` states (one
+    /// `[directions, B, hidden]` per layer) or zeros.
     ///
-    /// Gives the outputs of the last layer per time step, `[B, directions * hidden]` (forward features first), and
-    /// the last state of each layer, `[directions, B, hidden]`; the backward direction ends at the first time step.
+    /// Gives the outputs of the last layer, `[steps * B, directions * hidden]` (forward features first), and the last
+    /// state of each layer, `[directions, B, hidden]`; the backward direction ends at the first time step.
     pub fn forward(
         &self,
-        sequence: Vec<Tensor<2>>,
+        sequence: Tensor<2>,
+        steps: usize,
         initial: Option<Vec<Tensor<3>>>,
-    ) -> (Vec<Tensor<2>>, Vec<Tensor<3>>) {
+    ) -> (Tensor<2>, Vec<Tensor<3>>) {
         let mut initial = initial.unwrap_or_default().into_iter();
         let mut last = Vec::with_capacity(self.layers.len());
         let mut sequence = sequence;
         for layer in &self.layers {
-            let states = layer.states(&sequence, initial.next());
-            last.extend(states.last().cloned());
-            sequence = layer.outputs(&states);
+            sequence = layer.outputs(sequence, steps, initial.next());
+            last.push(layer.last_state(&sequence, steps));
         }
         (sequence, last)
     }
 
     /// `[B, directions * hidden]`: the last layer's forward output at the last step joined with its backward output
-    /// at the first step. `sequence` must not be empty.
-    pub fn summary(&self, sequence: Vec<Tensor<2>>) -> Tensor<2> {
-        let mut sequence = sequence;
-        let mut states = Vec::new();
-        for (k, layer) in self.layers.iter().enumerate() {
-            if k > 0 {
-                sequence = layer.outputs(&states);
-            }
-            states = layer.states(&sequence, None);
+    /// at the first step of the `sequence`, which is as in [`Self::forward`].
+    pub fn summary(&self, sequence: Tensor<2>, steps: usize) -> Tensor<2> {
+        let outputs = self.layers.iter().fold(sequence, |x, layer| layer.outputs(x, steps, None));
+        match self.layers.last() {
+            Some(layer) => join_directions(layer.last_state(&outputs, steps)),
+            None => outputs,
         }
-        let last = states.pop().expect("a sequence has at least one step and a stack one layer");
-        join_directions(last)
     }
 }
 
 impl GruLayer {
-    /// The state after each step, `[directions, B, hidden]`; the second direction reads the sequence backwards.
-    fn states(&self, sequence: &[Tensor<2>], initial: Option<Tensor<3>>) -> Vec<Tensor<3>> {
-        let [directions, hidden, gates] = self.weight_hh.dims();
-        let bias_ih = self.bias_ih.clone().reshape([directions, 1, gates]);
-        let bias_hh = self.bias_hh.clone().reshape([directions, 1, gates]);
-        let steps = sequence.len();
-        let mut state = initial;
-        let mut states = Vec::with_capacity(steps);
-        for t in 0..steps {
-            let x: Tensor<3> = if directions == 2 {
-                Tensor::stack(vec![sequence[t].clone(), sequence[steps - 1 - t].clone()], 0)
-            } else {
-                sequence[t].clone().unsqueeze_dim(0)
-            };
-            let [_, batch, _] = x.dims();
-            let input = x.matmul(self.weight_ih.clone()) + bias_ih.clone();
-            let gate = |all: &Tensor<3>, from: usize, to: usize| {
-                all.clone().slice([0..directions, 0..batch, from * hidden..to * hidden])
-            };
-            let next = match state.take() {
-                Some(h) => {
-                    let recurrent = h.clone().matmul(self.weight_hh.clone()) + bias_hh.clone();
-                    let rz = sigmoid(gate(&input, 0, 2) + gate(&recurrent, 0, 2));
-                    let (r, z) = (gate(&rz, 0, 1), gate(&rz, 1, 2));
-                    let n = (gate(&input, 2, 3) + r * gate(&recurrent, 2, 3)).tanh();
-                    n.clone() + z * (h - n)
-                }
-                // From the zero state the recurrent product is its bias.
-                None => {
-                    let rz = sigmoid(gate(&input, 0, 2) + bias_hh.clone().slice([0..directions, 0..1, 0..2 * hidden]));
-                    let (r, z) = (gate(&rz, 0, 1), gate(&rz, 1, 2));
-                    let bias_n = bias_hh.clone().slice([0..directions, 0..1, 2 * hidden..gates]);
-                    let n = (gate(&input, 2, 3) + r * bias_n).tanh();
-                    n.clone() - z * n
-                }
-            };
-            states.push(next.clone());
-            state = Some(next);
-        }
-        states
+    /// The state after each step of `x` `[steps * B, inputs]`: `[steps * B, directions * hidden]`. The second
+    /// direction reads the sequence backwards.
+    fn outputs(&self, x: Tensor<2>, steps: usize, initial: Option<Tensor<3>>) -> Tensor<2> {
+        let [directions, hidden, _] = self.weight_hh.dims();
+        let batch = x.dims()[0] / steps.max(1);
+        let device = x.device();
+        let initial = initial.unwrap_or_else(|| Tensor::zeros([directions, batch, hidden], &device));
+        let input = x.unsqueeze_dim(0).matmul(self.weight_ih.clone());
+        let scan = if has_kernels(&device) { kernels::gru } else { gru_steps };
+        scan(input, self.weight_hh.clone(), self.bias_ih.clone(), self.bias_hh.clone(), initial)
     }
 
-    /// The states as outputs per time step, `[B, directions * hidden]`.
-    fn outputs(&self, states: &[Tensor<3>]) -> Vec<Tensor<2>> {
+    /// The last state of each direction, `[directions, B, hidden]`, taken from the outputs.
+    fn last_state(&self, outputs: &Tensor<2>, steps: usize) -> Tensor<3> {
         let [directions, hidden, _] = self.weight_hh.dims();
-        if directions == 1 {
-            return states.iter().map(|h| h.clone().squeeze_dim(0)).collect();
-        }
-        let part = |h: &Tensor<3>, d: usize| -> Tensor<2> {
-            let [_, batch, _] = h.dims();
-            h.clone().slice([d..d + 1, 0..batch, 0..hidden]).squeeze_dim(0)
+        let rows = outputs.dims()[0];
+        let batch = rows / steps.max(1);
+        let part = |d: usize| {
+            let rows = if d == 0 { rows - batch..rows } else { 0..batch };
+            outputs.clone().slice([rows, d * hidden..(d + 1) * hidden])
         };
-        (0..states.len())
-            .map(|t| {
-                let backward = part(&states[states.len() - 1 - t], 1);
-                Tensor::cat(vec![part(&states[t], 0), backward], 1)
-            })
-            .collect()
+        Tensor::stack((0..directions).map(part).collect(), 0)
     }
+}
+
+/// The recurrent part of a layer in tensor operations, for devices without a kernel and as the kernel's yardstick:
+/// shapes as in [`kernels::gru`].
+fn gru_steps(
+    input: Tensor<3>,
+    weight: Tensor<3>,
+    bias_ih: Tensor<2>,
+    bias_hh: Tensor<2>,
+    initial: Tensor<3>,
+) -> Tensor<2> {
+    let [directions, batch, hidden] = initial.dims();
+    let steps = input.dims()[1] / batch.max(1);
+    let input = input + bias_ih.unsqueeze_dim(1);
+    let bias_hh: Tensor<3> = bias_hh.unsqueeze_dim(1);
+    let parts = (0..directions).map(|d| {
+        let one = |tensor: &Tensor<3>| -> Tensor<2> { tensor.clone().narrow(0, d, 1).squeeze_dim(0) };
+        let (input, weight, bias, mut h) = (one(&input), one(&weight), one(&bias_hh), one(&initial));
+        let mut states = Vec::with_capacity(steps);
+        for s in 0..steps {
+            let t = if d == 1 { steps - 1 - s } else { s };
+            let a = input.clone().narrow(0, t * batch, batch);
+            let c = h.clone().matmul(weight.clone()) + bias.clone();
+            let gate = |all: &Tensor<2>, k: usize, count: usize| all.clone().narrow(1, k * hidden, count * hidden);
+            let rz = sigmoid(gate(&a, 0, 2) + gate(&c, 0, 2));
+            let n = (gate(&a, 2, 1) + gate(&rz, 0, 1) * gate(&c, 2, 1)).tanh();
+            h = n.clone() + gate(&rz, 1, 1) * (h - n);
+            states.push(h.clone());
+        }
+        if d == 1 {
+            states.reverse();
+        }
+        Tensor::cat(states, 0)
+    });
+    Tensor::cat(parts.collect(), 1)
 }
 
 /// `[directions, B, hidden]` to `[B, directions * hidden]`.
@@ -173,6 +168,69 @@ impl Parameters for Gru {
             visitor.visit(&path(&name, "weight_hh"), &mut layer.weight_hh);
             visitor.visit(&path(&name, "bias_ih"), &mut layer.bias_ih);
             visitor.visit(&path(&name, "bias_hh"), &mut layer.bias_hh);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{NamedGrads, host, tracked};
+    use crate::rng::{Streams, normal};
+
+    const STEPS: usize = 4;
+    const BATCH: usize = 3;
+
+    /// The outputs under `scan` and the gradients of everything that enters it, for a loss in which each output has
+    /// its own weight.
+    fn run(
+        scan: fn(Tensor<3>, Tensor<3>, Tensor<2>, Tensor<2>, Tensor<3>) -> Tensor<2>,
+        directions: usize,
+        hidden: usize,
+        kind: DeviceKind,
+    ) -> Vec<(&'static str, Vec<f32>)> {
+        let device = kind.plain();
+        let mut rng = Streams::new(1).stream("gru kernel", 0);
+        let mut layer = Gru::new(1, hidden, 1, directions == 2, &mut rng, &device);
+        let mut numbers = |n: usize| (0..n).map(|_| 2.0 * normal(&mut rng)).collect::<Vec<f32>>();
+        let mut cube = |rows: usize, width: usize| -> Tensor<3> {
+            Tensor::from_data(TensorData::new(numbers(directions * rows * width), [directions, rows, width]), &device)
+        };
+        let input = cube(STEPS * BATCH, 3 * hidden).autodiff().require_grad();
+        let initial = cube(BATCH, hidden).autodiff().require_grad();
+        let probe =
+            tensors::matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
+        layer = tracked(&layer);
+        let GruLayer { weight_hh, bias_ih, bias_hh, .. } = layer.layers[0].clone();
+        let output = scan(input.clone(), weight_hh, bias_ih, bias_hh, initial.clone());
+        let grads = (output.clone() * probe).sum().backward();
+        let named = NamedGrads::read(&mut layer, "", &grads).expect("readable");
+        let mut found = vec![
+            ("output", host(output.inner()).expect("readable")),
+            ("input", host(input.grad(&grads).expect("tracked")).expect("readable")),
+            ("initial", host(initial.grad(&grads).expect("tracked")).expect("readable")),
+        ];
+        for name in ["l0.weight_hh", "l0.bias_ih", "l0.bias_hh"] {
+            found.push((name, named.get(name).expect("a parameter").to_vec()));
+        }
+        found
+    }
+
+    #[test]
+    fn the_kernel_agrees_with_tensor_operations() {
+        for kind in DeviceKind::ALL {
+            for (directions, hidden) in [(1, 5), (2, 5), (2, 16)] {
+                let want = run(gru_steps, directions, hidden, kind);
+                let got = run(kernels::gru, directions, hidden, kind);
+                for ((name, want), (_, got)) in want.iter().zip(&got) {
+                    assert_eq!(want.len(), got.len());
+                    assert!(want.iter().any(|x| x.abs() > 0.1), "{name} is a test");
+                    for (x, y) in want.iter().zip(got) {
+                        assert!((x - y).abs() <= 1e-6 * (1.0 + x.abs()), "{name} on {kind}: {y} is not {x}");
+                    }
+                }
+            }
         }
     }
 }

@@ -7,9 +7,12 @@
 mod activation;
 mod adam;
 mod dist;
+mod fast_math;
 mod grads;
 mod gru;
+mod gru_kernel;
 mod init;
+mod kernels;
 mod linear;
 mod mlp;
 mod params;

@@ -20,7 +20,6 @@ pub enum StdKind {
 
 /// The part of a Gaussian actor that gives ln σ.
 #[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one per network")]
 pub enum LogStd {
     /// Discrete actions have none.
     None,

@@ -5,14 +5,13 @@ use super::explore::explorer;
 use super::metrics::Sums;
 use super::transitions::check_ends;
 use super::{EntropyCoef, SacBatch, SacConfig, SacMetrics, SacNets, actor_step, alpha_step, critic_step, soft_update};
-use crate::nn::{ActionRows, Adam, AdamConfig, matrix, vector};
+use crate::nn::{Adam, AdamConfig};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, NetShape, Policy, SkillSource, joined_rows};
-use crate::rng::{ChaCha8Rng, Streams, normal};
+use crate::policy::{Actor, NetShape, Policy, SkillSource};
+use crate::rng::{ChaCha8Rng, Streams};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
 use crate::{ActionSpace, DeviceKind, LearnError, PolicySpec, Rollout};
-use burn::tensor::Tensor;
 
 /// Improves a policy from transitions, new and old.
 ///
@@ -287,50 +286,6 @@ impl SacLearner {
             EntropyCoef::Auto { .. } => self.nets.alpha(),
             EntropyCoef::Fixed(alpha) => Ok(alpha),
         }
-    }
-
-    /// Standard normal numbers for a batch of draws; discrete actions need none.
-    fn noise(&self, rng: &mut ChaCha8Rng) -> Option<Tensor<2>> {
-        let ActionSpace::Continuous(dim) = self.spec.action_space else { return None };
-        let n = self.config.batch;
-        Some(matrix((0..n * dim).map(|_| normal(rng)).collect(), n, dim, &self.device.plain()))
-    }
-
-    /// The transitions in `slots` on the device, normalised; with the decoder's side of them if the actor needs it.
-    fn batch(&self, slots: &[usize], with_actor: bool) -> Result<SacBatch, LearnError> {
-        let (buffer, device, n) = (&self.buffer, self.device.plain(), slots.len());
-        let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
-        let width = self.spec.latent + self.spec.obs_dim;
-        let inputs = |z: &[f32], obs: &[f32]| {
-            let rows = slots.iter().copied();
-            let rows = joined_rows(z, self.spec.latent, obs, self.spec.obs_dim, stats.as_ref(), rows);
-            matrix(rows, n, width, &device)
-        };
-        let reward = |&slot: &usize| match &self.rewards {
-            Some(normalizer) => normalizer.scale(buffer.rewards[slot]),
-            None => buffer.rewards[slot],
-        };
-        let actions = buffer.actions.gather(slots);
-        let decoder = match self.skill.as_ref().filter(|_| with_actor) {
-            None => None,
-            Some(skill) => {
-                let gather = |values: &[f32], width| joined_rows(&[], 0, values, width, None, slots.iter().copied());
-                let (z, obs) = (gather(&buffer.z, buffer.latent), gather(&buffer.obs, buffer.obs_dim));
-                let squashed = self.nets.actor.is_squashed();
-                let mut rng = self.streams.stream("score.own_samples", self.gradient_steps);
-                skill.rows((&z, &obs), &actions, squashed, &mut rng, self.device)?
-            }
-        };
-        let all: Vec<usize> = (0..n).collect();
-        let continues = slots.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
-        Ok(SacBatch {
-            inputs: inputs(&buffer.z, &buffer.obs),
-            actions: ActionRows::new(&actions, &device),
-            rewards: vector(slots.iter().map(reward).collect(), &device),
-            continues: vector(continues, &device),
-            next_inputs: inputs(&buffer.next_z, &buffer.next_obs),
-            decoder: decoder.map(|rows| rows.batch(&all, &device)),
-        })
     }
 
     fn check(&self, rollout: &Rollout) -> Result<(), LearnError> {

@@ -1,30 +1,10 @@
 //! The gradient steps of SAC: critics, actor, α.
 
-use super::{SacNets, alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
+use super::{Critics, SacBatch, SacNets, alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
 use crate::LearnError;
-use crate::nn::{
-    ActionRows, Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen,
-};
-use crate::sac::Critics;
-use crate::score::{DecoderBatch, ScoreConfig, decoder_kl};
+use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
+use crate::score::{ScoreConfig, decoder_kl};
 use burn::tensor::{Gradients, Tensor};
-
-/// One batch of transitions on the device.
-#[derive(Clone, Debug)]
-pub struct SacBatch {
-    /// What the actor reads, `[n, latent + obs_dim]`.
-    pub inputs: Tensor<2>,
-    /// The actions taken.
-    pub actions: ActionRows,
-    /// What they earned, `[n]`.
-    pub rewards: Tensor<1>,
-    /// 1 where the value of the next state counts, 0 where the episode was over, `[n]`.
-    pub continues: Tensor<1>,
-    /// The next states as the actor reads them, `[n, latent + obs_dim]`; any numbers where they do not count.
-    pub next_inputs: Tensor<2>,
-    /// Constants of the penalty, if there is one.
-    pub decoder: Option<DecoderBatch>,
-}
 
 /// What a step of the critics looked like, before it was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,6 +46,7 @@ pub struct AlphaStep {
 }
 
 /// What the policy does in each row.
+#[expect(clippy::large_enum_variant, reason = "there is one per gradient step")]
 enum Choice {
     /// ln π of all choices.
     Choices(Tensor<2>),

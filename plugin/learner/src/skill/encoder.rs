@@ -48,10 +48,7 @@ impl Encoder {
     pub fn forward(&self, states: Tensor<2>, actions: Tensor<2>, steps: usize) -> Dist {
         let features = self.state.forward(states);
         let joined = Tensor::cat(vec![features, actions], 1);
-        let [rows, width] = joined.dims();
-        let batch = rows / steps.max(1);
-        let sequence = (0..steps).map(|t| joined.clone().slice([t * batch..(t + 1) * batch, 0..width])).collect();
-        let summary = self.gru.summary(sequence);
+        let summary = self.gru.summary(joined, steps);
         Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) }
     }
 }

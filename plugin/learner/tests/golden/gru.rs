@@ -18,15 +18,14 @@ fn check(case: &Case, stack: &str, weights: &str, kind: DeviceKind) {
 
     let x = case.tensor::<3>("in.x", &device).autodiff().require_grad();
     let batch = case.dim("B");
-    let sequence: Vec<Tensor<2>> =
-        (0..steps).map(|t| x.clone().slice([0..batch, t..t + 1, 0..inputs]).squeeze_dim(1)).collect();
+    let sequence: Tensor<2> = x.clone().swap_dims(0, 1).reshape([steps * batch, inputs]);
     let initial = (stack == "bi2_h0").then(|| {
         let all = case.tensor::<3>("in.h0_bi2", &device);
         (0..layers).map(|k| all.clone().slice([2 * k..2 * k + 2, 0..batch, 0..hidden])).collect()
     });
-    let summary = (initial.is_none() && directions == 2).then(|| gru.summary(sequence.clone()));
-    let (outputs, last) = gru.forward(sequence, initial);
-    let output: Tensor<3> = Tensor::stack(outputs, 1);
+    let summary = (initial.is_none() && directions == 2).then(|| gru.summary(sequence.clone(), steps));
+    let (outputs, last) = gru.forward(sequence, steps, initial);
+    let output: Tensor<3> = outputs.reshape([steps, batch, directions * hidden]).swap_dims(0, 1);
     case.check(&format!("out.{stack}.output"), &host(output.clone()));
     let states: Tensor<3> = Tensor::cat(last, 0);
     case.check(&format!("out.{stack}.h_n"), &host(states.clone()));

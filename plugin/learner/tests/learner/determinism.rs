@@ -17,6 +17,7 @@ fn everything_can_move_to_another_thread() {
     movable::<Policy>();
     movable::<playbot_learner::Prior>();
     movable::<PpoLearner>();
+    movable::<playbot_learner::SacLearner>();
     movable::<playbot_learner::SkillModel>();
     movable::<playbot_learner::SkillTrainer>();
 }

@@ -138,12 +138,12 @@ pub fn sac_config() -> SacConfig {
     }
 }
 
-/// Success after 3000 steps.
+/// Success after 2000 steps.
 fn sac(config: SacConfig, seed: u64, device: DeviceKind) -> f64 {
     let steps = config.num_steps;
     let mut learner = SacLearner::new(config, SPEC, seed, device).expect("good settings");
     let mut field = Field::new(8, seed);
-    while learner.transitions() < 3000 {
+    while learner.transitions() < 2000 {
         learner.update(&field.rollout(&learner, steps)).expect("finite");
     }
     Field::success(&learner, 60)

@@ -1,0 +1,142 @@
+//! `playbot train` and `playbot runs` as their users call them: what a run writes down, and how it is looked at.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+fn playbot(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
+}
+
+/// Standard output and standard error, if the exit code is as expected.
+fn output(folder: &Path, args: &[&str], code: i32) -> (String, String) {
+    let output = playbot(folder, args);
+    let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
+    let (out, err) = (text(output.stdout), text(output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {out}{err}");
+    (out, err)
+}
+
+fn json_lines(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+}
+
+/// Trains PPO for four updates of 128 steps, three runs: two seeds, and another learning rate.
+fn three_runs(folder: &Path) {
+    let config = |lr: &str| {
+        format!(
+            r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", demos: "none", steps: 512, arenas: 8, worlds: 2,
+            ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8], lr: {lr}))"#
+        )
+    };
+    fs::write(folder.join("a.ron"), config("0.001")).expect("writable");
+    fs::write(folder.join("b.ron"), config("0.002")).expect("writable");
+    for (experiment, seed, run) in [("a.ron", "2", "runs/a/2"), ("a.ron", "1", "runs/a/1"), ("b.ron", "1", "runs/b")] {
+        output(folder, &["train", "--algorithm", "ppo", "--experiment", experiment, "--seed", seed, "--run", run], 0);
+    }
+}
+
+#[test]
+fn runs_are_listed_shown_and_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+
+    let (listed, _) = output(folder, &["runs", "ls"], 0);
+    assert_eq!(listed.lines().filter(|line| line.starts_with("runs/") && line.contains("512")).count(), 3, "{listed}");
+    let rows = json_lines(&output(folder, &["runs", "ls", "--json"], 0).0);
+    let paths: Vec<_> = rows.iter().filter_map(|row| row["path"].as_str()).collect();
+    assert_eq!(paths, ["runs/a/1", "runs/a/2", "runs/b"]);
+    assert!(rows.iter().all(|row| row["finished"] == true && row["steps"] == 512 && row["steps_per_s"].is_f64()));
+
+    let (shown, _) = output(folder, &["runs", "show", "runs/b", "--metric", "losses/entropy", "--plot", "b.svg"], 0);
+    assert!(shown.contains("ppo.lr=0.002") && shown.contains("losses/value_loss"), "{shown}");
+    assert!(fs::read_to_string(folder.join("b.svg")).expect("written").contains("losses/entropy"));
+    let all = &json_lines(&output(folder, &["runs", "show", "runs/b", "--json"], 0).0)[0];
+    assert_eq!(all["metrics"]["losses/entropy"]["last"]["step"], 512);
+    assert_eq!(all["experiment"]["ppo"]["num_steps"], 16);
+
+    let compare = ["runs", "compare", "runs", "--metric", "losses/entropy", "--threshold", "0", "--plot", "c.svg"];
+    let (compared, _) = output(folder, &compare, 0);
+    assert!(compared.contains("ppo ppo.lr=0.001") && compared.contains("1 2"), "{compared}");
+    assert!(compared.contains("128 (128 to 128)"), "{compared}");
+    let svg = fs::read_to_string(folder.join("c.svg")).expect("written");
+    assert_eq!((svg.matches("class=\"band").count(), svg.matches("class=\"line").count()), (1, 4), "two are keys");
+    let groups = json_lines(&output(folder, &[&compare[..3], &["--metric", "losses/entropy", "--json"]].concat(), 0).0);
+    assert_eq!(groups[0]["group"]["seeds"], serde_json::json!([1, 2]));
+    let last = |run: &str| -> f64 {
+        let text = fs::read_to_string(folder.join(run).join("metrics.jsonl")).expect("written");
+        json_lines(&text).last().and_then(|line| line["losses/entropy"].as_f64()).expect("a number")
+    };
+    let mean = (last("runs/a/1") + last("runs/a/2")) / 2.0;
+    assert_eq!(groups[0]["group"]["last_mean"].as_f64(), Some(mean));
+    assert_eq!(groups[1]["group"]["last_sd"].as_f64(), Some(0.0), "one seed");
+}
+
+#[test]
+fn damaged_runs_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let (_, missing) = output(folder, &["runs", "ls"], 3);
+    assert!(missing.contains("no folder runs"), "{missing}");
+    fs::create_dir_all(folder.join("runs/empty")).expect("created");
+    let (_, nothing) = output(folder, &["runs", "ls"], 3);
+    assert!(nothing.contains("no runs in runs"), "{nothing}");
+    let (_, foreign) = output(folder, &["runs", "show", "runs/empty"], 3);
+    assert!(foreign.contains("is not the folder of a run"), "{foreign}");
+
+    three_runs(folder);
+    let metrics = folder.join("runs/b/metrics.jsonl");
+    let whole = fs::read(&metrics).expect("written");
+    fs::write(&metrics, &whole[..whole.len() - 9]).expect("writable");
+    let (shown, torn) = output(folder, &["runs", "show", "runs/b", "--json"], 0);
+    assert!(torn.contains("metrics.jsonl: line 4 is damaged"), "{torn}");
+    assert_eq!(json_lines(&shown)[0]["metrics"]["losses/entropy"]["last"]["step"], 384);
+    let (_, unknown) = output(folder, &["runs", "compare", "runs", "--metric", "losses/entrpy"], 3);
+    assert!(unknown.contains("did you mean `losses/entropy`?"), "{unknown}");
+
+    fs::write(folder.join("runs/b/run.json"), "{").expect("writable");
+    let (listed, _) = output(folder, &["runs", "ls"], 1);
+    assert!(listed.contains("runs/a/1") && listed.contains("damaged: runs/b/run.json"), "{listed}");
+    assert!(json_lines(&output(folder, &["runs", "ls", "--json"], 1).0)[2]["error"].is_string());
+    output(folder, &["runs", "compare", "runs"], 3);
+    for file in ["metrics.jsonl", "timing.jsonl"] {
+        fs::remove_file(folder.join("runs/a/1").join(file)).expect("removed");
+    }
+    let (_, early) = output(folder, &["runs", "compare", "runs/a"], 3);
+    assert!(early.contains("runs/a/1 has no metrics yet"), "{early}");
+}
+
+/// Framed records: 12 bytes, the content, 4 bytes.
+fn records(bytes: &[u8]) -> Vec<&[u8]> {
+    let (mut records, mut rest) = (Vec::new(), bytes);
+    while let Some((length, tail)) = rest.split_first_chunk() {
+        let length = u64::from_le_bytes(*length) as usize;
+        records.push(&tail[4..4 + length]);
+        rest = &tail[8 + length..];
+    }
+    records
+}
+
+#[test]
+fn a_resumed_run_shows_each_update_once_in_tensorboard() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    let events = |run: &str| -> Vec<Vec<u8>> {
+        let files: Vec<_> = fs::read_dir(folder.join(run).join("tensorboard")).expect("listed").collect();
+        assert_eq!(files.len(), 1, "{files:?}");
+        let bytes = fs::read(files[0].as_ref().expect("listed").path()).expect("readable");
+        records(&bytes).into_iter().map(<[u8]>::to_vec).collect()
+    };
+    let before = events("runs/b");
+    assert_eq!(before.len(), 2 + 4, "version, start, four updates");
+    output(folder, &["train", "--run", "runs/b", "--resume", "--steps", "640"], 0);
+    let after = events("runs/b");
+    assert_eq!(after.len(), 2 + 5);
+    assert!(after[2..6] == before[2..], "the same updates at the same times");
+}

@@ -1,0 +1,135 @@
+//! Runs that differ only in their seed belong together.
+
+use std::collections::BTreeMap;
+
+use super::{record::RunRecord, settings::settings};
+
+/// More differing settings than this are not spelled out in a group's label.
+const NAMED: usize = 3;
+
+/// Runs of the same experiment and algorithm with several seeds.
+#[derive(Clone, Debug)]
+pub struct RunGroup<'a> {
+    /// The algorithm and what sets the group apart from the others, such as `ppo lr=0.001`.
+    pub label: String,
+    /// The settings in which the groups differ, with this group's values.
+    pub differing: BTreeMap<String, String>,
+    /// The runs, in the order of their seeds.
+    pub runs: Vec<&'a RunRecord>,
+}
+
+impl RunGroup<'_> {
+    /// The seeds, ascending.
+    pub fn seeds(&self) -> Vec<u64> {
+        self.runs.iter().map(|run| run.info.seed).collect()
+    }
+
+    /// What makes the runs less comparable than they look: a seed that occurs twice, runs that are not finished, other
+    /// revisions of the code.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let first = &self.runs[0];
+        if self.seeds().windows(2).any(|pair| pair[0] == pair[1]) {
+            warnings.push(format!("{}: the same seed more than once", self.label));
+        }
+        if self.runs.iter().any(|run| run.curves.last_step() != first.curves.last_step()) {
+            let steps: Vec<String> = self.runs.iter().map(|run| run.curves.last_step().to_string()).collect();
+            warnings.push(format!("{}: runs of different length ({} steps)", self.label, steps.join(", ")));
+        } else if !first.is_finished() {
+            warnings.push(format!("{}: not finished", self.label));
+        }
+        if self.runs.iter().any(|run| run.info.revision != first.info.revision) {
+            warnings.push(format!("{}: made by different revisions of the code", self.label));
+        }
+        warnings
+    }
+}
+
+/// Puts runs together that differ only in their seed; groups are in the order of their first run.
+pub fn group_runs(runs: &[RunRecord]) -> Vec<RunGroup<'_>> {
+    let mut groups: Vec<(BTreeMap<String, String>, Vec<&RunRecord>)> = Vec::new();
+    for run in runs {
+        let mut key = settings(&run.experiment);
+        key.remove("seed");
+        key.insert("algorithm".to_owned(), run.info.algorithm.name().to_owned());
+        match groups.iter_mut().find(|(other, _)| *other == key) {
+            Some((_, members)) => members.push(run),
+            None => groups.push((key, vec![run])),
+        }
+    }
+    let differs = |key: &String| groups.iter().any(|(other, _)| other.get(key) != groups[0].0.get(key));
+    let keys: Vec<String> = groups.iter().flat_map(|(key, _)| key.keys()).filter(|key| differs(key)).cloned().collect();
+    let mut finished = Vec::new();
+    for (index, (key, mut members)) in groups.into_iter().enumerate() {
+        members.sort_by_key(|run| run.info.seed);
+        let mut differing: BTreeMap<String, String> = key.into_iter().filter(|(key, _)| keys.contains(key)).collect();
+        differing.remove("algorithm");
+        let label = label(members[0].info.algorithm.name(), &differing, index + 1);
+        finished.push(RunGroup { label, differing, runs: members });
+    }
+    finished
+}
+
+fn label(algorithm: &str, differing: &BTreeMap<String, String>, number: usize) -> String {
+    if differing.len() > NAMED {
+        return format!("{algorithm} #{number}");
+    }
+    let settings = differing.iter().map(|(key, value)| format!(" {key}={value}"));
+    std::iter::once(algorithm.to_owned()).chain(settings).collect()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::{
+        super::{curves::RunCurves, settings::tests::experiment},
+        *,
+    };
+    use crate::train::{Algorithm, run_dir::RunInfo};
+
+    pub fn run(algorithm: Algorithm, seed: u64, changes: &str) -> RunRecord {
+        let experiment = experiment(&format!("seed: {seed}, {changes}"));
+        let info = RunInfo { algorithm, seed, version: "1".into(), revision: "r".into() };
+        let path = format!("{algorithm}-{seed}").into();
+        RunRecord { path, experiment, info, curves: RunCurves::default(), checkpoints: Vec::new(), updated: None }
+    }
+
+    fn grouped(runs: &[RunRecord]) -> Vec<(String, Vec<u64>)> {
+        group_runs(runs).iter().map(|group| (group.label.clone(), group.seeds())).collect()
+    }
+
+    #[test]
+    fn seeds_of_one_experiment_are_a_group() {
+        let runs = [
+            run(Algorithm::Ppo, 2, ""),
+            run(Algorithm::ScorePpo, 1, ""),
+            run(Algorithm::Ppo, 1, ""),
+            run(Algorithm::ScorePpo, 2, ""),
+        ];
+        assert_eq!(grouped(&runs), [("ppo".to_owned(), vec![1, 2]), ("score-ppo".to_owned(), vec![1, 2])]);
+        assert!(grouped(&[]).is_empty());
+    }
+
+    #[test]
+    fn groups_are_named_by_what_sets_them_apart() {
+        let runs = [run(Algorithm::Ppo, 1, "ppo: (gamma: 0.5)"), run(Algorithm::Ppo, 1, "ppo: (gamma: 0.25)")];
+        assert_eq!(
+            grouped(&runs).iter().map(|(label, _)| label).collect::<Vec<_>>(),
+            ["ppo ppo.gamma=0.5", "ppo ppo.gamma=0.25"]
+        );
+        let many = run(Algorithm::Ppo, 1, "arenas: 8, worlds: 1, ppo: (gamma: 0.75), score: (horizon: 3)");
+        let runs = [runs[0].clone(), many];
+        let groups = group_runs(&runs);
+        assert_eq!((groups[0].label.as_str(), groups[1].label.as_str()), ("ppo #1", "ppo #2"));
+        assert_eq!((groups[0].differing["arenas"].as_str(), groups[1].differing["arenas"].as_str()), ("64", "8"));
+        assert_eq!(groups[1].differing.len(), 4);
+    }
+
+    #[test]
+    fn doubtful_groups_are_pointed_out() {
+        let mut runs = [run(Algorithm::Ppo, 1, ""), run(Algorithm::Ppo, 1, "")];
+        runs[1].info.revision = "other".into();
+        let warnings = group_runs(&runs)[0].warnings().join("\n");
+        assert!(warnings.contains("same seed") && warnings.contains("not finished"), "{warnings}");
+        assert!(warnings.contains("revisions"), "{warnings}");
+    }
+}

@@ -1,0 +1,141 @@
+//! One metric over the seeds of a group.
+
+use serde::Serialize;
+
+use super::{curves::check_metric, error::RunsError, group::RunGroup};
+use crate::report::{
+    Curve,
+    statistics::{mean_and_sd, mean_curve, steps_to_reach},
+};
+
+/// What a group of runs reached in one metric. Values that are not known are NaN.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GroupStatistics {
+    /// The group.
+    pub label: String,
+    /// The seeds, ascending.
+    pub seeds: Vec<u64>,
+    /// The last value of each run.
+    pub last: Vec<f64>,
+    /// Mean of the last values.
+    pub last_mean: f64,
+    /// Sample standard deviation of the last values; 0 for a single run.
+    pub last_sd: f64,
+    /// Lowest value of any run at any step.
+    pub lowest: f64,
+    /// Highest value of any run at any step.
+    pub highest: f64,
+    /// For each run the first step at which it reached the threshold; none if no threshold was given.
+    pub steps_to_threshold: Vec<Option<u64>>,
+    /// Mean over the runs of their environment steps per second.
+    pub steps_per_s: f64,
+}
+
+impl GroupStatistics {
+    /// Measures a group.
+    pub fn new(group: &RunGroup, metric: &str, threshold: Option<f64>) -> Self {
+        let last: Vec<f64> = group.runs.iter().map(|run| run.curves.last(metric).unwrap_or(f64::NAN)).collect();
+        let (last_mean, last_sd) = mean_and_sd(&last);
+        let speeds: Vec<f64> = group.runs.iter().filter_map(|run| run.curves.steps_per_s()).collect();
+        let values = || group.runs.iter().flat_map(|run| run.curves.curve(metric)).map(|(_, value)| *value);
+        let reached = |threshold| group.runs.iter().map(move |run| steps_to_reach(run.curves.curve(metric), threshold));
+        Self {
+            label: group.label.clone(),
+            seeds: group.seeds(),
+            last_mean,
+            last_sd,
+            last,
+            lowest: values().fold(f64::NAN, f64::min),
+            highest: values().fold(f64::NAN, f64::max),
+            steps_to_threshold: threshold.into_iter().flat_map(reached).collect(),
+            steps_per_s: mean_and_sd(&speeds).0,
+        }
+    }
+}
+
+/// The mean curve of each group with a band: mean ± sample standard deviation of three seeds or more, the range of two,
+/// nothing around a single one.
+///
+/// # Errors
+///
+/// [`RunsError::NoMetrics`] if a run has no metrics at all, [`RunsError::Metric`] if no run has this one.
+pub fn mean_and_spread(groups: &[RunGroup], metric: &str) -> Result<Vec<Curve>, RunsError> {
+    let runs = || groups.iter().flat_map(|group| group.runs.iter().copied());
+    if let Some(run) = runs().find(|run| run.curves.last_step() == 0) {
+        return Err(RunsError::NoMetrics(run.path.clone()));
+    }
+    let tags = check_metric(metric, runs().map(|run| &run.curves));
+    if let (Err(source), Some(run)) = (tags, runs().next()) {
+        return Err(RunsError::Metric { path: run.path.clone(), source });
+    }
+    Ok(groups.iter().map(|group| group_curve(group, metric)).collect())
+}
+
+fn group_curve(group: &RunGroup, metric: &str) -> Curve {
+    let curves: Vec<Vec<(u64, f64)>> = group.runs.iter().map(|run| run.curves.curve(metric).to_vec()).collect();
+    let mean = mean_curve(&curves);
+    let points = mean.iter().map(|point| (point.step as f64, point.mean)).collect();
+    let label = match curves.len() {
+        1 => format!("{}, seed {}", group.label, group.runs[0].info.seed),
+        n => format!("{}, {n} seeds", group.label),
+    };
+    let curve = Curve::new(label, points);
+    if curves.len() == 1 { curve } else { curve.with_band(mean.iter().map(|point| (point.low, point.high)).collect()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::{
+        super::{
+            curves::RunCurves,
+            group::{group_runs, tests::run},
+            record::RunRecord,
+        },
+        *,
+    };
+    use crate::train::Algorithm;
+
+    fn with_curve(seed: u64, values: &[f64]) -> RunRecord {
+        let folder = tempfile::tempdir().expect("a folder");
+        let line = |(index, value)| format!("{{\"step\":{},\"charts/a\":{value}}}\n", 10 * (index + 1));
+        let text: String = values.iter().enumerate().map(line).collect();
+        fs::write(folder.path().join("metrics.jsonl"), text).expect("writable");
+        let curves = RunCurves::read(folder.path()).expect("readable");
+        RunRecord { curves, ..run(Algorithm::Ppo, seed, "") }
+    }
+
+    #[test]
+    fn numbers_of_three_seeds() {
+        let runs = [with_curve(3, &[0.0, 9.0]), with_curve(1, &[1.0, 2.0]), with_curve(2, &[5.0, 4.0])];
+        let groups = group_runs(&runs);
+        let statistics = GroupStatistics::new(&groups[0], "charts/a", Some(5.0));
+        assert_eq!((statistics.seeds, statistics.last), (vec![1, 2, 3], vec![2.0, 4.0, 9.0]));
+        assert_eq!((statistics.last_mean, statistics.last_sd), (5.0, 13f64.sqrt()));
+        assert_eq!((statistics.lowest, statistics.highest), (0.0, 9.0));
+        assert_eq!(statistics.steps_to_threshold, [None, Some(10), Some(20)]);
+        assert!(statistics.steps_per_s.is_nan(), "there is no timing");
+
+        let curves = mean_and_spread(&groups, "charts/a").expect("known");
+        assert_eq!((curves[0].label.as_str(), &curves[0].points), ("ppo, 3 seeds", &vec![(10.0, 2.0), (20.0, 5.0)]));
+        let band = curves[0].band.as_ref().expect("three seeds");
+        assert_eq!(band[1], (5.0 - 13f64.sqrt(), 5.0 + 13f64.sqrt()));
+    }
+
+    #[test]
+    fn one_seed_has_no_band_and_two_have_their_range() {
+        let runs = [with_curve(1, &[1.0]), with_curve(2, &[3.0])];
+        let band = |runs| mean_and_spread(&group_runs(runs), "charts/a").expect("known")[0].band.clone();
+        assert_eq!((band(&runs[..1]), band(&runs)), (None, Some(vec![(1.0, 3.0)])));
+    }
+
+    #[test]
+    fn missing_metrics_are_errors() {
+        let runs = [with_curve(1, &[1.0])];
+        let error = mean_and_spread(&group_runs(&runs), "charts/b").expect_err("unknown").to_string();
+        assert!(error.contains("`charts/b`") && error.contains("`charts/a`"), "{error}");
+        let runs = [runs[0].clone(), run(Algorithm::Ppo, 2, "")];
+        assert!(matches!(mean_and_spread(&group_runs(&runs), "charts/a"), Err(RunsError::NoMetrics(_))));
+    }
+}

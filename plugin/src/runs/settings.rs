@@ -1,0 +1,65 @@
+//! Experiments as flat lists of settings, to see where they differ.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::train::Experiment;
+
+/// All settings of an experiment by their path, such as `ppo.lr`, with their values as text.
+pub fn settings(experiment: &Experiment) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    flatten(&json!(experiment), String::new(), &mut found);
+    found
+}
+
+/// The settings that differ from their defaults; those without a default are not among them.
+pub fn changed_settings(experiment: &Experiment) -> BTreeMap<String, String> {
+    let mut changed = settings(experiment);
+    let required = ["game", "train", "test", "demos", "steps"];
+    let all = json!(experiment);
+    let least: Value = required.into_iter().map(|key| (key.to_owned(), all[key].clone())).collect();
+    if let Ok(default) = serde_json::from_value(least) {
+        let default = settings(&default);
+        changed.retain(|key, value| default.get(key) != Some(value));
+    }
+    changed
+}
+
+fn flatten(value: &Value, path: String, found: &mut BTreeMap<String, String>) {
+    let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match value {
+        Value::Object(entries) => entries.iter().for_each(|(key, value)| flatten(value, join(key), found)),
+        Value::String(text) => {
+            found.insert(path, text.clone());
+        }
+        other => {
+            found.insert(path, other.to_string());
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::train::config_file::parse_experiment;
+
+    pub fn experiment(changes: &str) -> Experiment {
+        let text = format!(
+            r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 100, {changes})"#
+        );
+        parse_experiment(&text, Path::new("x.ron")).expect("valid")
+    }
+
+    #[test]
+    fn settings_are_named_by_their_path() {
+        let experiment = experiment("seed: 7, ppo: (gamma: 0.5)");
+        let all = settings(&experiment);
+        assert_eq!((all["game"].as_str(), all["train"].as_str(), all["seed"].as_str()), ("coinrun", "hard:0..63", "7"));
+        let changed = changed_settings(&experiment);
+        let expected = [("ppo.gamma", "0.5"), ("seed", "7")];
+        assert_eq!(changed.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect::<Vec<_>>(), expected);
+    }
+}
