@@ -12,6 +12,7 @@ use bevy_playbot::{
     learner::{Dataset, DeviceKind, SkillModel},
     policy::ActionDraw,
     report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
+    runs::RunCurves,
     train::{
         Experiment, Trainer,
         checkpoint::Which,
@@ -19,7 +20,7 @@ use bevy_playbot::{
         study::StudyRun,
     },
 };
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{
     error::CliError,
@@ -30,17 +31,18 @@ use super::{
 use crate::registry;
 
 const RESULT: &str = "result.json";
+const SUCCESS: &str = "charts/success_rate";
 
 /// Where the runs of a study live, and how they are computed.
 pub struct Runner {
     /// Folder of all runs.
-    pub folder: PathBuf,
+    folder: PathBuf,
     /// Replace what is there instead of going on with it.
-    pub force: bool,
+    force: bool,
     /// Where to compute.
-    pub device: DeviceKind,
+    device: DeviceKind,
     /// Threads.
-    pub threads: usize,
+    threads: usize,
     /// Skill models that this process has learned already.
     learned: BTreeSet<String>,
     /// The recordings that were read last, and their game and path.
@@ -176,29 +178,18 @@ fn is_unborn(folder: &Path) -> bool {
 }
 
 fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, CliError> {
-    let lines = metrics(run)?;
-    let last = |tag: &str| lines.last().and_then(|line| line[tag].as_f64());
+    let curves = RunCurves::read(run)?;
     Ok(TrainingResult {
         steps,
-        steps_to_threshold: steps_to_reach(&success_curve(run)?, experiment.study.threshold),
-        success: last("charts/success_rate"),
-        episodic_return: last("charts/episodic_return"),
+        steps_to_threshold: steps_to_reach(curves.curve(SUCCESS), experiment.study.threshold),
+        success: curves.last(SUCCESS),
+        episodic_return: curves.last("charts/episodic_return"),
     })
 }
 
 /// The success rate of the last 100 training episodes, from the metrics of a run; empty if it was not trained.
 fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
-    let point = |line: &Value| Some((line["step"].as_u64()?, line["charts/success_rate"].as_f64()?));
-    Ok(metrics(run)?.iter().filter_map(point).collect())
-}
-
-fn metrics(run: &Path) -> Result<Vec<Value>, CliError> {
-    let path = run.join("metrics.jsonl");
-    if !path.exists() {
-        return Ok(Vec::new());
-    }
-    let text = fs::read_to_string(&path).map_err(|error| io_error("read", &path, &error))?;
-    text.lines().map(|line| serde_json::from_str(line).map_err(|error| io_error("read", &path, &error))).collect()
+    Ok(RunCurves::read(run)?.curve(SUCCESS).to_vec())
 }
 
 fn read_result(path: &Path) -> Result<StudyResult, CliError> {
