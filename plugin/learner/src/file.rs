@@ -4,7 +4,8 @@ use crate::nn::{Adam, ParamVisitor, Parameters, host};
 use crate::{FileError, LearnError};
 use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io::Write;
@@ -19,6 +20,13 @@ struct Stored {
     shape: Vec<usize>,
     dtype: Dtype,
     bytes: Vec<u8>,
+}
+
+/// The part of every description that says how to read the rest.
+#[derive(Deserialize)]
+struct Identity {
+    kind: String,
+    version: u32,
 }
 
 /// The contents of one file, to be written or just read.
@@ -101,9 +109,13 @@ impl TensorFile {
         Ok(Self { path: path.to_owned(), description, tensors })
     }
 
-    /// The description.
-    pub(crate) fn description<T: DeserializeOwned>(&self) -> Result<T, FileError> {
-        serde_json::from_str(&self.description).map_err(|e| self.format(format!("description in the header: {e}")))
+    /// The description, if the file calls itself a `kind` of `version`. That is looked at first, so that what a newer
+    /// version added is not taken for a fault.
+    pub(crate) fn description<T: DeserializeOwned>(&self, kind: &str, version: u32) -> Result<T, FileError> {
+        let parse = |e: serde_json::Error| self.format(format!("description in the header: {e}"));
+        let found: Identity = serde_json::from_str(&self.description).map_err(parse)?;
+        self.check_kind((kind, version), (&found.kind, found.version))?;
+        serde_json::from_str(&self.description).map_err(parse)
     }
 
     /// Takes out a single-precision tensor of the given shape.
@@ -151,13 +163,24 @@ impl TensorFile {
         Ok(())
     }
 
-    /// `Ok` if the file calls itself a `kind` of `version`.
-    pub(crate) fn check_kind(&self, (kind, version): (&str, u32), found: (&str, u32)) -> Result<(), FileError> {
-        if found == (kind, version) {
-            return Ok(());
+    fn check_kind(&self, (kind, version): (&str, u32), (found, other): (&str, u32)) -> Result<(), FileError> {
+        if found != kind {
+            return Err(self.format(format!("is a {found}, expected a {kind}")));
         }
-        let (found, other) = found;
-        Err(self.format(format!("is a {found} of version {other}, expected a {kind} of version {version}")))
+        let detail = match other.cmp(&version) {
+            Ordering::Equal => return Ok(()),
+            Ordering::Greater => {
+                format!(
+                    "was written by a newer version of playbot ({kind} format {other}, this one reads {version}): update playbot to read it"
+                )
+            }
+            Ordering::Less => {
+                format!(
+                    "was written by an older version of playbot ({kind} format {other}, this one reads {version}): write it again with this one"
+                )
+            }
+        };
+        Err(self.format(detail))
     }
 
     /// Fails if any tensor was not taken out.

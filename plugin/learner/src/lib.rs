@@ -34,6 +34,7 @@ mod error;
 mod file;
 pub mod nn;
 pub mod norm;
+mod observation;
 pub mod policy;
 pub mod ppo;
 pub mod rng;
@@ -43,12 +44,13 @@ mod space;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
+pub use observation::{ImageShape, ObsKind, Observations};
 pub use policy::{Policy, PolicyOutput, StdKind};
 pub use ppo::{EndStates, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
 pub use rng::{RngState, Streams};
 pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
 pub use skill::{
-    Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel, SkillProgress,
-    SkillTrainer,
+    ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+    SkillProgress, SkillTrainer, WindowRule,
 };
 pub use space::{Action, ActionSpace, Actions};

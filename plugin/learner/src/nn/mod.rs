@@ -6,24 +6,34 @@
 
 mod activation;
 mod adam;
+mod conv;
 mod dist;
 mod grads;
 mod gru;
+mod image_net;
+mod impala;
 mod init;
 mod linear;
 mod mlp;
+mod nature;
+mod obs_rows;
 mod params;
 mod sample;
 mod tensors;
 
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
+pub use conv::{Conv2d, max_pool, window_places};
 pub use dist::{ActionRows, Dist, HostDist};
 pub use grads::NamedGrads;
 pub use gru::{Gru, GruLayer};
+pub use image_net::{CnnKind, ImageNet};
+pub use impala::{Impala, ImpalaStage, ResidualBlock};
 pub use init::orthogonal;
 pub use linear::Linear;
 pub use mlp::Mlp;
+pub use nature::Nature;
+pub use obs_rows::ObsRows;
 pub(crate) use params::path;
 pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
 pub use sample::{argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};

@@ -73,8 +73,7 @@ impl PpoLearner {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
-        let header: Header = file.description()?;
-        file.check_kind((KIND, VERSION), (&header.kind, header.version))?;
+        let header: Header = file.description(KIND, VERSION)?;
         let skill = match (header.score, header.skill) {
             (Some(config), Some(description)) => {
                 let nets = description.nets(device).map_err(|e| file.learner(e))?;

@@ -89,11 +89,14 @@ impl PpoLearner {
 
 impl FrozenSkill {
     /// What a policy tied to this skill model reads and does.
-    pub(super) fn spec(&self) -> PolicySpec {
-        PolicySpec {
-            obs_dim: self.description.obs_dim,
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the skill model reads images.
+    pub(super) fn spec(&self) -> Result<PolicySpec, LearnError> {
+        Ok(PolicySpec {
+            obs_dim: self.description.observation.vector("PPO")?,
             latent: if self.config.condition { self.description.config.latent } else { 0 },
             action_space: self.description.action_space,
-        }
+        })
     }
 }

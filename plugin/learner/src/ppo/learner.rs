@@ -42,7 +42,7 @@ impl PpoLearner {
     /// SCORE-PPO: tied to `model`'s decoder as `score` says.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for settings that cannot work, or a skill model of images, which PPO does not read.
     pub fn with_skill(
         config: PpoConfig,
         score: ScoreConfig,
@@ -56,7 +56,7 @@ impl PpoLearner {
             decoder: model.nets.decoder.clone(),
             prior: model.nets.prior.clone(),
         };
-        Self::build(config, skill.spec(), Some(skill), seed, device)
+        Self::build(config, skill.spec()?, Some(skill), seed, device)
     }
 
     pub(super) fn build(
@@ -148,7 +148,7 @@ impl PpoLearner {
             PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
             PriorKind::Learned => {
                 let device = self.device.plain();
-                Prior::learned(&skill.prior, skill.description.obs_dim, latent, tanh, device)
+                Prior::learned(&skill.prior, skill.description.observation, latent, tanh, device)
             }
         })
     }
