@@ -165,7 +165,7 @@ impl TensorFile {
 
     fn check_kind(&self, (kind, version): (&str, u32), (found, other): (&str, u32)) -> Result<(), FileError> {
         if found != kind {
-            return Err(self.format(format!("is a {found}, expected a {kind}")));
+            return Err(self.format(format!("is of the kind `{found}`, expected `{kind}`")));
         }
         let detail = match other.cmp(&version) {
             Ordering::Equal => return Ok(()),

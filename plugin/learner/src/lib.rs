@@ -44,11 +44,12 @@ mod space;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
+pub use norm::RewardReset;
 pub use observation::{ImageShape, ObsKind, Observations};
 pub use policy::{Policy, PolicyOutput, StdKind};
 pub use ppo::{EndStates, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
 pub use rng::{RngState, Streams};
-pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
+pub use score::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{
     ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
     SkillProgress, SkillTrainer, WindowRule,

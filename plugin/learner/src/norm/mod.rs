@@ -5,5 +5,5 @@ mod reward;
 mod running;
 
 pub use obs::{ObsNormalizer, ObsStats};
-pub use reward::RewardNormalizer;
+pub use reward::{RewardNormalizer, RewardReset};
 pub use running::RunningStats;

@@ -4,7 +4,7 @@ use super::batch::DecoderRows;
 use super::{PolicySpec, PpoLearner, Rollout};
 use crate::nn::{HostDist, matrix, scalar};
 use crate::policy::{Actor, Policy, joined_rows};
-use crate::score::{AlphaKind, ScoreConfig, alphas, decoder_kl, own_samples};
+use crate::score::{ScoreConfig, decoder_kl, row_weights};
 use crate::skill::SkillDescription;
 use crate::{LearnError, PolicyOutput};
 
@@ -50,7 +50,7 @@ impl PpoLearner {
             let host = HostDist { dim: self.spec.action_space.dim(), head: output.head, log_std };
             host.rows(&rows, &device)
         };
-        let kl = decoder_kl(&dist(decoded), &dist(played), skill.config.kl_direction)?;
+        let kl = decoder_kl(&dist(decoded), &dist(played), skill.config.direction())?;
         let kl = scalar(kl.mean())?;
         if skill.config.init_from_decoder && self.updates == 0 && kl != 0.0 {
             return Err(LearnError::InitialKl { kl });
@@ -76,13 +76,8 @@ impl PpoLearner {
                 dist.log_std.get_or_insert_default().extend(stds);
             }
         }
-        let alpha = match skill.config.alpha {
-            AlphaKind::OwnSample => {
-                let mut rng = self.streams.stream("score.own_samples", self.updates);
-                alphas(AlphaKind::OwnSample, &dist, &own_samples(&dist, &mut rng))?
-            }
-            kind => alphas(kind, &dist, &rollout.actions)?,
-        };
+        let mut rng = self.streams.stream("score.own_samples", self.updates);
+        let alpha = row_weights(&skill.config, &dist, &rollout.actions, &mut rng)?;
         Ok(Some(DecoderRows { dist, alpha }))
     }
 }

@@ -86,6 +86,7 @@ impl PpoLearner {
             None => fresh(),
             Some(skill) => {
                 skill.config.validate()?;
+                skill.config.check_space(spec.action_space)?;
                 if skill.config.init_from_decoder && config.norm_obs {
                     let text =
                         "ppo norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
@@ -99,7 +100,7 @@ impl PpoLearner {
         Ok(Self {
             nets: tracked(&PpoNets { actor, critic }),
             adam: Adam::new(adam),
-            rewards: config.norm_reward.then(|| RewardNormalizer::new(config.gamma)),
+            rewards: config.norm_reward.then(|| config.reward_normalizer()),
             observations: config.norm_obs.then(|| ObsNormalizer::new(spec.obs_dim)),
             updates: 0,
             config,

@@ -6,8 +6,10 @@
 
 mod alpha;
 mod config;
+mod legacy;
 mod penalty;
 
-pub use alpha::{alphas, own_samples};
-pub use config::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
-pub use penalty::decoder_kl;
+pub use alpha::{alphas, own_samples, row_weights};
+pub use config::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
+pub use legacy::{legacy_coinrun, legacy_d4rl, marginal_densities};
+pub use penalty::{Penalty, decoder_kl, penalty};

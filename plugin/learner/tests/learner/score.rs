@@ -5,7 +5,7 @@ use crate::skill::corridor_demos;
 use crate::toy::{Driver, OBS};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    DeviceKind, LearnError, PpoConfig, PpoLearner, PriorKind, ScoreConfig, SkillModel, SkillTrainer,
+    DeviceKind, LearnError, PenaltyForm, PpoConfig, PpoLearner, PriorKind, ScoreConfig, SkillModel, SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -93,6 +93,8 @@ fn every_switch_works() {
         ScoreConfig { prior: PriorKind::StandardNormal, ..base() },
         ScoreConfig { alpha: playbot_learner::AlphaKind::PolicyAction, ..base() },
         ScoreConfig { kl_direction: playbot_learner::KlDirection::PolicyDecoder, ..base() },
+        ScoreConfig { alpha: playbot_learner::AlphaKind::BoundedDensity, ..base() },
+        ScoreConfig { penalty: PenaltyForm::LegacyCoinrun, ..base() },
     ] {
         let mut learner = learner(corridor::config(), score.clone(), &model);
         let rollout = Driver::new(4, 1).rollout(&learner, 16);
@@ -100,6 +102,9 @@ fn every_switch_works() {
         let metrics = learner.update(&rollout).expect("finite");
         assert_eq!(metrics.decoder_kl.is_some(), score.kl);
     }
+    let bad = ScoreConfig { penalty: PenaltyForm::LegacyD4rl, ..base() };
+    let error = PpoLearner::with_skill(corridor::config(), bad, &model, 1, DeviceKind::Flex);
+    assert!(error.expect_err("discrete actions").to_string().contains("LegacyD4rl is for continuous actions"));
     let bad = ScoreConfig { init_from_decoder: true, ..unconditioned };
     let error = PpoLearner::with_skill(corridor::config(), bad, &model, 1, DeviceKind::Flex);
     assert!(matches!(error, Err(LearnError::Config(_))));
