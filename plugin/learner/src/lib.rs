@@ -10,7 +10,8 @@
 //! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO: the policy sees
 //!   the skill z, starts as a copy of the decoder, and pays for leaving it where the decoder is sure ([`ScoreConfig`]).
 //!
-//! Rows are flat `f32` slices in host memory, row-major. All randomness comes from generators that the caller owns or
+//! Observations are vectors or images ([`ObsKind`]). Rows are flat `f32` slices in host memory (bytes for pixels),
+//! row-major. All randomness comes from generators that the caller owns or
 //! from the named [`rng::Streams`] of one seed: the same seed gives the same numbers, whatever the number of threads.
 //!
 //! # Example

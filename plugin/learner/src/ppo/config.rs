@@ -155,3 +155,22 @@ impl PpoConfig {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reward_normaliser_follows_its_settings() {
+        let config = PpoConfig { gamma: 0.9, ..PpoConfig::default() };
+        assert_eq!(config.reward_normalizer(), RewardNormalizer::new(0.9));
+        let legacy = PpoConfig { reward_gamma: Some(0.5), reward_reset: RewardReset::SameStep, ..config };
+        let mut normalizer = legacy.reward_normalizer();
+        normalizer.normalize(&[4.0, 2.0], &[false, true], 1).expect("they fit");
+        assert_eq!(normalizer.returns, [2.0]);
+        normalizer.normalize(&[1.0], &[false], 1).expect("they fit");
+        assert_eq!(normalizer.returns, [2.0]);
+        let bad = PpoConfig { reward_gamma: Some(1.5), ..legacy };
+        assert!(bad.validate().expect_err("above 1").to_string().contains("reward_gamma"));
+    }
+}

@@ -107,8 +107,8 @@ fn skills_keep_players_apart() {
     assert!((n / 5..4 * n / 5).contains(&ones), "{ones} of {n} skills press 1");
 }
 
-#[test]
-fn continuous_actions_are_learned_too() {
+/// Players whose two actions are half of and minus what they see.
+pub fn continuous_demos() -> Dataset {
     let streams = Streams::new(5);
     let episodes = (0..60).map(|i| {
         let mut rng = streams.stream("demo", i);
@@ -116,8 +116,12 @@ fn continuous_actions_are_learned_too() {
         let values = observations.iter().flat_map(|x| [0.5 * x, -x]).collect();
         DemoEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
     });
-    let data = Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent");
-    let mut trainer = SkillTrainer::new(config(), data, 3, DeviceKind::Flex).expect("windows fit");
+    Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent")
+}
+
+#[test]
+fn continuous_actions_are_learned_too() {
+    let mut trainer = SkillTrainer::new(config(), continuous_demos(), 3, DeviceKind::Flex).expect("windows fit");
     let history = train(&mut trainer, 30);
     assert!(history[29].nll < history[0].nll - 8.0, "{} to {}", history[0].nll, history[29].nll);
     assert_eq!(history[29].accuracy, None);
