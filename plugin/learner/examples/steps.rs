@@ -33,7 +33,7 @@ fn skill(rounds: usize) -> Result<(), LearnError> {
     let mut rng = Streams::new(1).stream("data", 0);
     let episodes = (0..20)
         .map(|_| DemoEpisode {
-            observations: normals(steps * obs_dim, &mut rng),
+            observations: normals(steps * obs_dim, &mut rng).into(),
             actions: Actions::Continuous { dim: action_dim, values: normals(steps * action_dim, &mut rng) },
         })
         .collect();

@@ -3,7 +3,7 @@
 use super::{Critics, SacBatch, SacNets, alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
 use crate::LearnError;
 use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
-use crate::score::{ScoreConfig, decoder_kl};
+use crate::score::{Penalty, ScoreConfig, penalty};
 use burn::tensor::{Gradients, Tensor};
 
 /// What a step of the critics looked like, before it was taken.
@@ -159,12 +159,11 @@ pub fn actor_step(
     };
     let mut total = loss;
     if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
-        let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
-        let penalty = (kl.clone() * decoder.alpha.clone()).mean();
+        let Penalty { kl, term } = penalty(score, &decoder.dist, &dist, decoder.alpha.clone())?;
         metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
-        metrics.kl_penalty = finite("kl_penalty", &penalty, steps)?;
+        metrics.kl_penalty = finite("kl_penalty", &term, steps)?;
         metrics.confidence = decoder.alpha_mean;
-        total = total + penalty * score.kl_coef;
+        total = total + term * score.kl_coef;
     }
     metrics.grad_norm = descend(&mut nets.actor, "actor", adam, &total.backward(), lr)?;
     Ok(metrics)
