@@ -167,20 +167,13 @@ impl TensorFile {
         if found != kind {
             return Err(self.format(format!("is of the kind `{found}`, expected `{kind}`")));
         }
-        let detail = match other.cmp(&version) {
+        let (age, advice) = match other.cmp(&version) {
             Ordering::Equal => return Ok(()),
-            Ordering::Greater => {
-                format!(
-                    "was written by a newer version of playbot ({kind} format {other}, this one reads {version}): update playbot to read it"
-                )
-            }
-            Ordering::Less => {
-                format!(
-                    "was written by an older version of playbot ({kind} format {other}, this one reads {version}): write it again with this one"
-                )
-            }
+            Ordering::Greater => ("a newer", "update playbot to read it"),
+            Ordering::Less => ("an older", "write it again with this one"),
         };
-        Err(self.format(detail))
+        let formats = format!("{kind} format {other}, this one reads {version}");
+        Err(self.format(format!("was written by {age} version of playbot ({formats}): {advice}")))
     }
 
     /// Fails if any tensor was not taken out.
