@@ -150,7 +150,7 @@ impl Policy {
     /// The joined inputs, at least two rows: matrix libraries sum a single row in another order than the rows of a
     /// matrix, and a lone agent shall act like one of many.
     fn inputs(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Tensor<2>, LearnError> {
-        let obs_dim = self.observation.vector("this call of a policy")?;
+        let obs_dim = self.observation.vector("`Policy::forward`")?;
         LearnError::check("observations", n * obs_dim, obs.len())?;
         if self.latent > 0 {
             LearnError::check("skills", n * self.latent, z.len())?;

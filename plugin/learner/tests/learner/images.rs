@@ -230,7 +230,7 @@ fn what_cannot_read_images_says_so() {
     let ppo = PpoLearner::with_skill(PpoConfig::default(), ScoreConfig::default(), &model, 1, DeviceKind::Flex);
     config_error(ppo.expect_err("images"), "PPO reads vectors, not images");
     let (z, vector) = ([0.0; 2], vec![0.0; SHAPE.numbers()]);
-    config_error(model.policy().forward(&z, &vector, 1).expect_err("a vector"), "vectors");
+    config_error(model.policy().forward(&z, &vector, 1).expect_err("a vector"), "`Policy::forward` reads vectors");
     let drawn = model.prior().sample(&vector, 1, SkillDraw::Mean, &mut |_| 0.0);
     config_error(drawn.expect_err("a vector"), "are not images");
     let short = model.policy().forward_images(&z, &[0; 143], 1).expect_err("a pixel is missing");
