@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    io::{BufRead, BufReader},
     path::Path,
     process::{Command, Output, Stdio},
     time::{Duration, Instant},
@@ -88,10 +89,12 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     assert!(saved.contains("variants: []") && saved.contains("kl: false") && saved.contains("seed: 2"), "{saved}");
 
     let args = ["study", "--experiment", "tiny.ron", "--out", "out", "--runs", "killed"];
-    let mut child = command(folder, &args).stderr(Stdio::null()).stdout(Stdio::null()).spawn().expect("starts");
+    let mut child = command(folder, &args).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("starts");
+    let mut said = BufReader::new(child.stderr.take().expect("piped")).lines().map_while(Result::ok);
+    assert!(said.any(|line| line.starts_with("full-seed2: ")), "two runs of eight are done");
     let begun = Instant::now();
     while !folder.join("killed/no-kl-seed1/checkpoints").exists() && begun.elapsed() < Duration::from_secs(60) {
-        std::thread::sleep(Duration::from_millis(2));
+        std::thread::yield_now();
     }
     child.kill().expect("killed or done");
     child.wait().expect("ended");
