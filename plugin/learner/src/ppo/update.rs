@@ -83,7 +83,7 @@ pub fn gradient_step(
     metrics.approx_kl = ratios.approx_kl;
     metrics.clip_fraction = ratios.clip_fraction;
     metrics.total_loss = read("total_loss", &total, adam)?;
-    let grads = NamedGrads::read(nets, "", &total.backward())?;
+    let grads = NamedGrads::take(nets, "", total.backward())?;
     let (norm, scale) = grads.clip_factor(config.max_grad_norm, adam.steps())?;
     metrics.grad_norm = norm;
     adam.step(nets, "", &grads, lr, scale)?;
