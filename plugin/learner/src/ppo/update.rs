@@ -82,7 +82,7 @@ pub fn gradient_step(
     metrics.approx_kl = ratios.approx_kl;
     metrics.clip_fraction = ratios.clip_fraction;
     metrics.total_loss = finite("total_loss", &total, steps)?;
-    let grads = NamedGrads::read(nets, "", &total.backward())?;
+    let grads = NamedGrads::take(nets, "", total.backward())?;
     let (norm, scale) = grads.clip_factor(config.max_grad_norm, adam.steps())?;
     metrics.grad_norm = norm;
     adam.step(nets, "", &grads, lr, scale)?;

@@ -128,7 +128,7 @@ pub fn critic_step(
     let steps = adam.steps();
     let (q1_loss, q2_loss) = (finite("q1_loss", &loss1, steps)?, finite("q2_loss", &loss2, steps)?);
     let q_values = finite("q_values", &values, steps)?;
-    let grad_norm = descend(&mut nets.critics, "", adam, &(loss1 + loss2).backward(), lr)?;
+    let grad_norm = descend(&mut nets.critics, "", adam, (loss1 + loss2).backward(), lr)?;
     Ok(CriticStep { q1_loss, q2_loss, q_values, grad_norm })
 }
 
@@ -165,7 +165,7 @@ pub fn actor_step(
         metrics.confidence = decoder.alpha_mean;
         total = total + term * score.kl_coef;
     }
-    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, &total.backward(), lr)?;
+    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, total.backward(), lr)?;
     Ok(metrics)
 }
 
@@ -189,7 +189,7 @@ pub fn alpha_step(
         alpha_loss: finite("alpha_loss", &loss, steps)?,
         log_prob: finite("log_prob", &log_prob.mean(), steps)?,
     };
-    descend(&mut nets.log_alpha, "", adam, &loss.backward(), lr)?;
+    descend(&mut nets.log_alpha, "", adam, loss.backward(), lr)?;
     Ok(metrics)
 }
 
@@ -198,10 +198,10 @@ fn descend<M: Parameters>(
     network: &mut M,
     prefix: &str,
     adam: &mut Adam,
-    gradients: &Gradients,
+    gradients: Gradients,
     lr: f64,
 ) -> Result<f64, LearnError> {
-    let grads = NamedGrads::read(network, prefix, gradients)?;
+    let grads = NamedGrads::take(network, prefix, gradients)?;
     let (norm, scale) = grads.clip_factor(f64::INFINITY, adam.steps())?;
     adam.step(network, prefix, &grads, lr, scale)?;
     Ok(norm)

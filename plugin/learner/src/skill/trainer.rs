@@ -186,7 +186,7 @@ impl SkillTrainer {
         if let Some((name, _)) = parts.iter().find(|(_, x)| !x.is_finite()) {
             return Err(LearnError::NotFinite { tensor: (*name).to_owned(), steps });
         }
-        let grads = NamedGrads::read(&mut self.nets, "", &loss.total.backward())?;
+        let grads = NamedGrads::take(&mut self.nets, "", loss.total.backward())?;
         let (norm, scale) = grads.clip_factor(self.config.max_grad_norm, steps)?;
         metrics.grad_norm = norm as f32;
         self.adam.step(&mut self.nets, "", &grads, self.config.lr, scale)?;
