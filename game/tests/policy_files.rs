@@ -68,7 +68,7 @@ fn a_policy_file_of_a_newer_version_is_refused() {
     });
     let error = read(&newer).expect_err("too new");
     assert!(matches!(error, FileError::Newer { found: 2, readable: 1, .. }), "{error}");
-    assert!(error.to_string().contains("update this program"), "{error}");
+    assert!(error.to_string().contains("update playbot"), "{error}");
 }
 
 #[test]

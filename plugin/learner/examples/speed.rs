@@ -26,7 +26,7 @@ fn main() -> Result<(), LearnError> {
     let space = ActionSpace::Discrete(CHOICES);
     let episodes = (0..DEMO_STEPS / 500)
         .map(|_| DemoEpisode {
-            observations: observations(500, &mut rng),
+            observations: observations(500, &mut rng).into(),
             actions: Actions::Discrete(choices(500, &mut rng)),
         })
         .collect();

@@ -81,8 +81,8 @@ pub enum FileError {
     },
     /// The file was written by a newer version of this program.
     #[error(
-        "{path}: is a {kind} of format {found}, but this program reads format {readable} only: it was written by a newer \
-         version; update this program"
+        "{path}: was written by a newer version of playbot ({kind} format {found}, this one reads {readable}): update \
+         playbot to read it"
     )]
     Newer {
         /// The file.

@@ -5,6 +5,7 @@ use crate::{FileError, LearnError};
 use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io::Write;
@@ -13,19 +14,19 @@ use std::path::{Path, PathBuf};
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";
 
-/// What every description begins with.
-#[derive(Deserialize)]
-struct Format {
-    kind: String,
-    version: u32,
-}
-
 /// A tensor in host memory.
 #[derive(Clone, Debug)]
 struct Stored {
     shape: Vec<usize>,
     dtype: Dtype,
     bytes: Vec<u8>,
+}
+
+/// The part of every description that says how to read the rest.
+#[derive(Deserialize)]
+struct Identity {
+    kind: String,
+    version: u32,
 }
 
 /// The contents of one file, to be written or just read.
@@ -125,9 +126,13 @@ impl TensorFile {
         Ok(Self { path: path.to_owned(), description, tensors })
     }
 
-    /// The description.
-    pub(crate) fn description<T: DeserializeOwned>(&self) -> Result<T, FileError> {
-        serde_json::from_str(&self.description).map_err(|e| self.format(format!("description in the header: {e}")))
+    /// The description, if the file calls itself a `kind` of `version`. That is looked at first, so that what a newer
+    /// version added is not taken for a fault.
+    pub(crate) fn description<T: DeserializeOwned>(&self, kind: &'static str, version: u32) -> Result<T, FileError> {
+        let parse = |e: serde_json::Error| self.format(format!("description in the header: {e}"));
+        let found: Identity = serde_json::from_str(&self.description).map_err(parse)?;
+        self.check_kind((kind, version), (&found.kind, found.version))?;
+        serde_json::from_str(&self.description).map_err(parse)
     }
 
     /// Takes out a single-precision tensor of the given shape.
@@ -188,23 +193,20 @@ impl TensorFile {
         Ok(())
     }
 
-    /// `Ok` if the file calls itself a `kind` of `version`. Comes before [`Self::description`], which a newer version may
-    /// have changed.
-    pub(crate) fn check_format(&self, kind: &'static str, version: u32) -> Result<(), FileError> {
-        let found: Format = self.description()?;
-        if found.kind != kind {
-            return Err(self.format(format!("is a {}, expected a {kind}", found.kind)));
+    fn check_kind(&self, (kind, version): (&'static str, u32), (found, other): (&str, u32)) -> Result<(), FileError> {
+        if found != kind {
+            return Err(self.format(format!("is of the kind `{found}`, expected `{kind}`")));
         }
-        if found.version > version {
-            let path = self.path.clone();
-            return Err(FileError::Newer { path, kind, found: found.version, readable: version });
+        match other.cmp(&version) {
+            Ordering::Equal => Ok(()),
+            Ordering::Greater => {
+                Err(FileError::Newer { path: self.path.clone(), kind, found: other, readable: version })
+            }
+            Ordering::Less => Err(self.format(format!(
+                "was written by an older version of playbot ({kind} format {other}, this one reads {version}): write \
+                 it again with this one"
+            ))),
         }
-        if found.version < version {
-            let detail =
-                format!("is a {kind} of the old format {}, this program reads format {version}", found.version);
-            return Err(self.format(detail));
-        }
-        Ok(())
     }
 
     /// Fails if any tensor was not taken out.

@@ -12,7 +12,8 @@
 //! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps what was
 //!   played and learns from it again and again.
 //!
-//! Rows are flat `f32` slices in host memory, row-major. All randomness comes from generators that the caller owns or
+//! Observations are vectors or images ([`ObsKind`]). Rows are flat `f32` slices in host memory (bytes for pixels),
+//! row-major. All randomness comes from generators that the caller owns or
 //! from the named [`rng::Streams`] of one seed: the same seed gives the same numbers, whatever the number of threads.
 //!
 //! # Example
@@ -36,6 +37,7 @@ mod error;
 mod file;
 pub mod nn;
 pub mod norm;
+mod observation;
 pub mod policy;
 pub mod ppo;
 pub mod rng;
@@ -46,13 +48,15 @@ mod space;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
+pub use norm::RewardReset;
+pub use observation::{ImageShape, ObsKind, Observations};
 pub use policy::{Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
 pub use ppo::{EndStates, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
 pub use rng::{RngState, Streams};
 pub use sac::{EntropyCoef, SacConfig, SacLearner, SacMetrics};
-pub use score::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
+pub use score::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{
-    Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel, SkillProgress,
-    SkillTrainer,
+    ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+    SkillProgress, SkillTrainer, WindowRule,
 };
 pub use space::{Action, ActionSpace, Actions};

@@ -45,7 +45,7 @@ pub fn load_dataset(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64))
                 observations
             };
             steps += episode.len() as u64;
-            episodes.push(LearnerEpisode { observations, actions: learner_actions(&episode) });
+            episodes.push(LearnerEpisode { observations: observations.into(), actions: learner_actions(&episode) });
             progress(steps);
         }
     }

@@ -1,12 +1,18 @@
 //! The Adam optimizer over named parameters.
 
+use super::fast_math::vectorized;
 use super::grads::NamedGrads;
 use super::params::{ParamVisitor, Parameters};
-use super::tensors::host;
 use crate::LearnError;
 use burn::tensor::{Tensor, TensorData};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Numbers that one thread updates at a time.
+const CHUNK: usize = 1 << 14;
+/// Numbers that are updated side by side.
+const LANES: usize = 16;
 
 /// Constants of Adam (Kingma and Ba 2014).
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
@@ -83,12 +89,7 @@ impl Adam {
         self.steps += 1;
         let t = self.steps.min(i32::MAX as u64) as i32;
         let mut visitor = Step {
-            lr: lr as f32,
-            decay: (1.0 - lr * self.config.weight_decay) as f32,
-            scale: scale as f32,
-            correction1: (1.0 / (1.0 - self.config.beta1.powi(t))) as f32,
-            correction2: (1.0 / (1.0 - self.config.beta2.powi(t))) as f32,
-            config: self.config,
+            formula: Formula::new(&self.config, lr, scale, t),
             steps: self.steps,
             moments: &mut self.moments,
             grads: grads.iter(),
@@ -100,12 +101,7 @@ impl Adam {
 }
 
 struct Step<'a, I> {
-    lr: f32,
-    decay: f32,
-    scale: f32,
-    correction1: f32,
-    correction2: f32,
-    config: AdamConfig,
+    formula: Formula,
     steps: u64,
     moments: &'a mut BTreeMap<String, Moments>,
     grads: I,
@@ -120,49 +116,97 @@ impl<'a, I: Iterator<Item = (&'a str, &'a [f32])>> ParamVisitor for Step<'a, I> 
         // `grads` were read from the same network, so that both come in the same order.
         let Some((grad_name, grad)) = self.grads.next() else { return };
         debug_assert_eq!(name, grad_name);
-        match self.update(name, tensor, grad) {
-            Ok(updated) => *tensor = updated,
-            Err(error) => self.error = Some(error),
+        // Taken out of the network, so that its numbers are changed in place if nobody shares them.
+        let device = tensor.device().inner();
+        let plain = std::mem::replace(tensor, Tensor::empty([0; D], &device)).inner();
+        match plain.try_into_data_as::<f32>() {
+            Ok(mut weights) => {
+                self.error = self.update(name, &mut weights, grad).err();
+                *tensor = Tensor::from_data(weights, &device).autodiff().require_grad();
+            }
+            Err(error) => self.error = Some(LearnError::Device(error.to_string())),
         }
     }
 }
 
 impl<I> Step<'_, I> {
-    fn update<const D: usize>(
-        &mut self,
-        name: &str,
-        tensor: &Tensor<D>,
-        grad: &[f32],
-    ) -> Result<Tensor<D>, LearnError> {
-        let plain = tensor.clone().inner();
-        let device = plain.device();
-        let shape = plain.dims();
-        let mut weights = host(plain)?;
+    fn update(&mut self, name: &str, weights: &mut TensorData, grad: &[f32]) -> Result<(), LearnError> {
+        let shape = weights.shape().to_vec();
+        let weights = weights.as_mut_slice::<f32>().map_err(|e| LearnError::Device(e.to_string()))?;
         LearnError::check(name, weights.len(), grad.len())?;
         if !self.moments.contains_key(name) {
             let zeros = vec![0.0; weights.len()];
-            let fresh = Moments { shape: shape.to_vec(), m: zeros.clone(), v: zeros };
+            let fresh = Moments { shape, m: zeros.clone(), v: zeros };
             self.moments.insert(name.to_owned(), fresh);
         }
         let moments = self.moments.get_mut(name).expect("inserted above if it was missing");
-        let (b1, b2) = (self.config.beta1 as f32, self.config.beta2 as f32);
-        let (c1, c2) = ((1.0 - self.config.beta1) as f32, (1.0 - self.config.beta2) as f32);
-        let (scale, decay, eps) = (self.scale, self.decay, self.config.eps as f32);
-        let (step, correction2) = (self.lr * self.correction1, self.correction2);
-        let rows = weights.iter_mut().zip(grad).zip(moments.m.iter_mut().zip(&mut moments.v));
-        // 0 for finite numbers, NaN otherwise.
-        let mut witness = 0.0f32;
-        for ((w, &g), (m, v)) in rows {
-            let g = g * scale;
-            *m = b1 * *m + c1 * g;
-            *v = b2 * *v + c2 * g * g;
-            *w = *w * decay - step * *m / ((*v * correction2).sqrt() + eps);
-            witness += *w * 0.0;
-        }
-        if witness != 0.0 {
+        let formula = &self.formula;
+        let rows = weights.par_chunks_mut(CHUNK).zip(grad.par_chunks(CHUNK));
+        let moments = moments.m.par_chunks_mut(CHUNK).zip(moments.v.par_chunks_mut(CHUNK));
+        let finite = rows.zip(moments).map(|((w, g), (m, v))| formula.apply(w, g, m, v));
+        if !finite.reduce(|| true, |a, b| a && b) {
             return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: self.steps });
         }
-        let updated = Tensor::<D>::from_data(TensorData::new(weights, shape), &device);
-        Ok(updated.autodiff().require_grad())
+        Ok(())
+    }
+}
+
+/// The constants of one step.
+struct Formula {
+    beta: (f32, f32),
+    /// 1 - β of each moment.
+    gain: (f32, f32),
+    eps: f32,
+    /// Of the gradient.
+    scale: f32,
+    /// What is left of a weight after its decay.
+    decay: f32,
+    /// The learning rate with the first moment's bias correction.
+    rate: f32,
+    /// The second moment's bias correction.
+    correction: f32,
+}
+
+impl Formula {
+    fn new(config: &AdamConfig, lr: f64, scale: f64, t: i32) -> Self {
+        let correction1 = (1.0 / (1.0 - config.beta1.powi(t))) as f32;
+        Self {
+            beta: (config.beta1 as f32, config.beta2 as f32),
+            gain: ((1.0 - config.beta1) as f32, (1.0 - config.beta2) as f32),
+            eps: config.eps as f32,
+            scale: scale as f32,
+            decay: (1.0 - lr * config.weight_decay) as f32,
+            rate: lr as f32 * correction1,
+            correction: (1.0 / (1.0 - config.beta2.powi(t))) as f32,
+        }
+    }
+
+    /// Updates weights and moments, and says whether all weights are finite.
+    fn apply(&self, weights: &mut [f32], grad: &[f32], m: &mut [f32], v: &mut [f32]) -> bool {
+        let Self { beta, gain, eps, scale, decay, rate, correction } = *self;
+        // 0 for finite numbers, NaN otherwise.
+        let mut witness = [0.0f32; LANES];
+        let mut update = |lane: usize, w: &mut f32, g: f32, m: &mut f32, v: &mut f32| {
+            let g = g * scale;
+            *m = beta.0 * *m + gain.0 * g;
+            *v = beta.1 * *v + gain.1 * g * g;
+            *w = *w * decay - rate * *m / ((*v * correction).sqrt() + eps);
+            witness[lane] += *w * 0.0;
+        };
+        vectorized(|| {
+            let (weights, w_rest) = weights.as_chunks_mut::<LANES>();
+            let (grad, g_rest) = grad.as_chunks::<LANES>();
+            let (m, m_rest) = m.as_chunks_mut::<LANES>();
+            let (v, v_rest) = v.as_chunks_mut::<LANES>();
+            for ((w, g), (m, v)) in weights.iter_mut().zip(grad).zip(m.iter_mut().zip(v)) {
+                for lane in 0..LANES {
+                    update(lane, &mut w[lane], g[lane], &mut m[lane], &mut v[lane]);
+                }
+            }
+            for ((w, &g), (m, v)) in w_rest.iter_mut().zip(g_rest).zip(m_rest.iter_mut().zip(v_rest)) {
+                update(0, w, g, m, v);
+            }
+        });
+        witness.iter().sum::<f32>() == 0.0
     }
 }

@@ -1,14 +1,14 @@
 //! Gradients by parameter name.
 
 use super::params::{ParamVisitor, Parameters};
-use super::tensors::host;
 use crate::LearnError;
-use burn::tensor::{Gradients, Tensor};
+use burn::tensor::{Gradients, Tensor, TensorData};
+use rayon::prelude::*;
 
 /// The gradients of a network's parameters on the host, in the order of [`Parameters::visit`].
 #[derive(Clone, Debug, Default)]
 pub struct NamedGrads {
-    entries: Vec<(String, Vec<f32>)>,
+    entries: Vec<(String, TensorData)>,
 }
 
 impl NamedGrads {
@@ -17,17 +17,24 @@ impl NamedGrads {
     /// # Errors
     /// [`LearnError::Device`] if a tensor cannot be read.
     pub fn read<M: Parameters>(network: &mut M, prefix: &str, grads: &Gradients) -> Result<Self, LearnError> {
-        let mut reader = Reader { grads, entries: Vec::new(), error: None };
+        let mut reader = Reader { source: Source::Shared(grads), entries: Vec::new(), error: None };
         network.visit(prefix, &mut reader);
-        match reader.error {
-            Some(error) => Err(error),
-            None => Ok(Self { entries: reader.entries }),
-        }
+        reader.finish()
+    }
+
+    /// As [`Self::read`], but takes the gradients away from `grads`, which saves a copy of each.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if a tensor cannot be read.
+    pub fn take<M: Parameters>(network: &mut M, prefix: &str, mut grads: Gradients) -> Result<Self, LearnError> {
+        let mut reader = Reader { source: Source::Owned(&mut grads), entries: Vec::new(), error: None };
+        network.visit(prefix, &mut reader);
+        reader.finish()
     }
 
     /// The gradients, by name.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &[f32])> {
-        self.entries.iter().map(|(name, values)| (name.as_str(), values.as_slice()))
+        self.entries.iter().map(|(name, values)| (name.as_str(), numbers(values)))
     }
 
     /// The gradient of the parameter called `name`.
@@ -37,7 +44,9 @@ impl NamedGrads {
 
     /// The Euclidean norm over all gradients together.
     pub fn norm(&self) -> f64 {
-        self.entries.iter().map(|(_, values)| square_sum(values)).sum::<f64>().sqrt()
+        // Each sum is made by one thread, and the sums are added in order.
+        let sums: Vec<f64> = self.entries.par_iter().map(|(_, values)| square_sum(numbers(values))).collect();
+        sums.iter().sum::<f64>().sqrt()
     }
 
     /// The factor that brings a total norm down to `max_norm`: min(1, max_norm / (norm + 1e-6)).
@@ -49,7 +58,7 @@ impl NamedGrads {
         if norm.is_finite() {
             return Ok((norm, (max_norm / (norm + 1e-6)).min(1.0)));
         }
-        let bad = self.entries.iter().find(|(_, values)| !square_sum(values).is_finite());
+        let bad = self.entries.iter().find(|(_, values)| !square_sum(numbers(values)).is_finite());
         let tensor = bad.map_or("gradients", |(name, _)| name.as_str());
         Err(LearnError::NotFinite { tensor: format!("gradient of {tensor}"), steps })
     }
@@ -68,17 +77,36 @@ fn square_sum(values: &[f32]) -> f64 {
     lanes.iter().sum::<f64>() + rest
 }
 
+fn numbers(values: &TensorData) -> &[f32] {
+    values.as_slice().expect("gradients are checked to be f32 when they are read")
+}
+
+enum Source<'a> {
+    Shared(&'a Gradients),
+    Owned(&'a mut Gradients),
+}
+
 struct Reader<'a> {
-    grads: &'a Gradients,
-    entries: Vec<(String, Vec<f32>)>,
+    source: Source<'a>,
+    entries: Vec<(String, TensorData)>,
     error: Option<LearnError>,
+}
+
+impl Reader<'_> {
+    fn finish(self) -> Result<NamedGrads, LearnError> {
+        self.error.map_or(Ok(NamedGrads { entries: self.entries }), Err)
+    }
 }
 
 impl ParamVisitor for Reader<'_> {
     fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
-        let values = match tensor.grad(self.grads) {
-            Some(grad) => host(grad),
-            None => Ok(vec![0.0; tensor.dims().iter().product()]),
+        let grad = match &mut self.source {
+            Source::Shared(grads) => tensor.grad(grads),
+            Source::Owned(grads) => tensor.grad_remove(grads),
+        };
+        let values = match grad {
+            Some(grad) => grad.try_into_data_as::<f32>().map_err(|e| LearnError::Device(e.to_string())),
+            None => Ok(TensorData::zeros::<f32, _>(tensor.dims())),
         };
         match values {
             Ok(values) => self.entries.push((name.to_owned(), values)),

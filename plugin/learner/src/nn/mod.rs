@@ -6,15 +6,20 @@
 
 mod activation;
 mod adam;
+mod conv;
 mod dist;
 mod fast_math;
 mod grads;
 mod gru;
 mod gru_kernel;
+mod image_net;
+mod impala;
 mod init;
 mod kernels;
 mod linear;
 mod mlp;
+mod nature;
+mod obs_rows;
 mod params;
 mod sample;
 mod squash;
@@ -22,12 +27,17 @@ mod tensors;
 
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
+pub use conv::{Conv2d, max_pool, window_places};
 pub use dist::{ActionRows, Dist, HostDist};
 pub use grads::NamedGrads;
 pub use gru::{Gru, GruLayer};
+pub use image_net::{CnnKind, ImageNet};
+pub use impala::{Impala, ImpalaStage, ResidualBlock};
 pub use init::orthogonal;
 pub use linear::Linear;
 pub use mlp::Mlp;
+pub use nature::Nature;
+pub use obs_rows::ObsRows;
 pub(crate) use params::path;
 pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
 pub use sample::{

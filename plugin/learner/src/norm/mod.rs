@@ -7,5 +7,5 @@ mod running;
 
 pub(crate) use checkpoint::{put_normalizers, take_normalizers};
 pub use obs::{ObsNormalizer, ObsStats};
-pub use reward::RewardNormalizer;
+pub use reward::{RewardNormalizer, RewardReset};
 pub use running::RunningStats;

@@ -2,20 +2,34 @@
 
 use super::RunningStats;
 use crate::LearnError;
+use serde::{Deserialize, Serialize};
 
 /// Added to the variance.
 const EPS: f64 = 1e-8;
 /// Scaled rewards are clipped to ± this.
 const CLIP: f64 = 10.0;
 
+/// When the end of an episode resets its discounted return.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum RewardReset {
+    /// After the last step: G = γ G + r, then G = 0 where the episode ended.
+    #[default]
+    AfterStep,
+    /// In the last step, whose own reward then counts for the next episode: G = γ G (1 - done) + r (as some wrappers
+    /// do; for comparison only).
+    SameStep,
+}
+
 /// Divides rewards by the running standard deviation of the discounted return. No mean is subtracted.
 ///
 /// Per step: G = γ G + r for every environment, the running variance takes in all G as one batch, the reward becomes
-/// clip(r/√(var + 1e-8), ±10), and G of the environments whose episode ended is set to 0.
+/// clip(r/√(var + 1e-8), ±10), and G of the environments whose episode ended is reset ([`RewardReset`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RewardNormalizer {
     /// γ.
     pub gamma: f64,
+    /// When the end of an episode resets G.
+    pub reset: RewardReset,
     /// The running variance, one dimension.
     pub stats: RunningStats,
     /// The discounted return of each environment; empty before the first batch.
@@ -25,7 +39,7 @@ pub struct RewardNormalizer {
 impl RewardNormalizer {
     /// Nothing seen yet.
     pub fn new(gamma: f64) -> Self {
-        Self { gamma, stats: RunningStats::new(1), returns: Vec::new() }
+        Self { gamma, reset: RewardReset::AfterStep, stats: RunningStats::new(1), returns: Vec::new() }
     }
 
     /// Takes in and scales rewards `[T, envs]`, row-major; `done` marks the steps that ended an episode in any way.
@@ -67,13 +81,14 @@ impl RewardNormalizer {
         LearnError::check("environments of the reward normaliser", self.returns.len(), envs)?;
         LearnError::check("episode ends", rewards.len(), done.len())?;
         for (rewards, done) in rewards.chunks_exact(envs).zip(done.chunks_exact(envs)) {
-            for (g, &r) in self.returns.iter_mut().zip(rewards) {
-                *g = self.gamma * *g + f64::from(r);
+            for ((g, &r), &done) in self.returns.iter_mut().zip(rewards).zip(done) {
+                let before = if done && self.reset == RewardReset::SameStep { 0.0 } else { *g };
+                *g = self.gamma * before + f64::from(r);
             }
             self.stats.update(self.returns.iter().copied(), envs);
             seen(self, rewards);
             for (g, &done) in self.returns.iter_mut().zip(done) {
-                if done {
+                if done && self.reset == RewardReset::AfterStep {
                     *g = 0.0;
                 }
             }

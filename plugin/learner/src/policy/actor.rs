@@ -1,7 +1,9 @@
 //! The network that gives a distribution over actions.
 
-use crate::ActionSpace;
-use crate::nn::{Activation, Dist, Linear, Mlp, ParamVisitor, Parameters, bounded_log_std, path, vector};
+use crate::nn::{
+    Activation, Dist, ImageNet, Linear, Mlp, ObsRows, ParamVisitor, Parameters, bounded_log_std, path, vector,
+};
+use crate::{ActionSpace, LearnError};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -40,7 +42,7 @@ pub enum LogStd {
 /// Sizes of an actor or critic.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct NetShape {
-    /// Width of the observation.
+    /// Width of the observation, or the number of features that an image becomes.
     pub obs_dim: usize,
     /// Width of the skill z that goes before the observation; 0 for none.
     pub latent: usize,
@@ -50,12 +52,15 @@ pub struct NetShape {
     pub activation: Activation,
 }
 
-/// π(a | s, z): input `[z, s]`, hidden layers, and a head of logits or means.
+/// π(a | s, z): input `[z, s]`, hidden layers, and a head of logits or means. Images come in as the features that a
+/// trunk of convolutions makes of them.
 ///
 /// The skill decoder and the policy are this same type, so that a policy can start as an exact copy of the decoder.
 /// The prior over skills is one too: its action is the latent.
 #[derive(Clone, Debug)]
 pub struct Actor {
+    /// The trunk that reads images, `cnn` in names; `None` for vectors.
+    pub cnn: Option<ImageNet>,
     /// Hidden layers and the head.
     pub net: Mlp,
     /// ln σ, for continuous actions.
@@ -81,7 +86,7 @@ impl Actor {
                 LogStd::State(Linear::new(width, n, 0.01, rng, device))
             }
         };
-        Self { net, log_std }
+        Self { cnn: None, net, log_std }
     }
 
     /// Logits, or a squashed Gaussian with ln σ within `log_std_range`. Orthogonal weights as in [`Self::new`].
@@ -99,18 +104,36 @@ impl Actor {
         actor
     }
 
+    /// The same actor with a trunk that reads images; its features must be [`NetShape::obs_dim`] of the actor.
+    pub fn with_cnn(self, cnn: ImageNet) -> Self {
+        Self { cnn: Some(cnn), ..self }
+    }
+
     /// Whether its actions are the tanh of the normal numbers whose distribution [`Self::forward`] gives.
     pub fn is_squashed(&self) -> bool {
         matches!(self.log_std, LogStd::Squashed { .. })
     }
 
-    /// The distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`.
+    /// What the layers behind the trunk read of observations, `[n, obs_dim]`: vectors as they are, images as features.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are of the other kind than the network.
+    pub fn observe(&self, states: &ObsRows) -> Result<Tensor<2>, LearnError> {
+        match (&self.cnn, states) {
+            (None, ObsRows::Vector(x)) => Ok(x.clone()),
+            (Some(cnn), ObsRows::Image(x)) => Ok(cnn.forward(x.clone())),
+            (None, ObsRows::Image(_)) => Err(LearnError::Config("a network for vectors got images".to_owned())),
+            (Some(_), ObsRows::Vector(_)) => Err(LearnError::Config("a network for images got vectors".to_owned())),
+        }
+    }
+
+    /// The distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is what [`Self::observe`] gives.
     pub fn forward(&self, x: Tensor<2>) -> Dist {
         self.head(self.net.features(x))
     }
 
     /// The distributions for skills `z` `[B, latent]` that are each held for `steps` observations: row `t * B + b` of
-    /// `states` `[steps * B, obs_dim]` goes with row `b` of `z`.
+    /// `states` `[steps * B, obs_dim]`, which [`Self::observe`] gives, goes with row `b` of `z`.
     pub fn forward_held(&self, z: Tensor<2>, states: Tensor<2>, steps: usize) -> Dist {
         self.head(self.net.features_held(z, states, steps))
     }
@@ -133,6 +156,9 @@ impl Actor {
 
 impl Parameters for Actor {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        if let Some(cnn) = &mut self.cnn {
+            cnn.visit(&path(prefix, "cnn"), visitor);
+        }
         self.net.visit(prefix, visitor);
         match &mut self.log_std {
             LogStd::None => {}

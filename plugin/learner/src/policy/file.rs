@@ -118,14 +118,16 @@ impl PolicyFile {
     /// [`FileError::Learner`] if the rows do not fit the policy, [`FileError::Io`] if the file cannot be written.
     pub fn save(&self, path: &Path, obs: &[f32], z: &[f32], n: usize) -> Result<(), FileError> {
         let policy = &self.policy;
+        let vector = policy.observation().vector("a policy file");
+        let obs_dim = vector.map_err(|source| FileError::Learner { path: path.to_owned(), source })?;
         let header = Header {
             kind: KIND.to_owned(),
             version: VERSION,
             card: self.card.clone(),
             policy: PolicyShape {
                 action_space: policy.space,
-                actor: ActorShape::of(&policy.actor, policy.obs_dim),
-                critic: policy.critic.as_ref().map(|critic| net_shape(&critic.net, policy.obs_dim)),
+                actor: ActorShape::of(&policy.actor, obs_dim),
+                critic: policy.critic.as_ref().map(|critic| net_shape(&critic.net, obs_dim)),
                 normalised: policy.stats.is_some(),
             },
             skills: self.skills.as_ref().map(SkillsShape::of),
@@ -146,7 +148,7 @@ impl PolicyFile {
                 file.put_network("prior", net)?;
             }
         }
-        file.put("examples.obs", &[n, policy.obs_dim], obs);
+        file.put("examples.obs", &[n, obs_dim], obs);
         file.put("examples.z", &[n, policy.latent], if policy.latent == 0 { &[] } else { z });
         let examples = self.examples(obs, z, n).map_err(|source| file.learner(source))?;
         for (name, width, values) in examples {
@@ -173,8 +175,7 @@ impl PolicyFile {
     }
 
     fn take(mut file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
-        file.check_format(KIND, VERSION)?;
-        let header: Header = file.description()?;
+        let header: Header = file.description(KIND, VERSION)?;
         let shape = header.policy;
         let plain = device.plain();
         let mut actor = shape.actor.build(shape.action_space, device);
@@ -205,7 +206,7 @@ impl PolicyFile {
 
     /// Compares what the policy says of the stored examples with what is stored.
     fn prove(&self, file: &mut TensorFile, n: usize) -> Result<(), FileError> {
-        let obs = file.take("examples.obs", &[n, self.policy.obs_dim])?;
+        let obs = file.take("examples.obs", &[n, self.policy.obs_dim()])?;
         let z = file.take("examples.z", &[n, self.policy.latent])?;
         let examples = self.examples(&obs, &z, n).map_err(|source| file.learner(source))?;
         for (what, width, found) in examples {
@@ -244,8 +245,8 @@ impl SkillsShape {
         Self {
             latent: skills.prior.latent(),
             tanh: skills.prior.tanh,
-            prior: skills.prior.net.as_ref().map(|(net, obs_dim, _)| ActorShape::of(net, *obs_dim)),
-            decoder: ActorShape::of(&skills.decoder.actor, skills.decoder.obs_dim),
+            prior: skills.prior.net.as_ref().map(|(net, obs, _)| ActorShape::of(net, obs.numbers())),
+            decoder: ActorShape::of(&skills.decoder.actor, skills.decoder.obs_dim()),
             horizon: skills.horizon,
             draw: skills.draw,
         }

@@ -1,9 +1,9 @@
 //! A frozen policy that plays.
 
 use super::{Actor, Critic, PolicyOutput, joined_rows};
-use crate::nn::{frozen, host, matrix};
+use crate::nn::{ObsRows, frozen, host, matrix};
 use crate::norm::ObsStats;
-use crate::{ActionSpace, LearnError};
+use crate::{ActionSpace, LearnError, ObsKind, Observations};
 use burn::tensor::{Device, Tensor};
 use std::sync::Arc;
 
@@ -17,19 +17,20 @@ pub struct Policy {
     pub(super) critic: Option<Critic>,
     pub(super) stats: Option<Arc<ObsStats>>,
     pub(super) space: ActionSpace,
-    pub(super) obs_dim: usize,
+    observation: ObsKind,
     pub(super) latent: usize,
     device: Device,
 }
 
 impl Policy {
-    /// A snapshot of `actor` and `critic`, which must read `latent + obs_dim` numbers.
+    /// A snapshot of `actor` and `critic`, which must read a skill of the given width and the given observations. There
+    /// are no critics of images.
     pub(crate) fn new(
         actor: &Actor,
         critic: Option<&Critic>,
         stats: Option<ObsStats>,
         space: ActionSpace,
-        (obs_dim, latent): (usize, usize),
+        (observation, latent): (impl Into<ObsKind>, usize),
         device: Device,
     ) -> Self {
         Self {
@@ -37,7 +38,7 @@ impl Policy {
             critic: critic.map(frozen),
             stats: stats.map(Arc::new),
             space,
-            obs_dim,
+            observation: observation.into(),
             latent,
             device,
         }
@@ -53,23 +54,59 @@ impl Policy {
         self.latent
     }
 
-    /// Width of the observation it reads.
-    pub fn obs_dim(&self) -> usize {
-        self.obs_dim
+    /// What it observes.
+    pub fn observation(&self) -> ObsKind {
+        self.observation
     }
 
-    /// Distributions and values for `n` observations.
+    /// Numbers in the observation it reads.
+    pub fn obs_dim(&self) -> usize {
+        self.observation.numbers()
+    }
+
+    /// Distributions and values for `n` vectors.
     ///
     /// `z` is `n * latent` (ignored if [`Self::latent`] is 0), `obs` is `n * obs_dim`.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::NotFinite`] if an output is NaN or infinite.
+    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::NotFinite`] if an output is NaN or infinite;
+    /// [`LearnError::Config`] if it observes images.
     pub fn forward(&self, z: &[f32], obs: &[f32], n: usize) -> Result<PolicyOutput, LearnError> {
         if n == 0 {
-            let (head, log_std, values) = Default::default();
-            return Ok(self.output(head, log_std, values));
+            return Ok(self.nothing());
         }
-        let x = self.inputs(z, obs, n)?;
+        self.judge(self.inputs(z, obs, n)?, n)
+    }
+
+    /// [`Self::forward`] for `n` images, whose `pixels` are `n * obs_dim`, in the order channel, row, column.
+    ///
+    /// # Errors
+    /// As [`Self::forward`]; [`LearnError::Config`] if it observes vectors.
+    pub fn forward_images(&self, z: &[f32], pixels: &[u8], n: usize) -> Result<PolicyOutput, LearnError> {
+        if n == 0 {
+            return Ok(self.nothing());
+        }
+        let observations = Observations::Image(pixels.to_vec());
+        observations.check("images", &self.observation, n)?;
+        let images = ObsRows::new(observations, &self.observation, &self.device);
+        let mut features = self.actor.observe(&images)?;
+        if self.latent > 0 {
+            LearnError::check("skills", n * self.latent, z.len())?;
+            features = Tensor::cat(vec![matrix(z.to_vec(), n, self.latent, &self.device), features], 1);
+        }
+        if n == 1 {
+            features = features.repeat_dim(0, 2);
+        }
+        self.judge(features, n)
+    }
+
+    fn nothing(&self) -> PolicyOutput {
+        let (head, log_std, values) = Default::default();
+        self.output(head, log_std, values)
+    }
+
+    /// The first `n` rows of what actor and critic say about joined inputs.
+    fn judge(&self, x: Tensor<2>, n: usize) -> Result<PolicyOutput, LearnError> {
         let dist = self.actor.forward(x.clone()).to_host()?;
         let dim = self.space.dim();
         let mut head = dist.head;
@@ -113,13 +150,14 @@ impl Policy {
     /// The joined inputs, at least two rows: matrix libraries sum a single row in another order than the rows of a
     /// matrix, and a lone agent shall act like one of many.
     fn inputs(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Tensor<2>, LearnError> {
-        LearnError::check("observations", n * self.obs_dim, obs.len())?;
+        let obs_dim = self.observation.vector("`Policy::forward`")?;
+        LearnError::check("observations", n * obs_dim, obs.len())?;
         if self.latent > 0 {
             LearnError::check("skills", n * self.latent, z.len())?;
         }
         let stats = self.stats.as_deref();
-        let width = self.latent + self.obs_dim;
-        let mut rows = joined_rows(z, self.latent, obs, self.obs_dim, stats, 0..n);
+        let width = self.latent + obs_dim;
+        let mut rows = joined_rows(z, self.latent, obs, obs_dim, stats, 0..n);
         if n == 1 {
             rows.extend_from_within(..);
         }

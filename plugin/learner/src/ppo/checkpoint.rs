@@ -65,8 +65,7 @@ impl PpoLearner {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
-        file.check_format(KIND, VERSION)?;
-        let header: Header = file.description()?;
+        let header: Header = file.description(KIND, VERSION)?;
         let skill = FrozenSkill::described(header.score, header.skill, device).map_err(|e| file.learner(e))?;
         let mut learner =
             Self::build(header.config, header.spec, skill, header.seed, device).map_err(|e| file.learner(e))?;

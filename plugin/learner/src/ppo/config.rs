@@ -1,6 +1,7 @@
 //! Settings of PPO.
 
 use crate::nn::Activation;
+use crate::norm::{RewardNormalizer, RewardReset};
 use crate::{ActionSpace, LearnError};
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +62,10 @@ pub struct PpoConfig {
     pub time_limit: TimeLimit,
     /// Whether rewards are divided by the running deviation of the discounted return.
     pub norm_reward: bool,
+    /// Discount of that return; γ if not given.
+    pub reward_gamma: Option<f64>,
+    /// When the end of an episode resets that return.
+    pub reward_reset: RewardReset,
     /// Whether actor and critic see normalised observations. Not together with a copied decoder, which reads raw ones.
     pub norm_obs: bool,
     /// Hidden layers of actor and critic. A copied decoder brings its own.
@@ -90,6 +95,8 @@ impl Default for PpoConfig {
             norm_adv: true,
             time_limit: TimeLimit::Bootstrap,
             norm_reward: true,
+            reward_gamma: None,
+            reward_reset: RewardReset::AfterStep,
             norm_obs: false,
             hidden: vec![200, 200],
             activation: Activation::Relu,
@@ -119,7 +126,8 @@ impl PpoConfig {
         if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
             return bad(format!("ppo {name} must be positive, not {x}"));
         }
-        let shares = [("gamma", self.gamma), ("lambda", self.lambda)];
+        let reward_gamma = self.reward_gamma.unwrap_or(self.gamma);
+        let shares = [("gamma", self.gamma), ("lambda", self.lambda), ("reward_gamma", reward_gamma)];
         if let Some((name, x)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
             return bad(format!("ppo {name} must lie in 0..1, not {x}"));
         }
@@ -133,11 +141,36 @@ impl PpoConfig {
         Ok(())
     }
 
+    /// The normaliser of rewards that these settings describe.
+    pub(super) fn reward_normalizer(&self) -> RewardNormalizer {
+        let gamma = self.reward_gamma.unwrap_or(self.gamma);
+        RewardNormalizer { reset: self.reward_reset, ..RewardNormalizer::new(gamma) }
+    }
+
     /// The learning rate of update number `update`, from 0.
     pub fn lr_at(&self, update: u64) -> f64 {
         match self.total_updates.filter(|_| self.anneal_lr) {
             Some(total) => self.lr * (1.0 - update as f64 / total as f64).max(0.0),
             None => self.lr,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reward_normaliser_follows_its_settings() {
+        let config = PpoConfig { gamma: 0.9, ..PpoConfig::default() };
+        assert_eq!(config.reward_normalizer(), RewardNormalizer::new(0.9));
+        let legacy = PpoConfig { reward_gamma: Some(0.5), reward_reset: RewardReset::SameStep, ..config };
+        let mut normalizer = legacy.reward_normalizer();
+        normalizer.normalize(&[4.0, 2.0], &[false, true], 1).expect("they fit");
+        assert_eq!(normalizer.returns, [2.0]);
+        normalizer.normalize(&[1.0], &[false], 1).expect("they fit");
+        assert_eq!(normalizer.returns, [2.0]);
+        let bad = PpoConfig { reward_gamma: Some(1.5), ..legacy };
+        assert!(bad.validate().expect_err("above 1").to_string().contains("reward_gamma"));
     }
 }

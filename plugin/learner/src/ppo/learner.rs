@@ -41,7 +41,7 @@ impl PpoLearner {
     /// SCORE-PPO: tied to `model`'s decoder as `score` says.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for settings that cannot work, or a skill model of images, which PPO does not read.
     pub fn with_skill(
         config: PpoConfig,
         score: ScoreConfig,
@@ -50,7 +50,7 @@ impl PpoLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         let skill = FrozenSkill::new(score, model);
-        Self::build(config, skill.spec(), Some(skill), seed, device)
+        Self::build(config, skill.spec()?, Some(skill), seed, device)
     }
 
     pub(super) fn build(
@@ -85,7 +85,7 @@ impl PpoLearner {
         Ok(Self {
             nets: tracked(&PpoNets { actor, critic }),
             adam: Adam::new(adam),
-            rewards: config.norm_reward.then(|| RewardNormalizer::new(config.gamma)),
+            rewards: config.norm_reward.then(|| config.reward_normalizer()),
             observations: config.norm_obs.then(|| ObsNormalizer::new(spec.obs_dim)),
             updates: 0,
             config,

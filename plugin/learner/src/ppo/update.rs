@@ -4,7 +4,7 @@ use super::batch::Minibatch;
 use super::{PpoConfig, PpoNets, ppo_loss, ratio_stats};
 use crate::LearnError;
 use crate::nn::{Adam, NamedGrads, finite, host};
-use crate::score::{ScoreConfig, decoder_kl};
+use crate::score::{Penalty, ScoreConfig, penalty};
 
 /// What one gradient step looked like, before it was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,7 +23,7 @@ pub struct StepMetrics {
     pub clip_fraction: f64,
     /// Mean divergence between decoder and policy, not weighted.
     pub decoder_kl: f64,
-    /// mean(α · divergence), without kl_coef.
+    /// mean(α · divergence), or the legacy form of it, without kl_coef.
     pub kl_penalty: f64,
     /// Mean of α.
     pub alpha_mean: f64,
@@ -48,7 +48,7 @@ impl StepMetrics {
 
 /// Loss, gradient, clipping by the global norm, one step of Adam on tracked `nets`.
 ///
-/// With a decoder in `batch` and settings of SCORE, kl_coef · mean(α · divergence) is added to the loss.
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss.
 ///
 /// # Errors
 /// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite.
@@ -72,18 +72,17 @@ pub fn gradient_step(
     };
     let mut total = loss.policy_loss - loss.entropy * config.ent_coef + loss.value_loss * config.vf_coef;
     if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
-        let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
-        let penalty = (kl.clone() * decoder.alpha.clone()).mean();
+        let Penalty { kl, term } = penalty(score, &decoder.dist, &dist, decoder.alpha.clone())?;
         metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
-        metrics.kl_penalty = finite("kl_penalty", &penalty, steps)?;
+        metrics.kl_penalty = finite("kl_penalty", &term, steps)?;
         metrics.alpha_mean = decoder.alpha_mean;
-        total = total + penalty * score.kl_coef;
+        total = total + term * score.kl_coef;
     }
     let ratios = ratio_stats(&host(loss.log_ratio.inner())?, config.clip);
     metrics.approx_kl = ratios.approx_kl;
     metrics.clip_fraction = ratios.clip_fraction;
     metrics.total_loss = finite("total_loss", &total, steps)?;
-    let grads = NamedGrads::read(nets, "", &total.backward())?;
+    let grads = NamedGrads::take(nets, "", total.backward())?;
     let (norm, scale) = grads.clip_factor(config.max_grad_norm, adam.steps())?;
     metrics.grad_norm = norm;
     adam.step(nets, "", &grads, lr, scale)?;

@@ -24,7 +24,7 @@ pub(super) fn explorer(spec: PolicySpec, device: &Device) -> Actor {
             LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
         }
     };
-    Actor { net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
+    Actor { cnn: None, net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ impl SacLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         let skill = FrozenSkill::new(score, model);
-        Self::build(config, skill.spec(), Some(skill), seed, device)
+        Self::build(config, skill.spec()?, Some(skill), seed, device)
     }
 
     pub(super) fn build(

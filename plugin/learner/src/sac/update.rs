@@ -3,7 +3,7 @@
 use super::{Critics, SacBatch, SacNets, alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
 use crate::LearnError;
 use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
-use crate::score::{ScoreConfig, decoder_kl};
+use crate::score::{Penalty, ScoreConfig, penalty};
 use burn::tensor::{Gradients, Tensor};
 
 /// What a step of the critics looked like, before it was taken.
@@ -128,7 +128,7 @@ pub fn critic_step(
     let steps = adam.steps();
     let (q1_loss, q2_loss) = (finite("q1_loss", &loss1, steps)?, finite("q2_loss", &loss2, steps)?);
     let q_values = finite("q_values", &values, steps)?;
-    let grad_norm = descend(&mut nets.critics, "", adam, &(loss1 + loss2).backward(), lr)?;
+    let grad_norm = descend(&mut nets.critics, "", adam, (loss1 + loss2).backward(), lr)?;
     Ok(CriticStep { q1_loss, q2_loss, q_values, grad_norm })
 }
 
@@ -159,14 +159,13 @@ pub fn actor_step(
     };
     let mut total = loss;
     if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
-        let kl = decoder_kl(&decoder.dist, &dist, score.kl_direction)?;
-        let penalty = (kl.clone() * decoder.alpha.clone()).mean();
+        let Penalty { kl, term } = penalty(score, &decoder.dist, &dist, decoder.alpha.clone())?;
         metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
-        metrics.kl_penalty = finite("kl_penalty", &penalty, steps)?;
+        metrics.kl_penalty = finite("kl_penalty", &term, steps)?;
         metrics.confidence = decoder.alpha_mean;
-        total = total + penalty * score.kl_coef;
+        total = total + term * score.kl_coef;
     }
-    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, &total.backward(), lr)?;
+    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, total.backward(), lr)?;
     Ok(metrics)
 }
 
@@ -190,7 +189,7 @@ pub fn alpha_step(
         alpha_loss: finite("alpha_loss", &loss, steps)?,
         log_prob: finite("log_prob", &log_prob.mean(), steps)?,
     };
-    descend(&mut nets.log_alpha, "", adam, &loss.backward(), lr)?;
+    descend(&mut nets.log_alpha, "", adam, loss.backward(), lr)?;
     Ok(metrics)
 }
 
@@ -199,10 +198,10 @@ fn descend<M: Parameters>(
     network: &mut M,
     prefix: &str,
     adam: &mut Adam,
-    gradients: &Gradients,
+    gradients: Gradients,
     lr: f64,
 ) -> Result<f64, LearnError> {
-    let grads = NamedGrads::read(network, prefix, gradients)?;
+    let grads = NamedGrads::take(network, prefix, gradients)?;
     let (norm, scale) = grads.clip_factor(f64::INFINITY, adam.steps())?;
     adam.step(network, prefix, &grads, lr, scale)?;
     Ok(norm)

@@ -1,7 +1,7 @@
 //! Settings of SCORE.
 
-use crate::LearnError;
 use crate::skill::SkillDraw;
+use crate::{ActionSpace, LearnError};
 use serde::{Deserialize, Serialize};
 
 /// Which divergence is penalised.
@@ -24,6 +24,25 @@ pub enum AlphaKind {
     PolicyAction,
     /// The decoder's density at the action of the rollout, unbounded if continuous.
     Density,
+    /// That density divided by the largest one of the row, in 0..1: p(a) / max p, or exp(-½ Σ squared z-scores) if
+    /// continuous.
+    BoundedDensity,
+}
+
+/// How the divergences of a minibatch become one number, which times kl_coef is added to the loss.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum PenaltyForm {
+    /// mean(α KL), not divided by the sum of α.
+    #[default]
+    Mean,
+    /// The released code's for mazes: -w · clamp(Σ KL(policy ‖ decoder), ±100), where w is the sum over rows and
+    /// dimensions of the decoder's one-dimensional densities at the rollout's actions. The sign is as released: it
+    /// rewards the divergence. Its kl_coef is 0.001. `kl_direction` and `alpha` are not used. Continuous actions only.
+    LegacyD4rl,
+    /// The released code's for CoinRun: Σ p(a) clamp(KL(policy ‖ decoder), ±100), where p(a) is the decoder's
+    /// probability of the rollout's action. Its kl_coef is 1e-8. `kl_direction` and `alpha` are not used. Discrete
+    /// actions only.
+    LegacyCoinrun,
 }
 
 /// Where skills come from.
@@ -51,6 +70,8 @@ pub struct ScoreConfig {
     pub kl_direction: KlDirection,
     /// The weight of each row.
     pub alpha: AlphaKind,
+    /// How the rows are put together.
+    pub penalty: PenaltyForm,
     /// Whether skills are drawn or are the prior's mean.
     pub skill_draw: SkillDraw,
     /// Steps for which a skill is held (the paper's T).
@@ -68,6 +89,7 @@ impl Default for ScoreConfig {
             kl_coef: 0.1,
             kl_direction: KlDirection::DecoderPolicy,
             alpha: AlphaKind::OwnSample,
+            penalty: PenaltyForm::Mean,
             skill_draw: SkillDraw::Sample,
             horizon: 8,
             prior: PriorKind::Learned,
@@ -92,5 +114,29 @@ impl ScoreConfig {
             return bad(format!("score kl_coef must not be negative, but is {}", self.kl_coef));
         }
         Ok(())
+    }
+
+    /// `Ok` if the penalty can be computed for actions of `space`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if it is a legacy form for the other kind of actions.
+    pub fn check_space(&self, space: ActionSpace) -> Result<(), LearnError> {
+        match (self.penalty, space) {
+            (PenaltyForm::LegacyD4rl, ActionSpace::Discrete(_)) => {
+                Err(LearnError::Config("score penalty LegacyD4rl is for continuous actions only".to_owned()))
+            }
+            (PenaltyForm::LegacyCoinrun, ActionSpace::Continuous(_)) => {
+                Err(LearnError::Config("score penalty LegacyCoinrun is for discrete actions only".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The divergence that the penalty measures.
+    pub fn direction(&self) -> KlDirection {
+        match self.penalty {
+            PenaltyForm::Mean => self.kl_direction,
+            PenaltyForm::LegacyD4rl | PenaltyForm::LegacyCoinrun => KlDirection::PolicyDecoder,
+        }
     }
 }

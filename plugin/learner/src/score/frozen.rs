@@ -1,7 +1,7 @@
 //! The frozen skill model behind SCORE.
 
 use super::decoder::DecoderRows;
-use super::{AlphaKind, PriorKind, ScoreConfig, alphas, decoder_kl, own_samples, unsquashed};
+use super::{PriorKind, ScoreConfig, decoder_kl, row_weights, unsquashed};
 use crate::file::TensorFile;
 use crate::nn::{HostDist, matrix, scalar};
 use crate::policy::{Actor, Policy, SkillSource, joined_rows};
@@ -56,12 +56,19 @@ impl FrozenSkill {
     }
 
     /// What a policy tied to this skill model reads and does.
-    pub(crate) fn spec(&self) -> PolicySpec {
-        PolicySpec {
-            obs_dim: self.description.obs_dim,
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the skill model reads images.
+    pub(crate) fn spec(&self) -> Result<PolicySpec, LearnError> {
+        Ok(PolicySpec {
+            obs_dim: self.obs_dim()?,
             latent: if self.config.condition { self.latent() } else { 0 },
             action_space: self.description.action_space,
-        }
+        })
+    }
+
+    fn obs_dim(&self) -> Result<usize, LearnError> {
+        self.description.observation.vector("a policy that learns from reward")
     }
 
     /// Width of a skill.
@@ -74,7 +81,9 @@ impl FrozenSkill {
         let (latent, tanh) = (self.latent(), self.description.config.tanh_latent);
         match self.config.prior {
             PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
-            PriorKind::Learned => Prior::learned(&self.prior, self.description.obs_dim, latent, tanh, device.plain()),
+            PriorKind::Learned => {
+                Prior::learned(&self.prior, self.description.observation, latent, tanh, device.plain())
+            }
         }
     }
 
@@ -85,13 +94,14 @@ impl FrozenSkill {
     }
 
     fn decoder_policy(&self, device: DeviceKind) -> Policy {
-        let widths = (self.description.obs_dim, self.latent());
+        let widths = (self.description.observation, self.latent());
         Policy::new(&self.decoder, None, None, self.description.action_space, widths, device.plain())
     }
 
     /// The copy of the decoder that a policy starts as, if it shall.
     pub(crate) fn copy(&self, norm_obs: bool) -> Result<Option<Actor>, LearnError> {
         self.config.validate()?;
+        self.config.check_space(self.description.action_space)?;
         if !self.config.init_from_decoder {
             return Ok(None);
         }
@@ -127,7 +137,7 @@ impl FrozenSkill {
         }
         let rows: Vec<usize> = (0..n).collect();
         let dist = |host: HostDist| host.rows(&rows, &device.plain());
-        let kl = decoder_kl(&dist(decoded), &dist(host(played)), self.config.kl_direction)?;
+        let kl = decoder_kl(&dist(decoded), &dist(host(played)), self.config.direction())?;
         let kl = scalar(kl.mean())?;
         if self.config.init_from_decoder && untrained && kl != 0.0 {
             return Err(LearnError::InitialKl { kl });
@@ -148,7 +158,7 @@ impl FrozenSkill {
         if !self.config.kl {
             return Ok(None);
         }
-        let (n, latent, obs_dim) = (actions.len(), self.latent(), self.description.obs_dim);
+        let (n, latent, obs_dim) = (actions.len(), self.latent(), self.obs_dim()?);
         let device = device.plain();
         let mut dist = HostDist { dim: self.description.action_space.dim(), head: Vec::new(), log_std: None };
         for start in (0..n).step_by(DECODER_CHUNK) {
@@ -161,10 +171,7 @@ impl FrozenSkill {
                 dist.log_std.get_or_insert_default().extend(stds);
             }
         }
-        let alpha = match self.config.alpha {
-            AlphaKind::OwnSample => alphas(AlphaKind::OwnSample, &dist, &own_samples(&dist, own_samples_from))?,
-            kind => alphas(kind, &dist, actions)?,
-        };
+        let alpha = row_weights(&self.config, &dist, actions, own_samples_from)?;
         let dist = if squashed { unsquashed(&dist) } else { dist };
         Ok(Some(DecoderRows { dist, alpha }))
     }

@@ -8,13 +8,15 @@ mod alpha;
 mod config;
 mod decoder;
 mod frozen;
+mod legacy;
 mod penalty;
 mod unsquash;
 
-pub use alpha::{alphas, own_samples};
-pub use config::{AlphaKind, KlDirection, PriorKind, ScoreConfig};
+pub use alpha::{alphas, own_samples, row_weights};
+pub use config::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use decoder::DecoderBatch;
 pub(crate) use decoder::DecoderRows;
 pub(crate) use frozen::FrozenSkill;
-pub use penalty::decoder_kl;
+pub use legacy::{legacy_coinrun, legacy_d4rl, marginal_densities};
+pub use penalty::{Penalty, decoder_kl, penalty};
 pub use unsquash::unsquashed;

@@ -1,14 +1,12 @@
-//! The divergence between decoder and policy.
+//! The penalty for leaving the decoder.
 
-use super::KlDirection;
+use super::{KlDirection, PenaltyForm, ScoreConfig, legacy_coinrun, legacy_d4rl};
 use crate::LearnError;
 use crate::nn::Dist;
 use burn::tensor::Tensor;
 
-/// The divergence of each row in the chosen direction, in nats, `[n]`. Exactly 0 where the two are equal.
-///
-/// The penalty is kl_coef · mean(α · this), to be added to a loss that is minimised; a plain mean over rows, not
-/// divided by the sum of α. `decoder` is constant.
+/// The divergence of each row in the chosen direction, in nats, `[n]`. Exactly 0 where the two are equal. `decoder` is
+/// constant.
 ///
 /// # Errors
 /// [`LearnError::Action`] if the two act in different kinds of spaces.
@@ -17,4 +15,28 @@ pub fn decoder_kl(decoder: &Dist, policy: &Dist, direction: KlDirection) -> Resu
         KlDirection::DecoderPolicy => decoder.kl(policy),
         KlDirection::PolicyDecoder => policy.kl(decoder),
     }
+}
+
+/// The penalty of a minibatch.
+#[derive(Clone, Debug)]
+pub struct Penalty {
+    /// The divergence of each row, not weighted, in nats, `[n]`.
+    pub kl: Tensor<1>,
+    /// What times kl_coef is added to a loss that is minimised, `[1]`.
+    pub term: Tensor<1>,
+}
+
+/// The penalty by [`ScoreConfig::penalty`], from the constant `decoder`, the `policy`, and the weight α of each row `[n]`
+/// that [`row_weights`](super::row_weights) gives.
+///
+/// # Errors
+/// [`LearnError::Action`] if decoder and policy act in different kinds of spaces.
+pub fn penalty(config: &ScoreConfig, decoder: &Dist, policy: &Dist, alpha: Tensor<1>) -> Result<Penalty, LearnError> {
+    let kl = decoder_kl(decoder, policy, config.direction())?;
+    let term = match config.penalty {
+        PenaltyForm::Mean => (kl.clone() * alpha).mean(),
+        PenaltyForm::LegacyD4rl => legacy_d4rl(kl.clone(), alpha),
+        PenaltyForm::LegacyCoinrun => legacy_coinrun(kl.clone(), alpha),
+    };
+    Ok(Penalty { kl, term })
 }

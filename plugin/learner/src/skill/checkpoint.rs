@@ -60,15 +60,17 @@ impl SkillTrainer {
     /// [`FileError`] says what is wrong with the file or does not fit the demonstrations.
     pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
-        file.check_format(KIND, VERSION)?;
-        let header: Header = file.description()?;
+        let header: Header = file.description(KIND, VERSION)?;
         let skill = header.skill;
         for (what, expected, found) in [
             ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),
             ("steps of the demonstrations", header.demo_steps, dataset.steps()),
-            ("obs_dim of the demonstrations", skill.obs_dim, dataset.obs_dim()),
         ] {
             LearnError::check(what, expected, found).map_err(|e| file.learner(e))?;
+        }
+        if skill.observation != dataset.observation() {
+            let (reads, found) = (skill.observation, dataset.observation());
+            return Err(file.format(format!("reads {reads}, the demonstrations are {found}")));
         }
         if skill.action_space != dataset.action_space() {
             return Err(file.format(format!("acts in {:?}, the demonstrations do not", skill.action_space)));
@@ -81,7 +83,7 @@ impl SkillTrainer {
         let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
         trainer.sums.total.copy_from_slice(&sums);
         trainer.epoch = header.epoch;
-        let windows = trainer.dataset.windows(trainer.config.window, &trainer.streams, header.epoch);
+        let windows = trainer.cut_windows(header.epoch);
         trainer.windows = windows.map_err(|e| file.learner(e))?;
         if header.windows_done >= trainer.windows.len() {
             return Err(file.format("stands behind the end of its epoch".to_owned()));

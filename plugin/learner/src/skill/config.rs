@@ -1,6 +1,8 @@
 //! Settings of the skill model.
 
+use super::{ActionInput, WindowRule};
 use crate::LearnError;
+use crate::nn::CnnKind;
 use crate::policy::StdKind;
 use serde::{Deserialize, Serialize};
 
@@ -24,12 +26,18 @@ pub struct SkillConfig {
     pub latent: usize,
     /// Steps in a window.
     pub window: usize,
+    /// Where windows are cut.
+    pub windows: WindowRule,
     /// β, the weight of the KL term.
     pub beta: f64,
     /// Hidden layers of the decoder and of the prior, ReLU.
     pub hidden: Vec<usize>,
-    /// Width of the encoder's three per-step layers.
+    /// Width of the encoder's three per-step layers over vectors.
     pub encoder_hidden: usize,
+    /// The convolutions over images; each of the three networks has its own. Not used for vectors.
+    pub cnn: CnnKind,
+    /// How the encoder reads discrete actions.
+    pub action_input: ActionInput,
     /// Width of each direction of the encoder's recurrent layers.
     pub gru_hidden: usize,
     /// Number of the encoder's recurrent layers.
@@ -63,9 +71,12 @@ impl Default for SkillConfig {
         Self {
             latent: 8,
             window: 10,
+            windows: WindowRule::default(),
             beta: 0.1,
             hidden: vec![200, 200],
             encoder_hidden: 64,
+            cnn: CnnKind::default(),
+            action_input: ActionInput::default(),
             gru_hidden: 64,
             gru_layers: 1,
             lr: 3e-4,
@@ -96,6 +107,7 @@ impl SkillConfig {
             ("gru_layers", self.gru_layers),
             ("batch", self.batch),
             ("hidden", self.hidden.iter().copied().min().unwrap_or(1)),
+            ("cnn", self.cnn.smallest()),
         ];
         if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
             return Err(LearnError::Config(format!("skill {name} must be at least 1")));

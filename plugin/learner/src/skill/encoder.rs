@@ -1,16 +1,26 @@
 //! q(z | τ): from a window of states and actions to a latent skill.
 
 use super::SkillConfig;
-use crate::nn::{Activation, Dist, Gru, Linear, Mlp, ParamVisitor, Parameters, path};
+use crate::nn::{Activation, Dist, Gru, ImageNet, Linear, Mlp, ObsRows, ParamVisitor, Parameters, path};
+use crate::{LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
-/// Three layers per step over the state (ReLU between them), joined with the action, read in both directions by
-/// recurrent layers; from the two last outputs, linear heads for the mean and ln σ of z.
+/// What the encoder makes of each step's observation.
+#[derive(Clone, Debug)]
+pub enum StateNet {
+    /// Three layers over a vector, ReLU between them; `state` in names.
+    Vector(Mlp),
+    /// Convolutions over an image; `cnn` in names.
+    Image(ImageNet),
+}
+
+/// The features of each step's observation, joined with the action, read in both directions by recurrent layers; from
+/// the two last outputs, linear heads for the mean and ln σ of z.
 #[derive(Clone, Debug)]
 pub struct Encoder {
-    /// Per-step layers over the state.
-    pub state: Mlp,
+    /// Per-step layers over the observation.
+    pub state: StateNet,
     /// The recurrent layers.
     pub gru: Gru,
     /// Head of the mean.
@@ -20,42 +30,78 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Starting weights: orthogonal, recurrent layers uniform.
+    /// Starting weights: orthogonal, recurrent layers uniform. `action_width` is that of an action as the encoder reads
+    /// it.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the convolutions.
     pub fn new<R: Rng + ?Sized>(
         config: &SkillConfig,
-        obs_dim: usize,
+        observation: ObsKind,
         action_width: usize,
         rng: &mut R,
         device: &Device,
-    ) -> Self {
+    ) -> Result<Self, LearnError> {
         let width = config.encoder_hidden;
-        let state = Mlp::new(obs_dim, &[width; 2], width, Activation::Relu, 1.0, rng, device);
-        let inputs = width + action_width;
+        let (state, features) = match observation {
+            ObsKind::Vector(obs_dim) => {
+                let net = Mlp::new(obs_dim, &[width; 2], width, Activation::Relu, 1.0, rng, device);
+                (StateNet::Vector(net), width)
+            }
+            ObsKind::Image(shape) => {
+                (StateNet::Image(ImageNet::new(&config.cnn, shape, rng, device)?), config.cnn.features())
+            }
+        };
+        let inputs = features + action_width;
         let gru = Gru::new(inputs, config.gru_hidden, config.gru_layers, true, rng, device);
-        let features = 2 * config.gru_hidden;
-        Self {
+        let summary = 2 * config.gru_hidden;
+        Ok(Self {
             state,
             gru,
-            mean: Linear::new(features, config.latent, 1.0, rng, device),
-            log_std: Linear::new(features, config.latent, 0.01, rng, device),
-        }
+            mean: Linear::new(summary, config.latent, 1.0, rng, device),
+            log_std: Linear::new(summary, config.latent, 0.01, rng, device),
+        })
     }
 
     /// The Gaussian over z, before any squashing, for each of B windows of `steps` steps.
     ///
-    /// `states` `[steps * B, obs_dim]` and `actions` `[steps * B, action_width]` (one-hot or raw) are time-major:
-    /// row `t * B + b`.
-    pub fn forward(&self, states: Tensor<2>, actions: Tensor<2>, steps: usize) -> Dist {
-        let features = self.state.forward(states);
-        let joined = Tensor::cat(vec![features, actions], 1);
-        let summary = self.gru.summary(joined, steps);
-        Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) }
+    /// `states`, `steps * B` rows, and `actions` `[steps * B, action_width]`
+    /// ([`ActionInput`](super::ActionInput)) are time-major: row `t * B + b`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are of the other kind than the network.
+    pub fn forward(&self, states: &ObsRows, actions: Tensor<2>, steps: usize) -> Result<Dist, LearnError> {
+        let summary = self.summary(states, actions, steps)?;
+        Ok(Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) })
+    }
+
+    /// What the recurrent layers make of each window, `[B, 2 * gru_hidden]`; inputs and errors as [`Self::forward`].
+    pub fn summary(&self, states: &ObsRows, actions: Tensor<2>, steps: usize) -> Result<Tensor<2>, LearnError> {
+        let joined = Tensor::cat(vec![self.state.forward(states)?, actions], 1);
+        Ok(self.gru.summary(joined, steps))
+    }
+}
+
+impl StateNet {
+    /// The features of each observation, `[n, features]`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are of the other kind than the network.
+    pub fn forward(&self, states: &ObsRows) -> Result<Tensor<2>, LearnError> {
+        match (self, states) {
+            (Self::Vector(net), ObsRows::Vector(x)) => Ok(net.forward(x.clone())),
+            (Self::Image(net), ObsRows::Image(x)) => Ok(net.forward(x.clone())),
+            _ => Err(LearnError::Config("the encoder got observations of the other kind".to_owned())),
+        }
     }
 }
 
 impl Parameters for Encoder {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
-        self.state.visit(&path(prefix, "state"), visitor);
+        match &mut self.state {
+            StateNet::Vector(net) => net.visit(&path(prefix, "state"), visitor),
+            StateNet::Image(net) => net.visit(&path(prefix, "cnn"), visitor),
+        }
         self.gru.visit(&path(prefix, "gru"), visitor);
         self.mean.visit(&path(prefix, "mean"), visitor);
         self.log_std.visit(&path(prefix, "log_std"), visitor);

@@ -4,9 +4,13 @@
 //! again, and a prior p(z | s₀) says which skills a player would choose in a state. Training minimises
 //! J = NLL + β KL(q ‖ p) (the SCORE paper's Eq. 2 with its sign put right; OPAL, Ajay et al. 2021).
 //!
-//! There is one pipeline everywhere: observations are used raw, and the decoder sees tanh(z) (or z, by
+//! Observations are vectors or images ([`crate::ObsKind`]). For images each of the three networks has a trunk of
+//! convolutions of its own ([`SkillConfig::cnn`]), which comes before the layers that would read a vector.
+//!
+//! There is one pipeline everywhere: observations are used raw (pixels divided by 255), and the decoder sees tanh(z) (or z, by
 //! [`SkillConfig::tanh_latent`]) in training and in use.
 
+mod action_input;
 mod checkpoint;
 mod config;
 mod dataset;
@@ -16,13 +20,16 @@ mod model;
 mod nets;
 mod prior;
 mod trainer;
+mod windows;
 
+pub use action_input::ActionInput;
 pub use config::{Reduction, SkillConfig};
-pub use dataset::{Dataset, DemoEpisode, Window};
-pub use encoder::Encoder;
+pub use dataset::{Dataset, DemoEpisode};
+pub use encoder::{Encoder, StateNet};
 pub use loss::{SkillLoss, skill_loss};
 pub(crate) use model::SkillDescription;
 pub use model::SkillModel;
 pub use nets::{SkillForward, SkillNets};
 pub use prior::{Prior, SkillDraw};
 pub use trainer::{SkillMetrics, SkillProgress, SkillTrainer};
+pub use windows::{Window, WindowRule};

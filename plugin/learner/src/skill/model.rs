@@ -5,7 +5,7 @@ use crate::file::TensorFile;
 use crate::nn::frozen;
 use crate::policy::{Actor, Policy};
 use crate::rng::Streams;
-use crate::{ActionSpace, DeviceKind, FileError, LearnError};
+use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -14,7 +14,9 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 pub(crate) struct SkillDescription {
     pub(crate) config: SkillConfig,
-    pub(crate) obs_dim: usize,
+    // Files of vectors were written before there were images.
+    #[serde(alias = "obs_dim")]
+    pub(crate) observation: ObsKind,
     pub(crate) action_space: ActionSpace,
 }
 
@@ -32,8 +34,8 @@ const VERSION: u32 = 1;
 
 /// Encoder, decoder and prior after training, with the settings they were trained with.
 ///
-/// The file is safetensors with names such as `decoder.l0.weight` (`[inputs, outputs]`) and the settings as JSON in its
-/// header, so that one file is all there is.
+/// The file is safetensors with names such as `decoder.l0.weight` (`[inputs, outputs]`) or `decoder.cnn.s0.conv.weight`
+/// (`[outputs, inputs, rows, columns]`) and the settings as JSON in its header, so that one file is all there is.
 #[derive(Clone, Debug)]
 pub struct SkillModel {
     pub(crate) description: SkillDescription,
@@ -51,9 +53,14 @@ impl SkillModel {
         &self.description.config
     }
 
-    /// Width of an observation.
+    /// What it observes.
+    pub fn observation(&self) -> ObsKind {
+        self.description.observation
+    }
+
+    /// Numbers in an observation.
     pub fn obs_dim(&self) -> usize {
-        self.description.obs_dim
+        self.observation().numbers()
     }
 
     /// What the decoder acts in.
@@ -80,12 +87,12 @@ impl SkillModel {
     pub fn prior(&self) -> Prior {
         let config = self.config();
         let device = self.device.plain();
-        Prior::learned(&self.nets.prior, self.obs_dim(), config.latent, config.tanh_latent, device)
+        Prior::learned(&self.nets.prior, self.observation(), config.latent, config.tanh_latent, device)
     }
 
     /// The decoder as a policy without a critic. Under the prior this is behaviour cloning.
     pub fn policy(&self) -> Policy {
-        let widths = (self.obs_dim(), self.latent());
+        let widths = (self.observation(), self.latent());
         Policy::new(self.decoder(), None, None, self.action_space(), widths, self.device.plain())
     }
 
@@ -107,8 +114,7 @@ impl SkillModel {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
-        file.check_format(KIND, VERSION)?;
-        let header: Header = file.description()?;
+        let header: Header = file.description(KIND, VERSION)?;
         let description = header.skill;
         let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut nets, &device.plain())?;
@@ -122,6 +128,6 @@ impl SkillDescription {
     pub(crate) fn nets(&self, device: DeviceKind) -> Result<SkillNets, LearnError> {
         self.config.validate()?;
         let (config, space) = (&self.config, self.action_space);
-        Ok(SkillNets::new(config, self.obs_dim, space, &Streams::new(0), &device.plain()))
+        SkillNets::new(config, self.observation, space, &Streams::new(0), &device.plain())
     }
 }

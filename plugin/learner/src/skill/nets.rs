@@ -1,10 +1,10 @@
 //! The three networks of the skill model together.
 
 use super::{Encoder, SkillConfig};
-use crate::nn::{ActionRows, Activation, Dist, ParamVisitor, Parameters, path};
+use crate::nn::{ActionRows, Activation, Dist, ImageNet, ObsRows, ParamVisitor, Parameters, path};
 use crate::policy::{Actor, NetShape};
 use crate::rng::Streams;
-use crate::{ActionSpace, Actions, LearnError};
+use crate::{ActionSpace, LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
 
 /// Encoder, decoder and prior.
@@ -34,61 +34,67 @@ pub struct SkillForward {
 }
 
 impl SkillNets {
-    /// Starting weights from the streams `skill.encoder`, `skill.decoder` and `skill.prior`.
-    pub fn new(config: &SkillConfig, obs_dim: usize, space: ActionSpace, streams: &Streams, device: &Device) -> Self {
-        let rng = |name| streams.stream(name, 0);
-        let shape = |latent| NetShape { obs_dim, latent, hidden: config.hidden.clone(), activation: Activation::Relu };
-        let latent = ActionSpace::Continuous(config.latent);
-        Self {
-            encoder: Encoder::new(config, obs_dim, space.dim(), &mut rng("skill.encoder"), device),
-            decoder: Actor::new(&shape(config.latent), space, config.decoder_std, &mut rng("skill.decoder"), device),
-            prior: Actor::new(&shape(0), latent, config.prior_std, &mut rng("skill.prior"), device),
+    /// Starting weights from the streams `skill.encoder`, `skill.decoder` and `skill.prior`, and `skill.decoder.cnn` and
+    /// `skill.prior.cnn` for images, of which each of the three networks has a trunk of its own.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the convolutions.
+    pub fn new(
+        config: &SkillConfig,
+        observation: ObsKind,
+        space: ActionSpace,
+        streams: &Streams,
+        device: &Device,
+    ) -> Result<Self, LearnError> {
+        let rng = |name: &str| streams.stream(name, 0);
+        let action_width = config.action_input.width(space);
+        let actor = |name: &str, latent, space, std| -> Result<Actor, LearnError> {
+            let obs_dim = match observation {
+                ObsKind::Vector(width) => width,
+                ObsKind::Image(_) => config.cnn.features(),
+            };
+            let hidden = config.hidden.clone();
+            let shape = NetShape { obs_dim, latent, hidden, activation: Activation::Relu };
+            let actor = Actor::new(&shape, space, std, &mut rng(name), device);
+            let ObsKind::Image(shape) = observation else { return Ok(actor) };
+            Ok(actor.with_cnn(ImageNet::new(&config.cnn, shape, &mut rng(&format!("{name}.cnn")), device)?))
+        };
+        Ok(Self {
+            encoder: Encoder::new(config, observation, action_width, &mut rng("skill.encoder"), device)?,
+            decoder: actor("skill.decoder", config.latent, space, config.decoder_std)?,
+            prior: actor("skill.prior", 0, ActionSpace::Continuous(config.latent), config.prior_std)?,
             tanh_latent: config.tanh_latent,
-        }
+        })
     }
 
     /// Runs a batch of B windows through all three networks.
     ///
-    /// `states` `[steps * B, obs_dim]` are time-major, `first` `[B, obs_dim]` are the states of the first step,
-    /// `encoded_actions` are the actions as the encoder reads them (one-hot or raw), and `noise` `[B, latent]` is standard
-    /// normal: z = mean + noise · σ.
+    /// `states`, `steps * B` rows, are time-major, so that the first B rows are those of the first step;
+    /// `encoded_actions` are the actions as the encoder reads them ([`ActionInput`](super::ActionInput)), and `noise`
+    /// `[B, latent]` is standard normal: z = mean + noise · σ.
     ///
     /// # Errors
-    /// [`LearnError::Action`] if `actions` do not fit the decoder.
+    /// [`LearnError::Action`] if `actions` do not fit the decoder; [`LearnError::Config`] if the observations are of the
+    /// other kind than the networks.
     pub fn forward(
         &self,
-        states: Tensor<2>,
-        first: Tensor<2>,
+        states: &ObsRows,
         actions: &ActionRows,
         encoded_actions: Tensor<2>,
         noise: Tensor<2>,
         steps: usize,
     ) -> Result<SkillForward, LearnError> {
-        let posterior = self.encoder.forward(states.clone(), encoded_actions, steps);
+        let posterior = self.encoder.forward(states, encoded_actions, steps)?;
+        let first = self.prior.observe(&states.first(states.rows() / steps.max(1)))?;
         let kl_per_sequence = posterior.kl(&self.prior.forward(first))?;
         let Dist::Gaussian { mean, log_std } = posterior else {
             return Err(LearnError::Action("the encoder is Gaussian".to_owned()));
         };
         let latent = mean + noise * log_std.exp();
         let decoder_latent = if self.tanh_latent { latent.tanh() } else { latent };
-        let decoded = self.decoder.forward_held(decoder_latent.clone(), states, steps);
+        let decoded = self.decoder.forward_held(decoder_latent.clone(), self.decoder.observe(states)?, steps);
         let nll_per_step = decoded.log_prob(actions)?.neg();
         Ok(SkillForward { nll_per_step, kl_per_sequence, decoder_latent, decoded })
-    }
-}
-
-/// Actions as the encoder reads them, row-major: one-hot if discrete, raw if continuous.
-pub(crate) fn encoder_actions(actions: &Actions, space: ActionSpace) -> Vec<f32> {
-    match actions {
-        Actions::Discrete(values) => {
-            let dim = space.dim();
-            let mut out = vec![0.0; values.len() * dim];
-            for (row, &a) in values.iter().enumerate() {
-                out[row * dim + a as usize] = 1.0;
-            }
-            out
-        }
-        Actions::Continuous { values, .. } => values.clone(),
     }
 }
 

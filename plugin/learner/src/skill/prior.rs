@@ -1,8 +1,8 @@
 //! p(z | s₀) in use.
 
-use crate::LearnError;
-use crate::nn::{frozen, matrix};
+use crate::nn::{ObsRows, frozen};
 use crate::policy::Actor;
+use crate::{LearnError, ObsKind, Observations};
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
@@ -19,15 +19,21 @@ pub enum SkillDraw {
 /// Draws skills for states. Clones share the weights.
 #[derive(Clone, Debug)]
 pub struct Prior {
-    pub(crate) net: Option<(Actor, usize, Device)>,
+    pub(crate) net: Option<(Actor, ObsKind, Device)>,
     latent: usize,
     pub(crate) tanh: bool,
 }
 
 impl Prior {
-    /// The learned prior `net`, which reads `obs_dim` numbers.
-    pub(crate) fn learned(net: &Actor, obs_dim: usize, latent: usize, tanh: bool, device: Device) -> Self {
-        Self { net: Some((frozen(net), obs_dim, device)), latent, tanh }
+    /// The learned prior `net`, which reads the given observations.
+    pub(crate) fn learned(
+        net: &Actor,
+        observation: impl Into<ObsKind>,
+        latent: usize,
+        tanh: bool,
+        device: Device,
+    ) -> Self {
+        Self { net: Some((frozen(net), observation.into(), device)), latent, tanh }
     }
 
     /// A prior that ignores the state: standard normal, then tanh if `tanh`.
@@ -40,16 +46,41 @@ impl Prior {
         self.latent
     }
 
-    /// Skills for `n` raw observations (`n * obs_dim`), as the decoder and the policy take them: `n * latent`.
+    /// Skills for `n` raw vectors (`n * obs_dim`), as the decoder and the policy take them: `n * latent`.
     ///
     /// `normal(row)` must give the next standard normal number of that row's own generator; it is called `latent`
     /// times per row, in order of rows, and not at all for [`SkillDraw::Mean`].
     ///
     /// # Errors
-    /// [`LearnError::Shape`] for observations of the wrong length; [`LearnError::NotFinite`] if a skill is.
+    /// [`LearnError::Shape`] for observations of the wrong length, [`LearnError::Config`] if the prior reads images;
+    /// [`LearnError::NotFinite`] if a skill is not finite.
     pub fn sample(
         &self,
         obs: &[f32],
+        n: usize,
+        draw: SkillDraw,
+        normal: &mut dyn FnMut(usize) -> f32,
+    ) -> Result<Vec<f32>, LearnError> {
+        self.draw(|| Observations::Vector(obs.to_vec()), n, draw, normal)
+    }
+
+    /// [`Self::sample`] for `n` images, whose `pixels` are in the order channel, row, column.
+    ///
+    /// # Errors
+    /// As [`Self::sample`]; [`LearnError::Config`] if the prior reads vectors.
+    pub fn sample_images(
+        &self,
+        pixels: &[u8],
+        n: usize,
+        draw: SkillDraw,
+        normal: &mut dyn FnMut(usize) -> f32,
+    ) -> Result<Vec<f32>, LearnError> {
+        self.draw(|| Observations::Image(pixels.to_vec()), n, draw, normal)
+    }
+
+    fn draw(
+        &self,
+        observations: impl FnOnce() -> Observations,
         n: usize,
         draw: SkillDraw,
         normal: &mut dyn FnMut(usize) -> f32,
@@ -60,14 +91,15 @@ impl Prior {
         let numbers = n * self.latent;
         let (mut z, log_std) = match &self.net {
             None => (vec![0.0; numbers], vec![0.0; numbers]),
-            Some((net, obs_dim, device)) => {
-                LearnError::check("observations", n * obs_dim, obs.len())?;
-                let mut rows = obs.to_vec();
+            Some((net, kind, device)) => {
+                let observations = observations();
+                observations.check("observations of the prior", kind, n)?;
+                let mut features = net.observe(&ObsRows::new(observations, kind, device))?;
                 if n == 1 {
                     // As in `Policy`: a single row would be summed in another order.
-                    rows.extend_from_within(..);
+                    features = features.repeat_dim(0, 2);
                 }
-                let dist = net.forward(matrix(rows, n.max(2), *obs_dim, device)).to_host()?;
+                let dist = net.forward(features).to_host()?;
                 (dist.head, dist.log_std.unwrap_or_default())
             }
         };

@@ -1,8 +1,7 @@
 //! Training of the skill model.
 
-use super::nets::encoder_actions;
 use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
-use crate::nn::{ActionRows, Adam, AdamConfig, Dist, NamedGrads, argmax, host, matrix, scalar, tracked};
+use crate::nn::{ActionRows, Adam, AdamConfig, Dist, NamedGrads, ObsRows, argmax, host, matrix, scalar, tracked};
 use crate::rng::{Streams, normal};
 use crate::{Actions, DeviceKind, LearnError};
 use std::ops::ControlFlow;
@@ -64,12 +63,13 @@ impl SkillTrainer {
     /// A trainer with starting weights from `seed`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work, [`LearnError::NoWindow`] if no episode is long enough.
+    /// [`LearnError::Config`] for settings that cannot work or images too small for them, [`LearnError::NoWindow`] if no
+    /// episode is long enough.
     pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         config.validate()?;
         let streams = Streams::new(seed);
-        let nets = SkillNets::new(&config, dataset.obs_dim, dataset.space, &streams, &device.plain());
-        let windows = dataset.windows(config.window, &streams, 0)?;
+        let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &device.plain())?;
+        let windows = dataset.windows(config.window, config.windows, &streams, 0)?;
         Ok(Self {
             nets: tracked(&nets),
             adam: Adam::new(AdamConfig { eps: 1e-8, ..AdamConfig::default() }),
@@ -119,7 +119,7 @@ impl SkillTrainer {
             self.epoch += 1;
             self.next = 0;
             self.last_epoch = std::mem::take(&mut self.sums).mean(metrics.accuracy.is_some());
-            self.windows = self.dataset.windows(self.config.window, &self.streams, self.epoch)?;
+            self.windows = self.cut_windows(self.epoch)?;
         }
         Ok(metrics)
     }
@@ -153,10 +153,14 @@ impl SkillTrainer {
         SkillModel::new(self.description(), &self.nets, self.device)
     }
 
+    pub(super) fn cut_windows(&self, epoch: u64) -> Result<Vec<Window>, LearnError> {
+        self.dataset.windows(self.config.window, self.config.windows, &self.streams, epoch)
+    }
+
     pub(super) fn description(&self) -> SkillDescription {
         SkillDescription {
             config: self.config.clone(),
-            obs_dim: self.dataset.obs_dim,
+            observation: self.dataset.observation,
             action_space: self.dataset.space,
         }
     }
@@ -182,7 +186,7 @@ impl SkillTrainer {
         if let Some((name, _)) = parts.iter().find(|(_, x)| !x.is_finite()) {
             return Err(LearnError::NotFinite { tensor: (*name).to_owned(), steps });
         }
-        let grads = NamedGrads::read(&mut self.nets, "", &loss.total.backward())?;
+        let grads = NamedGrads::take(&mut self.nets, "", loss.total.backward())?;
         let (norm, scale) = grads.clip_factor(self.config.max_grad_norm, steps)?;
         metrics.grad_norm = norm as f32;
         self.adam.step(&mut self.nets, "", &grads, self.config.lr, scale)?;
@@ -191,18 +195,16 @@ impl SkillTrainer {
 
     fn forward(&self, windows: &[Window]) -> Result<(SkillForward, Actions), LearnError> {
         let (batch, steps) = (windows.len(), self.config.window);
-        let (obs_dim, space) = (self.dataset.obs_dim, self.dataset.space);
+        let (input, space) = (self.config.action_input, self.dataset.space);
         let device = self.device.plain();
         let (observations, actions) = self.dataset.gather(windows, steps)?;
-        let first = matrix(observations[..batch * obs_dim].to_vec(), batch, obs_dim, &device);
-        let states = matrix(observations, steps * batch, obs_dim, &device);
-        let encoded = encoder_actions(&actions, space);
-        let encoded = matrix(encoded, steps * batch, space.dim(), &device);
+        let states = ObsRows::new(observations, &self.dataset.observation, &device);
+        let encoded = matrix(input.encode(&actions, space), steps * batch, input.width(space), &device);
         let mut rng = self.streams.stream("skill.noise", self.adam.steps());
         let noise = (0..batch * self.config.latent).map(|_| normal(&mut rng)).collect();
         let noise = matrix(noise, batch, self.config.latent, &device);
         let rows = ActionRows::new(&actions, &device);
-        let forward = self.nets.forward(states, first, &rows, encoded, noise, steps)?;
+        let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
     }
 }

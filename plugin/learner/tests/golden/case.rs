@@ -36,6 +36,7 @@ impl Case {
                 let values = match view.dtype() {
                     Dtype::F32 => bytemuck::pod_collect_to_vec::<u8, f32>(data).into_iter().map(f64::from).collect(),
                     Dtype::I64 => bytemuck::pod_collect_to_vec::<u8, i64>(data).into_iter().map(|x| x as f64).collect(),
+                    Dtype::U8 => data.iter().map(|&x| f64::from(x)).collect(),
                     other => panic!("{name} is {other:?}"),
                 };
                 (name.to_owned(), (view.shape().to_vec(), values))
@@ -76,6 +77,15 @@ impl Case {
 
     pub fn f32s(&self, name: &str) -> Vec<f32> {
         self.f64s(name).iter().map(|&x| x as f32).collect()
+    }
+
+    pub fn bytes(&self, name: &str) -> Vec<u8> {
+        self.f64s(name).iter().map(|&x| x as u8).collect()
+    }
+
+    pub fn sizes(&self, name: &str) -> Vec<usize> {
+        let sizes = self.json["dims"][name].as_array().unwrap_or_else(|| panic!("{}: no sizes {name}", self.name));
+        sizes.iter().map(|n| n.as_u64().expect("a size") as usize).collect()
     }
 
     pub fn bools(&self, name: &str) -> Vec<bool> {
@@ -150,24 +160,28 @@ impl Case {
         }
     }
 
-    /// The stored tensors that make up our parameter `name` (both directions of a recurrent layer, or one tensor): their
-    /// name and their numbers in our layout, `None` where the case does not hold them.
-    fn parts(&self, group: &str, name: &str) -> Vec<(String, Option<Vec<f64>>)> {
-        let theirs = format!("{group}{}", their_name(name));
+    /// The names of what makes up our parameter `name`: both directions of a recurrent layer, or one tensor.
+    fn names(&self, group: &str, name: &str) -> Vec<String> {
+        let head = if self.has("param.dec.logits.weight") { "dec.logits" } else { "dec.mean" };
+        let theirs = format!("{group}{}", their_name(name, head));
         let (stem, last) = theirs.rsplit_once('.').unwrap_or(("", &theirs));
-        let names = match stem.rsplit_once(".l").filter(|_| name.contains("gru")) {
+        match stem.rsplit_once(".l").filter(|_| name.contains("gru")) {
             None => vec![theirs],
             Some((stem, layer)) => {
                 let forward = format!("{stem}.{last}_l{layer}");
                 let both = vec![forward.clone(), format!("{forward}_reverse")];
                 if name.contains("uni") { vec![forward] } else { both }
             }
-        };
+        }
+    }
+
+    /// [`Self::names`] with their numbers in our layout, `None` where the case does not hold them.
+    fn parts(&self, group: &str, name: &str) -> Vec<(String, Option<Vec<f64>>)> {
         let numbers = |name: String| {
             let values = self.has(&name).then(|| self.transposed(&name));
             (name, values)
         };
-        names.into_iter().map(numbers).collect()
+        self.names(group, name).into_iter().map(numbers).collect()
     }
 
     /// `[out, in]` to `[in, out]`; anything else as it is.
@@ -193,6 +207,17 @@ impl Case {
             }
         }
     }
+
+    /// Compares the Euclidean norm of a parameter-like tensor of ours with the number `group` + its name, if there is one.
+    pub fn check_norm(&self, group: &str, name: &str, got: &[f32]) {
+        let names = self.names(group, name);
+        let length = got.len() / names.len();
+        for (theirs, got) in names.into_iter().zip(got.chunks_exact(length)) {
+            if self.json["expected"].get(&theirs).is_some() {
+                self.check_number(&theirs, norm(got));
+            }
+        }
+    }
 }
 
 /// A tensor that is made by rule instead of stored (SplitMix64 over the element numbers).
@@ -200,26 +225,33 @@ fn generate(rule: &Value) -> (String, (Vec<usize>, Vec<f64>)) {
     let shape: Vec<usize> =
         rule["shape"].as_array().into_iter().flatten().map(|n| n.as_u64().expect("size") as usize).collect();
     let seed = rule["seed"].as_u64().expect("seed");
-    let bound = rule["bound"].as_f64().expect("bound");
+    let bound = rule["bound"].as_f64();
     let element = |i: usize| {
         let mut z = seed.wrapping_add((i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         z ^= z >> 31;
-        f64::from((((z >> 40) as f64 / 8_388_608.0 - 1.0) * bound) as f32)
+        match bound {
+            Some(bound) => f64::from((((z >> 40) as f64 / 8_388_608.0 - 1.0) * bound) as f32),
+            // Bytes have no bound.
+            None => (z >> 56) as f64,
+        }
     };
     let values: Vec<f64> = (0..shape.iter().product()).map(element).collect();
     for (bits, x) in rule["first_bits"].as_array().into_iter().flatten().zip(&values) {
         assert_eq!(bits.as_u64(), Some(u64::from((*x as f32).to_bits())));
     }
+    for (first, x) in rule["first"].as_array().into_iter().flatten().zip(&values) {
+        assert_eq!(first.as_f64(), Some(*x));
+    }
     (rule["name"].as_str().expect("name").to_owned(), (shape, values))
 }
 
-fn their_name(name: &str) -> String {
+fn their_name(name: &str, decoder_head: &str) -> String {
     let name = name
         .replace("encoder.state.head", "enc.state.l2")
         .replace("encoder.", "enc.")
-        .replace("decoder.head", "dec.mean")
+        .replace("decoder.head", decoder_head)
         .replace("decoder.", "dec.")
         .replace("prior.head", "prior.mean")
         .replace("sac_actor.head", "actor.mean")
@@ -250,6 +282,11 @@ impl ParamVisitor for Fill<'_> {
 /// All numbers of a tensor.
 pub fn host<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.try_into_vec_as::<f32>().expect("readable")
+}
+
+/// The Euclidean norm.
+pub fn norm(values: &[f32]) -> f64 {
+    values.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The number of a tensor of one element.

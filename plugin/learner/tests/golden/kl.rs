@@ -3,8 +3,9 @@
 use crate::case::{Case, host, number};
 use burn::tensor::Tensor;
 use playbot_learner::nn::Dist;
-use playbot_learner::score::{alphas, decoder_kl};
-use playbot_learner::{AlphaKind, DeviceKind, KlDirection};
+use playbot_learner::rng::Streams;
+use playbot_learner::score::{alphas, decoder_kl, penalty, row_weights};
+use playbot_learner::{AlphaKind, DeviceKind, KlDirection, PenaltyForm, ScoreConfig};
 
 type Leaves = Vec<(&'static str, Tensor<2>)>;
 
@@ -21,15 +22,17 @@ fn policy(case: &Case, kind: DeviceKind) -> (Dist, Leaves) {
     (Dist::Gaussian { mean, log_std }, leaves)
 }
 
-fn check(name: &str, kinds: &[(&str, AlphaKind)]) {
-    let case = Case::load(name);
+fn decoder(case: &Case, kind: DeviceKind) -> Dist {
+    let device = kind.plain();
+    if case.has("in.dec_logits") {
+        return Dist::categorical(case.tensor("in.dec_logits", &device));
+    }
+    Dist::Gaussian { mean: case.tensor("in.dec_mean", &device), log_std: case.tensor("in.dec_log_std", &device) }
+}
+
+fn check(case: &Case, kinds: &[(&str, AlphaKind)]) {
     for device in DeviceKind::ALL {
-        let plain = device.plain();
-        let decoder = if case.has("in.dec_logits") {
-            Dist::categorical(case.tensor("in.dec_logits", &plain))
-        } else {
-            Dist::Gaussian { mean: case.tensor("in.dec_mean", &plain), log_std: case.tensor("in.dec_log_std", &plain) }
-        };
+        let decoder = decoder(case, device);
         let rows = decoder.clone().to_host().expect("readable");
         for (alpha_name, alpha_kind) in kinds {
             let actions = match alpha_kind {
@@ -40,32 +43,49 @@ fn check(name: &str, kinds: &[(&str, AlphaKind)]) {
             if *alpha_kind != AlphaKind::Off {
                 case.check(&format!("out.alpha.{alpha_name}"), &alpha);
             }
-            for (direction, short) in [(KlDirection::DecoderPolicy, "dec_pol"), (KlDirection::PolicyDecoder, "pol_dec")]
+            for (kl_direction, short) in
+                [(KlDirection::DecoderPolicy, "dec_pol"), (KlDirection::PolicyDecoder, "pol_dec")]
             {
-                let (policy, leaves) = policy(&case, device);
-                let kl = decoder_kl(&decoder, &policy, direction).expect("same kind");
-                case.check(&format!("out.kl_{short}"), &host(kl.clone()));
-                let alpha = Tensor::<1>::from_floats(alpha.as_slice(), &plain);
-                let penalty = (kl * alpha).mean();
-                case.check_number(&format!("reg.{short}.{alpha_name}"), number(penalty.clone()));
-                let term = number(penalty.clone() * case.number("kl_coef"));
-                case.check_number(&format!("loss_term.{short}.{alpha_name}"), term);
-                let grads = penalty.backward();
-                for (leaf_name, leaf) in leaves {
-                    let got = host(leaf.grad(&grads).expect("tracked"));
-                    case.check(&format!("grad.{short}.{alpha_name}.{leaf_name}"), &got);
-                }
+                let (policy, leaves) = policy(case, device);
+                let config = ScoreConfig { kl_direction, ..ScoreConfig::default() };
+                let alpha = Tensor::<1>::from_floats(alpha.as_slice(), &device.plain());
+                let penalty = penalty(&config, &decoder, &policy, alpha).expect("same kind");
+                case.check(&format!("out.kl_{short}"), &host(penalty.kl));
+                let term = penalty.term;
+                case.check_number(&format!("reg.{short}.{alpha_name}"), number(term.clone()));
+                let scaled = number(term.clone() * case.number("kl_coef"));
+                case.check_number(&format!("loss_term.{short}.{alpha_name}"), scaled);
+                check_gradients(case, &format!("grad.{short}.{alpha_name}"), &leaves, term);
             }
         }
     }
-    // The released code's terms are not reproduced.
-    case.finish(&["legacy_", "grad.legacy_"]);
+}
+
+fn check_gradients(case: &Case, name: &str, leaves: &Leaves, loss: Tensor<1>) {
+    let grads = loss.backward();
+    for (leaf_name, leaf) in leaves {
+        let got = host(leaf.grad(&grads).expect("tracked"));
+        case.check(&format!("{name}.{leaf_name}"), &got);
+    }
+}
+
+/// The penalty of a legacy form, and its weights, as PPO computes them.
+fn legacy(case: &Case, form: PenaltyForm, device: DeviceKind) -> (Tensor<1>, Vec<f32>, Leaves) {
+    let config = ScoreConfig { penalty: form, ..ScoreConfig::default() };
+    let decoder = decoder(case, device);
+    let rows = decoder.clone().to_host().expect("readable");
+    let mut rng = Streams::new(0).stream("unused", 0);
+    let weights = row_weights(&config, &rows, &case.actions("in.policy_action"), &mut rng).expect("they fit");
+    let (policy, leaves) = policy(case, device);
+    let alpha = Tensor::<1>::from_floats(weights.as_slice(), &device.plain());
+    (penalty(&config, &decoder, &policy, alpha).expect("same kind").term, weights, leaves)
 }
 
 #[test]
 fn golden_kl_gaussian() {
+    let case = Case::load("kl_gaussian");
     check(
-        "kl_gaussian",
+        &case,
         &[
             ("off", AlphaKind::Off),
             ("score_policy_action", AlphaKind::PolicyAction),
@@ -73,16 +93,36 @@ fn golden_kl_gaussian() {
             ("density_policy_action", AlphaKind::Density),
         ],
     );
+    for device in DeviceKind::ALL {
+        let (term, weights, leaves) = legacy(&case, PenaltyForm::LegacyD4rl, device);
+        case.check_number("legacy_d4rl.weight", weights.iter().map(|&w| f64::from(w)).sum());
+        let kl = decoder_kl(&decoder(&case, device), &policy(&case, device).0, KlDirection::PolicyDecoder);
+        let sum = kl.expect("same kind").sum();
+        case.check_number("legacy_d4rl.kl_sum", number(sum.clone()));
+        let bound = case.number("legacy_clamp");
+        case.check_number("legacy_d4rl.kl_sum_clamped", number(sum.clamp(-bound, bound)));
+        let term = term * case.number("legacy_d4rl_coef");
+        case.check_number("legacy_d4rl.term", number(term.clone()));
+        check_gradients(&case, "grad.legacy_d4rl", &leaves, term);
+    }
+    case.finish(&[]);
 }
 
 #[test]
 fn golden_kl_categorical() {
+    let case = Case::load("kl_categorical");
     check(
-        "kl_categorical",
+        &case,
         &[
             ("off", AlphaKind::Off),
             ("prob_policy_action", AlphaKind::PolicyAction),
             ("prob_own_sample", AlphaKind::OwnSample),
         ],
     );
+    for device in DeviceKind::ALL {
+        let (term, _, leaves) = legacy(&case, PenaltyForm::LegacyCoinrun, device);
+        case.check_number("legacy_coinrun.sum", number(term.clone()));
+        check_gradients(&case, "grad.legacy_coinrun_sum", &leaves, term);
+    }
+    case.finish(&[]);
 }

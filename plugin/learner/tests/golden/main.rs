@@ -6,6 +6,7 @@ mod adam;
 mod case;
 mod gae;
 mod gru;
+mod impala;
 mod kl;
 mod norm;
 mod ppo_loss;

@@ -1,7 +1,7 @@
 //! Running normalisation of observations and rewards.
 
 use crate::case::Case;
-use playbot_learner::norm::{ObsNormalizer, RewardNormalizer};
+use playbot_learner::norm::{ObsNormalizer, RewardNormalizer, RewardReset};
 
 fn normalized(normalizer: &ObsNormalizer, rows: &[f32], dim: usize) -> Vec<f32> {
     let stats = normalizer.snapshot();
@@ -34,22 +34,33 @@ fn golden_norm_obs() {
 #[test]
 fn golden_norm_reward() {
     let case = Case::load("norm_reward");
+    for (reset, variant) in [(RewardReset::AfterStep, "reset_after"), (RewardReset::SameStep, "reset_same_step")] {
+        check_rewards(&case, RewardNormalizer { reset, ..RewardNormalizer::new(case.number("gamma")) }, variant);
+    }
+    case.finish(&[]);
+}
+
+fn check_rewards(case: &Case, fresh: RewardNormalizer, variant: &str) {
     let envs = case.dim("N");
-    let mut normalizer = RewardNormalizer::new(case.number("gamma"));
+    let mut normalizer = fresh.clone();
     let (rewards, dones) = (case.f32s("in.rewards"), case.bools("in.dones"));
-    let (mut scaled, mut mean, mut var) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut scaled, mut mean, mut var, mut returns) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (rewards, dones) in rewards.chunks_exact(envs).zip(dones.chunks_exact(envs)) {
+        // What the variance takes in: with the ends of episodes hidden where these reset afterwards.
+        let mut before = normalizer.clone();
+        let shown = if fresh.reset == RewardReset::AfterStep { &vec![false; envs] } else { dones };
+        before.normalize(rewards, shown, envs).expect("they fit");
+        returns.extend(f32s(&before.returns));
         scaled.extend(normalizer.normalize(rewards, dones, envs).expect("they fit"));
         mean.push(normalizer.stats.mean[0] as f32);
         var.push(normalizer.stats.var[0] as f32);
     }
-    case.check("out.reset_after.normalized", &scaled);
-    case.check("out.reset_after.mean", &mean);
-    case.check("out.reset_after.var", &var);
+    case.check(&format!("out.{variant}.discounted_return"), &returns);
+    case.check(&format!("out.{variant}.normalized"), &scaled);
+    case.check(&format!("out.{variant}.mean"), &mean);
+    case.check(&format!("out.{variant}.var"), &var);
     case.check_number("count_final", normalizer.stats.count);
-    let mut whole = RewardNormalizer::new(case.number("gamma"));
+    let mut whole = fresh;
     assert_eq!(whole.normalize(&rewards, &dones, envs).expect("they fit"), scaled);
     assert_eq!(whole, normalizer);
-    // The returns follow from the variance; the other order of resetting is not offered.
-    case.finish(&["out.reset_same_step", "out.reset_after.discounted_return"]);
 }

@@ -1,11 +1,25 @@
-//! The skill model on state vectors: every intermediate result, the loss, and every gradient.
+//! The skill model on state vectors and on images: every intermediate result, the loss, and every gradient.
 
-use crate::case::{Case, host, number};
+use crate::case::{Case, host, norm, number};
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionRows, Dist, NamedGrads, parameter_count, tracked};
+use playbot_learner::nn::{ActionRows, CnnKind, Dist, NamedGrads, ObsRows, parameter_count, tracked};
 use playbot_learner::rng::Streams;
-use playbot_learner::skill::{SkillNets, skill_loss};
-use playbot_learner::{ActionSpace, Actions, DeviceKind, Reduction, SkillConfig, StdKind};
+use playbot_learner::skill::{SkillForward, SkillNets, skill_loss};
+use playbot_learner::{
+    ActionInput, ActionSpace, Actions, DeviceKind, ImageShape, ObsKind, Reduction, SkillConfig, StdKind,
+};
+
+fn is_image(case: &Case) -> bool {
+    case.has("in.images")
+}
+
+fn observation(case: &Case) -> ObsKind {
+    if !is_image(case) {
+        return ObsKind::Vector(case.dim("obs"));
+    }
+    let [channels, height, width] = case.sizes("image")[..] else { panic!("an image has three sizes") };
+    ObsKind::Image(ImageShape { channels, height, width })
+}
 
 fn config(case: &Case) -> SkillConfig {
     let hidden = case.dim("hidden");
@@ -22,13 +36,19 @@ fn config(case: &Case) -> SkillConfig {
         latent_reg: case.hyper("latent_reg").as_f64().unwrap_or(0.0),
         prior_std: std,
         decoder_std: std,
+        cnn: if is_image(case) {
+            CnnKind::Impala { channels: case.sizes("channels"), feature: case.dim("feat") }
+        } else {
+            CnnKind::default()
+        },
+        action_input: ActionInput::ScaledIndex,
         reduction: if case.hyper("reduction") == "legacy" { Reduction::Legacy } else { Reduction::Standard },
         ..SkillConfig::default()
     }
 }
 
 /// `[B, T, width]` to time-major `[T * B, width]`.
-fn time_major(values: &[f32], batch: usize, steps: usize) -> Vec<f32> {
+fn time_major<T: Copy>(values: &[T], batch: usize, steps: usize) -> Vec<T> {
     let width = values.len() / (batch * steps);
     let row = |t: usize, b: usize| &values[(b * steps + t) * width..(b * steps + t + 1) * width];
     (0..steps * batch).flat_map(|i| row(i / batch, i % batch).to_vec()).collect()
@@ -39,77 +59,164 @@ fn batch_major(values: &[f32], batch: usize, steps: usize) -> Vec<f32> {
     time_major(values, steps, batch)
 }
 
-struct Inputs {
-    states: Vec<f32>,
-    actions: Vec<f32>,
-    eps: Vec<f32>,
+/// One case on one device.
+struct Run<'a> {
+    case: &'a Case,
+    config: SkillConfig,
+    kind: DeviceKind,
+    nets: SkillNets,
+    space: ActionSpace,
+    batch: usize,
+    steps: usize,
 }
 
-fn run(case: &Case, mut nets: SkillNets, inputs: &Inputs, kind: DeviceKind) {
-    let device = kind.plain();
-    let config = config(case);
-    let (batch, steps) = (case.dim("B"), case.dim("T"));
-    let (obs, act) = (case.dim("obs"), case.dim("act"));
-    nets = tracked(&nets);
-    let matrix = |values: &[f32], rows: usize| -> Tensor<2> {
-        Tensor::from_data(TensorData::new(values.to_vec(), [rows, values.len() / rows]), &device)
-    };
-    let states = time_major(&inputs.states, batch, steps);
-    let actions = time_major(&inputs.actions, batch, steps);
-    let first = matrix(&states[..batch * obs], batch);
-    let states = matrix(&states, steps * batch);
-    let encoded = matrix(&actions, steps * batch);
-    let rows = ActionRows::new(&Actions::Continuous { dim: act, values: actions }, &device);
-    let noise = matrix(&inputs.eps, batch);
+impl<'a> Run<'a> {
+    fn new(case: &'a Case, kind: DeviceKind) -> Self {
+        let config = config(case);
+        let space = match is_image(case) {
+            true => ActionSpace::Discrete(case.dim("K")),
+            false => ActionSpace::Continuous(case.dim("act")),
+        };
+        let mut nets =
+            SkillNets::new(&config, observation(case), space, &Streams::new(0), &kind.plain()).expect("they fit");
+        case.fill(&mut nets, "param.", "", kind);
+        Self { case, config, kind, nets: tracked(&nets), space, batch: case.dim("B"), steps: case.dim("T") }
+    }
 
-    if let Dist::Gaussian { mean, log_std } = nets.encoder.forward(states.clone(), encoded.clone(), steps) {
-        case.check("out.enc_mean", &host(mean.clone()));
-        case.check("out.enc_log_std", &host(log_std.clone()));
-        case.check("out.latent", &host(mean + noise.clone() * log_std.exp()));
+    fn matrix(&self, values: &[f32], rows: usize) -> Tensor<2> {
+        Tensor::from_data(TensorData::new(values.to_vec(), [rows, values.len() / rows]), &self.kind.plain())
     }
-    let prior = nets.prior.forward(first.clone()).to_host().expect("readable");
-    case.check("out.prior_mean", &prior.head);
-    case.check("out.prior_log_std", &prior.log_std.expect("Gaussian"));
-    let forward = nets.forward(states, first, &rows, encoded, noise, steps).expect("they fit");
-    case.check("out.decoder_latent", &host(forward.decoder_latent.clone()));
-    case.check("out.kl_per_sequence", &host(forward.kl_per_sequence.clone()));
-    case.check("out.nll_per_step", &batch_major(&host(forward.nll_per_step.clone()), batch, steps));
-    let decoded = forward.decoded.clone().to_host().expect("readable");
-    case.check("out.dec_mean", &batch_major(&decoded.head, batch, steps));
-    case.check("out.dec_log_std", &batch_major(&decoded.log_std.expect("Gaussian"), batch, steps));
 
-    let loss = skill_loss(&forward, &config);
-    case.check_number("nll", number(loss.nll));
-    case.check_number("kl", number(loss.kl));
-    case.check_number("total_loss", number(loss.total.clone()));
-    if config.reduction == Reduction::Legacy {
-        case.check_number("latent_norm", number(loss.latent_norm));
+    fn states(&self) -> ObsRows {
+        let (case, rows) = (self.case, self.steps * self.batch);
+        match observation(case) {
+            ObsKind::Vector(_) => {
+                ObsRows::Vector(self.matrix(&time_major(&case.f32s("in.states"), self.batch, self.steps), rows))
+            }
+            ObsKind::Image(ImageShape { channels, height, width }) => {
+                let pixels = time_major(&case.bytes("in.images"), self.batch, self.steps);
+                ObsRows::pixels(pixels, [rows, channels, height, width], &self.kind.plain())
+            }
+        }
     }
-    let grads = NamedGrads::read(&mut nets, "", &loss.total.backward()).expect("readable");
-    for (name, values) in grads.iter() {
-        case.check_parameter("grad.", name, values);
+
+    /// The actions, time-major.
+    fn actions(&self) -> Actions {
+        match self.space {
+            ActionSpace::Discrete(_) => {
+                let all: Vec<u32> = self.case.indices("in.actions").into_iter().map(|a| a as u32).collect();
+                Actions::Discrete(time_major(&all, self.batch, self.steps))
+            }
+            ActionSpace::Continuous(dim) => {
+                let values = time_major(&self.case.f32s("in.actions"), self.batch, self.steps);
+                Actions::Continuous { dim, values }
+            }
+        }
     }
-    case.check_number("grad_norm.total", grads.norm());
+
+    fn run(mut self) {
+        let (case, steps) = (self.case, self.steps);
+        let (states, actions) = (self.states(), self.actions());
+        let encoded = self.matrix(&self.config.action_input.encode(&actions, self.space), steps * self.batch);
+        let noise = self.matrix(&case.f32s("in.eps"), self.batch);
+        self.check_inner(&states, &encoded, &noise);
+
+        let rows = ActionRows::new(&actions, &self.kind.plain());
+        let forward = self.nets.forward(&states, &rows, encoded, noise, steps).expect("they fit");
+        self.check_forward(&states, &forward);
+        let loss = skill_loss(&forward, &self.config);
+        case.check_number("nll", number(loss.nll));
+        case.check_number("kl", number(loss.kl));
+        case.check_number("total_loss", number(loss.total.clone()));
+        if self.config.reduction == Reduction::Legacy {
+            case.check_number("latent_norm", number(loss.latent_norm));
+            case.check_number("nll_unclamped", number(forward.nll_per_step.mean()));
+            case.check_number("kl_unclamped", number(forward.kl_per_sequence.sum()));
+        }
+        let grads = NamedGrads::read(&mut self.nets, "", &loss.total.backward()).expect("readable");
+        self.check_gradients(&grads);
+    }
+
+    /// What the networks compute on their way.
+    fn check_inner(&self, states: &ObsRows, encoded: &Tensor<2>, noise: &Tensor<2>) {
+        let (case, nets) = (self.case, &self.nets);
+        if case.has("out.enc_feature") {
+            let summary = nets.encoder.summary(states, encoded.clone(), self.steps).expect("they fit");
+            case.check("out.enc_feature", &host(summary));
+        }
+        let posterior = nets.encoder.forward(states, encoded.clone(), self.steps).expect("they fit");
+        if let Dist::Gaussian { mean, log_std } = posterior {
+            case.check("out.enc_mean", &host(mean.clone()));
+            case.check("out.enc_log_std", &host(log_std.clone()));
+            case.check("out.latent", &host(mean + noise.clone() * log_std.exp()));
+        }
+        let seen = nets.prior.observe(&states.first(self.batch)).expect("they fit");
+        if is_image(case) {
+            let batch_major = |x: Tensor<2>| batch_major(&host(x), self.batch, self.steps);
+            case.check("out.prior_image_features", &host(seen.clone()));
+            let features = nets.encoder.state.forward(states).expect("they fit");
+            case.check("out.enc_image_features", &batch_major(features));
+            case.check("out.dec_image_features", &batch_major(nets.decoder.observe(states).expect("they fit")));
+        }
+        let prior = nets.prior.forward(seen).to_host().expect("readable");
+        case.check("out.prior_mean", &prior.head);
+        case.check("out.prior_log_std", &prior.log_std.expect("Gaussian"));
+    }
+
+    fn check_forward(&self, states: &ObsRows, forward: &SkillForward) {
+        let case = self.case;
+        let batch_major = |values: &[f32]| batch_major(values, self.batch, self.steps);
+        case.check("out.decoder_latent", &host(forward.decoder_latent.clone()));
+        case.check("out.kl_per_sequence", &host(forward.kl_per_sequence.clone()));
+        case.check("out.nll_per_step", &batch_major(&host(forward.nll_per_step.clone())));
+        let decoded = forward.decoded.clone().to_host().expect("readable");
+        if let Some(log_std) = decoded.log_std {
+            case.check("out.dec_mean", &batch_major(&decoded.head));
+            case.check("out.dec_log_std", &batch_major(&log_std));
+            return;
+        }
+        // The decoder normalises its logits at once; here is what it normalises.
+        let (net, seen) = (&self.nets.decoder.net, self.nets.decoder.observe(states).expect("they fit"));
+        let hidden = net.features_held(forward.decoder_latent.clone(), seen, self.steps);
+        case.check("out.logits", &batch_major(&host(net.head.forward(hidden))));
+    }
+
+    fn check_gradients(&self, grads: &NamedGrads) {
+        let case = self.case;
+        for (name, values) in grads.iter() {
+            case.check_parameter("grad.", name, values);
+            case.check_norm("grad_norm.", name, values);
+        }
+        case.check_number("grad_norm.total", grads.norm());
+        if is_paper_size(case) {
+            for (theirs, ours) in [("enc", "encoder."), ("dec", "decoder."), ("prior", "prior.")] {
+                let part = grads.iter().filter(|(name, _)| name.starts_with(ours));
+                let squares: f64 = part.map(|(_, values)| norm(values).powi(2)).sum();
+                case.check_number(&format!("grad_norm.{theirs}"), squares.sqrt());
+            }
+        }
+    }
+}
+
+/// The one case that gives its sizes and norms for each network.
+fn is_paper_size(case: &Case) -> bool {
+    case.dim("hidden") == 200
 }
 
 fn check(name: &str) {
     let case = Case::load(name);
-    let space = ActionSpace::Continuous(case.dim("act"));
-    let inputs = Inputs { states: case.f32s("in.states"), actions: case.f32s("in.actions"), eps: case.f32s("in.eps") };
     for kind in DeviceKind::ALL {
-        let mut nets = SkillNets::new(&config(&case), case.dim("obs"), space, &Streams::new(0), &kind.plain());
-        case.fill(&mut nets, "param.", "", kind);
-        if case.dim("hidden") == 200 {
-            case.check_number("param_count.enc", parameter_count(&nets.encoder) as f64);
-            case.check_number("param_count.dec", parameter_count(&nets.decoder) as f64);
-            case.check_number("param_count.prior", parameter_count(&nets.prior) as f64);
+        let run = Run::new(&case, kind);
+        if is_paper_size(&case) {
+            case.check_number("param_count.enc", parameter_count(&run.nets.encoder) as f64);
+            case.check_number("param_count.dec", parameter_count(&run.nets.decoder) as f64);
+            case.check_number("param_count.prior", parameter_count(&run.nets.prior) as f64);
         } else {
-            case.check_number("param_count", parameter_count(&nets) as f64);
+            case.check_number("param_count", parameter_count(&run.nets) as f64);
         }
-        run(&case, nets, &inputs, kind);
+        run.run();
     }
-    // Single norms follow from the gradients; unclamped terms are not kept; the feature is an inner step.
-    case.finish(&["grad_norm.", "nll_unclamped", "kl_unclamped", "out.enc_feature"]);
+    case.finish(&[]);
 }
 
 #[test]
@@ -145,4 +252,14 @@ fn golden_vae_state_deep_tanh() {
 #[test]
 fn golden_vae_paper_size() {
     check("vae_paper_size");
+}
+
+#[test]
+fn golden_vae_image_small() {
+    check("vae_image_small");
+}
+
+#[test]
+fn golden_vae_image_small_legacy() {
+    check("vae_image_small_legacy");
 }

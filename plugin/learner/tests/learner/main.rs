@@ -4,6 +4,8 @@ mod checkpoint;
 mod corridor;
 mod determinism;
 mod errors;
+mod files;
+mod images;
 mod point;
 mod sac;
 mod score;

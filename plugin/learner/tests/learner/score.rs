@@ -1,11 +1,12 @@
 //! SCORE-PPO: the policy starts as the decoder, stays near it if it must, and each switch works.
 
 use crate::corridor;
-use crate::skill::corridor_demos;
+use crate::skill::{continuous_demos, corridor_demos};
 use crate::toy::{Driver, OBS};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    DeviceKind, LearnError, PpoConfig, PpoLearner, PriorKind, ScoreConfig, SkillModel, SkillTrainer,
+    Actions, DeviceKind, LearnError, PenaltyForm, PpoConfig, PpoLearner, PriorKind, Rollout, ScoreConfig, SkillModel,
+    SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -68,6 +69,55 @@ fn the_penalty_holds_the_policy_back() {
     assert!(held < 0.3 * free, "with one it stays: {held} of {free}");
 }
 
+/// Actions of the policy for random observations and skills, with rewards that mean nothing.
+fn aimless_rollout(learner: &PpoLearner, update: u64) -> Rollout {
+    let (steps, envs) = (32, 4);
+    let rows = steps * envs;
+    let mut rng = Streams::new(2).stream("aimless", update);
+    let mut draw = |n: usize| -> Vec<f32> { (0..n).map(|_| normal(&mut rng)).collect() };
+    let (z, obs, rewards) = (draw(rows * 2), draw(rows), draw(rows));
+    let output = learner.policy().forward(&z, &obs, rows).expect("finite");
+    let mut actions = Actions::Continuous { dim: 2, values: Vec::new() };
+    let mut log_probs = Vec::new();
+    for row in 0..rows {
+        let (action, log_prob) = output.sample(row, &mut rng);
+        actions.push(&action).expect("continuous");
+        log_probs.push(log_prob);
+    }
+    Rollout {
+        steps,
+        obs,
+        z,
+        actions,
+        log_probs,
+        values: output.values,
+        rewards,
+        terminated: vec![false; rows],
+        truncated: vec![false; rows],
+        final_values: vec![0.0; rows],
+        next_values: vec![0.0; envs],
+        ..Rollout::new(envs, 1, 2, &learner.spec().action_space)
+    }
+}
+
+#[test]
+fn the_legacy_penalty_for_mazes_drives_the_policy_away() {
+    let trainer = SkillTrainer::new(crate::skill::config(), continuous_demos(), 1, DeviceKind::Flex);
+    let model = trainer.expect("windows fit").into_model();
+    let divergence = |penalty, kl_coef| {
+        let score = ScoreConfig { penalty, kl_coef, ..ScoreConfig::default() };
+        let mut learner = learner(corridor::config(), score, &model);
+        let updates = (0..6).map(|i| {
+            let rollout = aimless_rollout(&learner, i);
+            learner.update(&rollout).expect("finite").decoder_kl.expect("penalised")
+        });
+        updates.last().expect("six of them")
+    };
+    let free = divergence(PenaltyForm::Mean, 0.0);
+    let (held, driven) = (divergence(PenaltyForm::Mean, 10.0), divergence(PenaltyForm::LegacyD4rl, 0.001));
+    assert!(held < 0.5 * free && driven > 2.0 * free, "{held} held, {free} free, {driven} as released");
+}
+
 #[test]
 fn score_solves_the_corridor_from_the_first_rollout() {
     let model = model(8);
@@ -93,6 +143,8 @@ fn every_switch_works() {
         ScoreConfig { prior: PriorKind::StandardNormal, ..base() },
         ScoreConfig { alpha: playbot_learner::AlphaKind::PolicyAction, ..base() },
         ScoreConfig { kl_direction: playbot_learner::KlDirection::PolicyDecoder, ..base() },
+        ScoreConfig { alpha: playbot_learner::AlphaKind::BoundedDensity, ..base() },
+        ScoreConfig { penalty: PenaltyForm::LegacyCoinrun, ..base() },
     ] {
         let mut learner = learner(corridor::config(), score.clone(), &model);
         let rollout = Driver::new(4, 1).rollout(&learner, 16);
@@ -100,6 +152,9 @@ fn every_switch_works() {
         let metrics = learner.update(&rollout).expect("finite");
         assert_eq!(metrics.decoder_kl.is_some(), score.kl);
     }
+    let bad = ScoreConfig { penalty: PenaltyForm::LegacyD4rl, ..base() };
+    let error = PpoLearner::with_skill(corridor::config(), bad, &model, 1, DeviceKind::Flex);
+    assert!(error.expect_err("discrete actions").to_string().contains("LegacyD4rl is for continuous actions"));
     let bad = ScoreConfig { init_from_decoder: true, ..unconditioned };
     let error = PpoLearner::with_skill(corridor::config(), bad, &model, 1, DeviceKind::Flex);
     assert!(matches!(error, Err(LearnError::Config(_))));

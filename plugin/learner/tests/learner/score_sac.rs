@@ -90,7 +90,7 @@ fn continuous_model() -> SkillModel {
         let mut rng = streams.stream("demo", i);
         let observations: Vec<f32> = (0..20).map(|_| normal(&mut rng)).collect();
         let values = observations.iter().flat_map(|x| [0.5 * x, -x]).collect();
-        DemoEpisode { observations, actions: Actions::Continuous { dim: 2, values } }
+        DemoEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
     });
     let data = Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent");
     let mut trainer = SkillTrainer::new(crate::skill::config(), data, 3, DeviceKind::Flex).expect("windows fit");

@@ -34,7 +34,7 @@ pub fn corridor_demos(episodes: u64) -> Dataset {
             actions.push(action);
             let (_, end, cut) = corridor.step(action);
             if end || cut {
-                return DemoEpisode { observations, actions: Actions::Discrete(actions) };
+                return DemoEpisode { observations: observations.into(), actions: Actions::Discrete(actions) };
             }
         }
     });
@@ -89,8 +89,8 @@ fn walks(model: &SkillModel) -> f64 {
 /// Two kinds of players, who always press 0 or always 1 whatever they see: only z can tell them apart.
 #[test]
 fn skills_keep_players_apart() {
-    let episodes =
-        (0..60).map(|i| DemoEpisode { observations: vec![1.0; 20], actions: Actions::Discrete(vec![i % 2; 20]) });
+    let episodes = (0..60)
+        .map(|i| DemoEpisode { observations: vec![1.0; 20].into(), actions: Actions::Discrete(vec![i % 2; 20]) });
     let data = Dataset::new(1, ActionSpace::Discrete(2), episodes.collect()).expect("consistent");
     let mut trainer = SkillTrainer::new(config(), data, 3, DeviceKind::Flex).expect("windows fit");
     let history = train(&mut trainer, 25);
@@ -107,17 +107,21 @@ fn skills_keep_players_apart() {
     assert!((n / 5..4 * n / 5).contains(&ones), "{ones} of {n} skills press 1");
 }
 
-#[test]
-fn continuous_actions_are_learned_too() {
+/// Players whose two actions are half of and minus what they see.
+pub fn continuous_demos() -> Dataset {
     let streams = Streams::new(5);
     let episodes = (0..60).map(|i| {
         let mut rng = streams.stream("demo", i);
         let observations: Vec<f32> = (0..20).map(|_| normal(&mut rng)).collect();
         let values = observations.iter().flat_map(|x| [0.5 * x, -x]).collect();
-        DemoEpisode { observations, actions: Actions::Continuous { dim: 2, values } }
+        DemoEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
     });
-    let data = Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent");
-    let mut trainer = SkillTrainer::new(config(), data, 3, DeviceKind::Flex).expect("windows fit");
+    Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent")
+}
+
+#[test]
+fn continuous_actions_are_learned_too() {
+    let mut trainer = SkillTrainer::new(config(), continuous_demos(), 3, DeviceKind::Flex).expect("windows fit");
     let history = train(&mut trainer, 30);
     assert!(history[29].nll < history[0].nll - 8.0, "{} to {}", history[0].nll, history[29].nll);
     assert_eq!(history[29].accuracy, None);

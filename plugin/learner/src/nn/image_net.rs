@@ -1,0 +1,201 @@
+//! The network that turns images into features, of either architecture.
+
+use super::params::{ParamVisitor, Parameters};
+use super::{Activation, Impala, Linear, Nature};
+use crate::{ImageShape, LearnError, ObsKind};
+use burn::tensor::{Device, Tensor};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// Architecture and sizes of an [`ImageNet`].
+#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
+#[serde(deny_unknown_fields)]
+pub enum CnnKind {
+    /// The residual network of IMPALA, the paper's.
+    Impala {
+        /// Channels of each stage.
+        #[serde(default = "impala_channels")]
+        channels: Vec<usize>,
+        /// Features.
+        #[serde(default = "impala_feature")]
+        feature: usize,
+    },
+    /// The three convolutions of the first deep Q-network; needs images of at least 36×36 pixels.
+    Nature {
+        /// Features.
+        #[serde(default = "nature_feature")]
+        feature: usize,
+    },
+}
+
+fn impala_channels() -> Vec<usize> {
+    vec![16, 32, 32]
+}
+
+fn impala_feature() -> usize {
+    256
+}
+
+fn nature_feature() -> usize {
+    512
+}
+
+impl Default for CnnKind {
+    fn default() -> Self {
+        Self::Impala { channels: impala_channels(), feature: impala_feature() }
+    }
+}
+
+impl CnnKind {
+    /// Numbers that an image becomes.
+    pub fn features(&self) -> usize {
+        match self {
+            Self::Impala { feature, .. } | Self::Nature { feature } => *feature,
+        }
+    }
+
+    /// The smallest of the sizes, which must not be 0.
+    pub(crate) fn smallest(&self) -> usize {
+        match self {
+            Self::Impala { channels, feature } => channels.iter().copied().min().unwrap_or(1).min(*feature),
+            Self::Nature { feature } => *feature,
+        }
+    }
+}
+
+/// Images to features.
+#[derive(Clone, Debug)]
+pub enum ImageNet {
+    /// The residual network of IMPALA.
+    Impala(Impala),
+    /// The network of the first deep Q-network.
+    Nature(Nature),
+}
+
+impl ImageNet {
+    /// Starting weights, orthogonal; for images of `image`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the image is too small for the architecture, or a size is 0.
+    pub fn new<R: Rng + ?Sized>(
+        kind: &CnnKind,
+        image: ImageShape,
+        rng: &mut R,
+        device: &Device,
+    ) -> Result<Self, LearnError> {
+        if image.numbers() == 0 || kind.smallest() == 0 {
+            return Err(LearnError::Config(format!("a cnn {kind:?} over {} has a size of 0", ObsKind::Image(image))));
+        }
+        match kind {
+            CnnKind::Impala { channels, feature } => {
+                Ok(Self::Impala(Impala::new(channels, *feature, image, rng, device)))
+            }
+            CnnKind::Nature { feature } => {
+                let net = Nature::new(*feature, image, rng, device).map(Self::Nature);
+                net.ok_or_else(|| {
+                    let image = ObsKind::Image(image);
+                    LearnError::Config(format!("cnn Nature needs at least 36 rows and columns, not {image}"))
+                })
+            }
+        }
+    }
+
+    /// Numbers that an image becomes.
+    pub fn features(&self) -> usize {
+        let [_, features] = self.fc().weight.dims();
+        features
+    }
+
+    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`.
+    pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
+        match self {
+            Self::Impala(net) => net.forward(pixels),
+            Self::Nature(net) => net.forward(pixels),
+        }
+    }
+
+    fn fc(&self) -> &Linear {
+        match self {
+            Self::Impala(net) => &net.fc,
+            Self::Nature(net) => &net.fc,
+        }
+    }
+}
+
+/// ReLU of `fc` over the channels, rows and columns of `x`, in this order.
+pub(super) fn last_layer(fc: &Linear, x: Tensor<4>) -> Tensor<2> {
+    let flat: Tensor<2> = x.flatten(1, 3);
+    let [n, _] = flat.dims();
+    // Matrix libraries sum a single row in another order than the rows of a matrix; an image's features shall not
+    // depend on the others in the batch.
+    let flat = if n == 1 { flat.repeat_dim(0, 2) } else { flat };
+    Activation::Relu.forward(fc.forward(flat)).narrow(0, 0, n)
+}
+
+impl Parameters for ImageNet {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        match self {
+            Self::Impala(net) => net.visit(prefix, visitor),
+            Self::Nature(net) => net.visit(prefix, visitor),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{ObsRows, host, parameter_count};
+    use crate::rng::Streams;
+
+    fn net(kind: &CnnKind, channels: usize, height: usize, width: usize) -> Result<ImageNet, LearnError> {
+        let image = ImageShape { channels, height, width };
+        ImageNet::new(kind, image, &mut Streams::new(1).stream("net", 0), &DeviceKind::Flex.plain())
+    }
+
+    #[test]
+    fn any_size_that_fits_gives_features_of_a_sensible_size() {
+        let impala = CnnKind::Impala { channels: vec![4, 8, 8], feature: 24 };
+        let nature = CnnKind::Nature { feature: 24 };
+        for (kind, channels, height, width) in
+            [(&impala, 3, 64, 64), (&impala, 1, 17, 33), (&impala, 2, 1, 1), (&nature, 4, 84, 84), (&nature, 3, 36, 41)]
+        {
+            let net = net(kind, channels, height, width).expect("it fits");
+            let pixels = (0..2 * channels * height * width).map(|i| (i * 37 % 256) as u8).collect();
+            let shape = [2, channels, height, width];
+            let ObsRows::Image(x) = ObsRows::pixels(pixels, shape, &DeviceKind::Flex.plain()) else {
+                panic!("made of pixels");
+            };
+            let features = net.forward(x);
+            assert_eq!(features.dims(), [2, net.features()]);
+            let features = host(features).expect("readable");
+            assert!(features.iter().all(|x| (0.0..100.0).contains(x)), "{features:?}");
+            assert!(features.iter().any(|x| *x > 1e-3), "dead from the start: {features:?}");
+        }
+    }
+
+    #[test]
+    fn published_sizes() {
+        let count = |kind: CnnKind, side| parameter_count(&net(&kind, 3, side, side).expect("it fits"));
+        assert_eq!(count(CnnKind::default(), 64), 622_144);
+        // 32·(3·64 + 1) + 64·(32·16 + 1) + 64·(64·9 + 1) + 512·(64·4·4 + 1)
+        assert_eq!(count(CnnKind::Nature { feature: 512 }, 64), 600_736);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error() {
+        let nature = CnnKind::Nature { feature: 8 };
+        let error = net(&nature, 3, 64, 35).expect_err("too narrow").to_string();
+        assert!(error.contains("36") && error.contains("35 columns"), "{error}");
+        let empty = CnnKind::Impala { channels: vec![16, 0], feature: 8 };
+        assert!(matches!(net(&empty, 3, 64, 64), Err(LearnError::Config(_))));
+        assert!(matches!(net(&CnnKind::default(), 0, 64, 64), Err(LearnError::Config(_))));
+    }
+
+    #[test]
+    fn settings_have_defaults_and_no_unknown_names() {
+        let kind: CnnKind = serde_json::from_str(r#"{"Impala":{"feature":64}}"#).expect("the rest is default");
+        assert_eq!(kind, CnnKind::Impala { channels: vec![16, 32, 32], feature: 64 });
+        assert!(serde_json::from_str::<CnnKind>(r#"{"Nature":{"features":64}}"#).is_err());
+    }
+}

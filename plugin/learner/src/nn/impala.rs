@@ -1,0 +1,103 @@
+//! The image encoder of IMPALA.
+
+use super::conv::{Conv2d, max_pool, window_places};
+use super::image_net::last_layer;
+use super::params::{ParamVisitor, Parameters, path};
+use super::{Activation, Linear};
+use crate::ImageShape;
+use burn::tensor::{Device, Tensor};
+use rand::Rng;
+
+/// Stages of convolution, pooling and residual blocks, then a linear layer (Espeholt et al. 2018, "IMPALA", the larger
+/// of its two networks, without its recurrent part).
+#[derive(Clone, Debug)]
+pub struct Impala {
+    /// The stages, from the image up; each halves the sides.
+    pub stages: Vec<ImpalaStage>,
+    /// The last layer, over the last stage's channels, rows and columns.
+    pub fc: Linear,
+}
+
+/// A 3×3 convolution, max-pooling of 3×3 at every second pixel, and two residual blocks.
+#[derive(Clone, Debug)]
+pub struct ImpalaStage {
+    /// Changes the number of channels.
+    pub conv: Conv2d,
+    /// The residual blocks.
+    pub blocks: [ResidualBlock; 2],
+}
+
+/// x + conv1(relu(conv0(relu(x)))), both convolutions 3×3.
+#[derive(Clone, Debug)]
+pub struct ResidualBlock {
+    /// The first convolution.
+    pub conv0: Conv2d,
+    /// The second.
+    pub conv1: Conv2d,
+}
+
+impl Impala {
+    /// One stage per entry of `channels`. Orthogonal weights with gain 1 in the convolutions (the residual blocks would
+    /// double the variance again and again with √2) and √2 in the last layer.
+    pub fn new<R: Rng + ?Sized>(
+        channels: &[usize],
+        feature: usize,
+        image: ImageShape,
+        rng: &mut R,
+        device: &Device,
+    ) -> Self {
+        let (mut inputs, mut height, mut width) = (image.channels, image.height, image.width);
+        let mut stages = Vec::with_capacity(channels.len());
+        // A side of at least one pixel stays one.
+        let pooled = |side: usize| window_places(side, 3, 2, 1).unwrap_or(1);
+        for &outputs in channels {
+            stages.push(ImpalaStage::new(inputs, outputs, rng, device));
+            (inputs, height, width) = (outputs, pooled(height), pooled(width));
+        }
+        let fc = Linear::new(inputs * height * width, feature, std::f64::consts::SQRT_2, rng, device);
+        Self { stages, fc }
+    }
+
+    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
+    pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
+        let x = self.stages.iter().fold(pixels, |x, stage| stage.forward(x));
+        last_layer(&self.fc, Activation::Relu.forward(x))
+    }
+}
+
+impl ImpalaStage {
+    fn new<R: Rng + ?Sized>(inputs: usize, outputs: usize, rng: &mut R, device: &Device) -> Self {
+        let mut conv = |inputs| Conv2d::new(inputs, outputs, 3, 1.0, rng, device).with_padding(1);
+        let first = conv(inputs);
+        let mut block = || ResidualBlock { conv0: conv(outputs), conv1: conv(outputs) };
+        Self { conv: first, blocks: [block(), block()] }
+    }
+
+    /// `[n, inputs, height, width]` to `[n, outputs, ⌈height/2⌉, ⌈width/2⌉]`.
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let pooled = max_pool(self.conv.forward(x), 3, 2, 1);
+        self.blocks.iter().fold(pooled, |x, block| block.forward(x))
+    }
+}
+
+impl ResidualBlock {
+    fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let inner = self.conv0.forward(Activation::Relu.forward(x.clone()));
+        x + self.conv1.forward(Activation::Relu.forward(inner))
+    }
+}
+
+impl Parameters for Impala {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        for (i, stage) in self.stages.iter_mut().enumerate() {
+            let name = path(prefix, &format!("s{i}"));
+            stage.conv.visit(&path(&name, "conv"), visitor);
+            for (k, block) in stage.blocks.iter_mut().enumerate() {
+                let name = path(&name, &format!("res{k}"));
+                block.conv0.visit(&path(&name, "conv0"), visitor);
+                block.conv1.visit(&path(&name, "conv1"), visitor);
+            }
+        }
+        self.fc.visit(&path(prefix, "fc"), visitor);
+    }
+}

@@ -1,0 +1,55 @@
+//! Observations on a device.
+
+use super::matrix;
+use crate::{ObsKind, Observations};
+use burn::tensor::{DType, Device, Int, Tensor, TensorData};
+
+/// A batch of observations on a device, one per row.
+#[derive(Clone, Debug)]
+pub enum ObsRows {
+    /// `[n, width]`.
+    Vector(Tensor<2>),
+    /// Pixels divided by 255, `[n, channels, height, width]`.
+    Image(Tensor<4>),
+}
+
+impl ObsRows {
+    /// Moves whole observations of `kind` to `device`. Pixels go over as bytes and become numbers there.
+    pub(crate) fn new(observations: Observations, kind: &ObsKind, device: &Device) -> Self {
+        let rows = observations.numbers() / kind.numbers().max(1);
+        match (observations, kind) {
+            (Observations::Vector(values), _) => Self::Vector(matrix(values, rows, kind.numbers(), device)),
+            (Observations::Image(pixels), ObsKind::Image(shape)) => {
+                Self::pixels(pixels, [rows, shape.channels, shape.height, shape.width], device)
+            }
+            (Observations::Image(_), ObsKind::Vector(_)) => {
+                unreachable!("observations are checked to be of their kind")
+            }
+        }
+    }
+
+    /// Images from their pixels, row-major in `shape` = `[n, channels, height, width]`.
+    ///
+    /// # Panics
+    /// If the number of pixels is not that of the shape.
+    pub fn pixels(pixels: Vec<u8>, shape: [usize; 4], device: &Device) -> Self {
+        let bytes: Tensor<4, Int> = Tensor::from_data(TensorData::new(pixels, shape), (device, DType::U8));
+        Self::Image(bytes.float() / 255.0)
+    }
+
+    /// Number of observations.
+    pub fn rows(&self) -> usize {
+        match self {
+            Self::Vector(x) => x.dims()[0],
+            Self::Image(x) => x.dims()[0],
+        }
+    }
+
+    /// The first `n`.
+    pub fn first(&self, n: usize) -> Self {
+        match self {
+            Self::Vector(x) => Self::Vector(x.clone().narrow(0, 0, n)),
+            Self::Image(x) => Self::Image(x.clone().narrow(0, 0, n)),
+        }
+    }
+}

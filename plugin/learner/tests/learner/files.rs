@@ -1,0 +1,123 @@
+//! Files that do not fit say what is wrong with them, by name.
+
+use crate::corridor::config as ppo_config;
+use crate::score::model;
+use crate::skill::{config, corridor_demos};
+use playbot_learner::{DeviceKind, FileError, PpoLearner, ScoreConfig, SkillModel, SkillTrainer};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+type Load = fn(&Path) -> Result<(), FileError>;
+
+/// A file of each kind, what reads it, and the name of a tensor in it.
+fn files(folder: &Path) -> Vec<(PathBuf, Load, &'static str)> {
+    let paths = ["skill", "trainer", "ppo"].map(|name| folder.join(name));
+    let model = model(1);
+    model.save(&paths[0]).expect("written");
+    let mut trainer = SkillTrainer::new(config(), corridor_demos(20), 1, DeviceKind::Flex).expect("windows fit");
+    trainer.train_batch().expect("finite");
+    trainer.save(&paths[1]).expect("written");
+    let learner = PpoLearner::with_skill(ppo_config(), ScoreConfig::default(), &model, 1, DeviceKind::Flex);
+    learner.expect("good settings").save(&paths[2]).expect("written");
+    let [skill, checkpoint, ppo] = paths;
+    vec![
+        (skill, |path| SkillModel::load(path, DeviceKind::Flex).map(drop), "encoder.gru.l0.bias_hh"),
+        (
+            checkpoint,
+            |path| SkillTrainer::load(path, corridor_demos(20), DeviceKind::Flex).map(drop),
+            "adam.m.decoder.l1.weight",
+        ),
+        (ppo, |path| PpoLearner::load(path, DeviceKind::Flex).map(drop), "prior.head.weight"),
+    ]
+}
+
+/// A file's header and tensors, to be changed.
+struct Contents {
+    description: String,
+    tensors: BTreeMap<String, (Vec<usize>, Dtype, Vec<u8>)>,
+}
+
+impl Contents {
+    fn read(path: &Path) -> Self {
+        let bytes = std::fs::read(path).expect("readable");
+        let (_, header) = SafeTensors::read_metadata(&bytes).expect("safetensors");
+        let description = header.metadata().as_ref().expect("a description")["playbot"].clone();
+        let file = SafeTensors::deserialize(&bytes).expect("safetensors");
+        let tensors = file
+            .iter()
+            .map(|(name, view)| (name.to_owned(), (view.shape().to_vec(), view.dtype(), view.data().to_vec())))
+            .collect();
+        Self { description, tensors }
+    }
+
+    fn write(&self, path: &Path) {
+        let views = self.tensors.iter().map(|(name, (shape, dtype, bytes))| {
+            (name, TensorView::new(*dtype, shape.clone(), bytes).expect("as many bytes as numbers"))
+        });
+        let header = HashMap::from([("playbot".to_owned(), self.description.clone())]);
+        std::fs::write(path, safetensors::serialize(views, Some(header)).expect("names differ")).expect("written");
+    }
+}
+
+/// What reading the file says after `change`.
+fn after(path: &Path, load: Load, change: impl Fn(&mut Contents)) -> FileError {
+    let mut contents = Contents::read(path);
+    change(&mut contents);
+    let changed = path.with_extension("changed");
+    contents.write(&changed);
+    load(&changed).expect_err("changed for the worse")
+}
+
+#[test]
+fn missing_extra_and_misshapen_tensors_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (path, load, tensor) in files(folder.path()) {
+        load(&path).expect("whole");
+        let error = after(&path, load, |c| drop(c.tensors.remove(tensor)));
+        assert!(matches!(&error, FileError::MissingTensor { name, .. } if name == tensor), "{error}");
+        let error = after(&path, load, |c| {
+            c.tensors.insert("decoder.l7.bias".to_owned(), (vec![1], Dtype::F32, vec![0; 4]));
+        });
+        assert!(matches!(&error, FileError::ExtraTensor { name, .. } if name == "decoder.l7.bias"), "{error}");
+        let error = after(&path, load, |c| c.tensors.get_mut(tensor).expect("there").0.insert(0, 1));
+        assert!(matches!(&error, FileError::WrongShape { name, .. } if name == tensor), "{error}");
+        let error = after(&path, load, |c| c.tensors.get_mut(tensor).expect("there").1 = Dtype::I32);
+        assert!(error.to_string().contains(tensor) && error.to_string().contains("I32"), "{error}");
+    }
+}
+
+#[test]
+fn a_file_of_a_newer_version_or_another_kind_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (path, load, _) in files(folder.path()) {
+        let newer = |c: &mut Contents| {
+            // What a newer version has added must not be what is complained about.
+            c.description = c.description.replacen(r#""version":1"#, r#""version":2,"colour":"red""#, 1);
+        };
+        let error = after(&path, load, newer).to_string();
+        assert!(error.contains("newer version of playbot") && error.contains("format 2, this one reads 1"), "{error}");
+        assert!(error.contains("update"), "{error}");
+        let older = |c: &mut Contents| c.description = c.description.replacen(r#""version":1"#, r#""version":0"#, 1);
+        let error = after(&path, load, older).to_string();
+        assert!(error.contains("older version of playbot"), "{error}");
+        let foreign = |c: &mut Contents| c.description = c.description.replacen(r#""kind":""#, r#""kind":"other "#, 1);
+        let error = after(&path, load, foreign).to_string();
+        assert!(error.contains("kind `other ") && error.contains("expected `"), "{error}");
+    }
+}
+
+#[test]
+fn a_skill_model_from_before_there_were_images_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("skill");
+    let model = model(1);
+    model.save(&path).expect("written");
+    let mut contents = Contents::read(&path);
+    let old = contents.description.replacen(r#""observation":"#, r#""obs_dim":"#, 1);
+    assert_ne!(old, contents.description);
+    contents.description = old;
+    contents.write(&path);
+    let back = SkillModel::load(&path, DeviceKind::Flex).expect("an older file");
+    assert_eq!(back.observation(), model.observation());
+}
