@@ -105,7 +105,7 @@ fn torn_and_foreign_files_are_explained() {
     let file = folder.path().join("checkpoint");
     learner(563).save(&file).expect("writable");
     let error = PolicyFile::load(&file, DeviceKind::Flex).expect_err("a checkpoint").to_string();
-    assert!(error.contains("expected a policy"), "{error}");
+    assert!(error.contains("expected `policy`"), "{error}");
 }
 
 #[test]

@@ -125,7 +125,7 @@ impl CliError {
 
 /// A setting can be put right by the caller; a loss that is no number cannot.
 fn learn_code(error: &LearnError) -> u8 {
-    if matches!(error, LearnError::NotFinite { .. }) { 2 } else { 3 }
+    if error.is_divergence() { 2 } else { 3 }
 }
 
 fn run_code(error: &RunError) -> u8 {

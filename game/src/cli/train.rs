@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
-    learner::{DeviceKind, LearnError, SkillModel},
+    learner::{DeviceKind, SkillModel},
     train::{
         Algorithm, Experiment, Trainer, UpdateReport,
         checkpoint::Which,
@@ -165,7 +165,7 @@ fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
 /// The error of a training, with the checkpoint that is left if its numbers ran away.
 fn stopped_by(run: &RunDir, error: TrainError) -> CliError {
     match (&error, run.checkpoint(Which::Last)) {
-        (TrainError::Learn(LearnError::NotFinite { .. }), Ok(checkpoint)) => {
+        (TrainError::Learn(learn), Ok(checkpoint)) if learn.is_divergence() => {
             CliError::Diverged { error: error.into(), step: checkpoint.summary.step, checkpoint: checkpoint.path }
         }
         _ => error.into(),

@@ -14,6 +14,16 @@ pub enum LearnError {
         /// Optimizer steps done before.
         steps: u64,
     },
+    /// A loss has grown beyond all bounds.
+    #[error("`{tensor}` has exploded: it is {value:e} after {steps} optimizer steps")]
+    Exploded {
+        /// Name of the loss.
+        tensor: String,
+        /// Its value.
+        value: f32,
+        /// Optimizer steps done before.
+        steps: u64,
+    },
     /// A configuration value that cannot work.
     #[error("config: {0}")]
     Config(String),
@@ -50,6 +60,11 @@ pub enum LearnError {
 }
 
 impl LearnError {
+    /// Whether numbers ran away, which no change of the call can cure, but other settings may.
+    pub fn is_divergence(&self) -> bool {
+        matches!(self, Self::NotFinite { .. } | Self::Exploded { .. })
+    }
+
     /// `Ok` if `found` equals `expected`, else [`LearnError::Shape`].
     pub(crate) fn check(what: &str, expected: usize, found: usize) -> Result<(), Self> {
         if expected == found {

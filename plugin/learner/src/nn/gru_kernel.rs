@@ -52,14 +52,14 @@ pub(super) struct ScanGrads<B: Backend> {
 }
 
 /// One direction's part of [`ScanGrads`].
-struct DirectionGrads {
+struct DirectionGrads<'a> {
     /// `[T * B, 3 * hidden]`.
-    input: Vec<f32>,
+    input: &'a mut [f32],
     /// Of c, `[T * B, 3 * hidden]`.
-    recurrent: Vec<f32>,
-    bias_ih: Vec<f32>,
-    bias_hh: Vec<f32>,
-    initial: Vec<f32>,
+    recurrent: &'a mut [f32],
+    bias_ih: &'a mut [f32],
+    bias_hh: &'a mut [f32],
+    initial: &'a mut [f32],
 }
 
 impl Sizes {
@@ -121,26 +121,30 @@ pub(super) fn backward<B: Backend>(
     let Sizes { steps, batch, hidden, directions } = sizes;
     let (rows, gates) = (steps * batch, sizes.gates());
     let output = data::<B>(output);
+    let zeros = |per_direction: usize| vec![0.0; directions * per_direction];
+    let (mut input, mut recurrent) = (zeros(rows * gates), zeros(rows * gates));
+    let (mut bias_ih, mut bias_hh, mut first) = (zeros(gates), zeros(gates), zeros(sizes.block()));
+    let wide = input.par_chunks_mut((rows * gates).max(1)).zip(recurrent.par_chunks_mut((rows * gates).max(1)));
+    let biases = bias_ih.par_chunks_mut(gates).zip(bias_hh.par_chunks_mut(gates));
+    let parts = wide.zip(biases.zip(first.par_chunks_mut(sizes.block().max(1))));
     let weights = per_direction::<B>(&weight, sizes);
-    let work = weights.into_par_iter().zip(&scan.directions).enumerate();
-    let parts: Vec<DirectionGrads> = work
-        .map(|(d, (weight, run))| {
-            scan_backward::<B>(numbers(&output), d, run, B::float_transpose(weight), initial, sizes, &device)
-        })
-        .collect();
-    let all = |field: fn(&DirectionGrads) -> &[f32]| parts.iter().map(field).collect::<Vec<_>>().concat();
+    let work = parts.zip(weights.into_par_iter().zip(&scan.directions)).enumerate();
+    work.for_each(|(d, (((input, recurrent), ((bias_ih, bias_hh), state)), (weight, run)))| {
+        let grads = DirectionGrads { input, recurrent, bias_ih, bias_hh, initial: state };
+        scan_backward::<B>(grads, numbers(&output), d, run, B::float_transpose(weight), initial, sizes, &device);
+    });
     let before = scan.directions.iter().map(|run| {
         let from = if run.backwards { sizes.block() } else { 0 };
         &run.states[from..from + rows * hidden]
     });
     let before = tensor::<B>(before.collect::<Vec<_>>().concat(), [directions, rows, hidden], &device);
-    let recurrent = tensor::<B>(all(|part| &part.recurrent), [directions, rows, gates], &device);
+    let recurrent = tensor::<B>(recurrent, [directions, rows, gates], &device);
     ScanGrads {
-        input: tensor::<B>(all(|part| &part.input), [directions, rows, gates], &device),
+        input: tensor::<B>(input, [directions, rows, gates], &device),
         weight: B::float_matmul(B::float_transpose(before), recurrent),
-        bias_ih: tensor::<B>(all(|part| &part.bias_ih), [directions, gates], &device),
-        bias_hh: tensor::<B>(all(|part| &part.bias_hh), [directions, gates], &device),
-        initial: tensor::<B>(all(|part| &part.initial), [directions, batch, hidden], &device),
+        bias_ih: tensor::<B>(bias_ih, [directions, gates], &device),
+        bias_hh: tensor::<B>(bias_hh, [directions, gates], &device),
+        initial: tensor::<B>(first, [directions, batch, hidden], &device),
     }
 }
 
@@ -246,7 +250,9 @@ fn joined(runs: &[Direction], sizes: Sizes) -> Vec<f32> {
     out
 }
 
+/// One direction of [`backward`]; `grads` start as zeros.
 fn scan_backward<B: Backend>(
+    mut grads: DirectionGrads<'_>,
     output: &[f32],
     direction: usize,
     run: &Direction,
@@ -254,16 +260,8 @@ fn scan_backward<B: Backend>(
     initial: bool,
     sizes: Sizes,
     device: &B::Device,
-) -> DirectionGrads {
-    let (block, gates) = (sizes.block(), sizes.gates());
-    let zeros = || vec![0.0; sizes.steps * sizes.batch * gates];
-    let mut grads = DirectionGrads {
-        input: zeros(),
-        recurrent: zeros(),
-        bias_ih: vec![0.0; gates],
-        bias_hh: vec![0.0; gates],
-        initial: vec![0.0; block],
-    };
+) {
+    let gates = sizes.gates();
     // `initial` holds the gradient of the state between two steps until the first step is reached.
     let order: Vec<usize> = sizes.order(run.backwards).collect();
     for (k, &t) in order.iter().enumerate().rev() {
@@ -279,14 +277,13 @@ fn scan_backward<B: Backend>(
         grads.bias_ih.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
         grads.bias_hh.iter_mut().zip(c).for_each(|(sum, x)| *sum += x);
     }
-    grads
 }
 
 /// One step for all rows of the batch: from the gradient of the state after it to those of a, c and, but for the part
 /// that goes through c, of the state before it.
 #[inline(always)]
 fn step_backward(
-    grads: &mut DirectionGrads,
+    grads: &mut DirectionGrads<'_>,
     t: usize,
     output: &[f32],
     direction: usize,

@@ -44,4 +44,4 @@ pub use sample::{
     argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
 };
 pub use squash::{LogProbForm, SquashedDraw, SquashedGaussian, bounded_log_std};
-pub(crate) use tensors::{finite, host, matrix, scalar, vector};
+pub(crate) use tensors::{check_loss, finite, host, matrix, scalar, vector};

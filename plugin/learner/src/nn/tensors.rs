@@ -24,11 +24,23 @@ pub(crate) fn scalar(tensor: Tensor<1>) -> Result<f32, LearnError> {
     tensor.try_into_scalar::<f32>().map_err(|e| LearnError::Device(e.to_string()))
 }
 
-/// The number of a `[1]` tensor, tracked or not, which must be finite; `steps` optimizer steps were done before.
+/// A loss beyond this has exploded: single precision cannot tell its changes any more.
+const EXPLODED: f32 = 1e12;
+
+/// The number of a `[1]` tensor, tracked or not, which must be finite and not have exploded; `steps` optimizer steps were
+/// done before.
 pub(crate) fn finite(name: &str, tensor: &Tensor<1>, steps: u64) -> Result<f64, LearnError> {
     let value = scalar(tensor.clone().inner())?;
-    if value.is_finite() {
-        return Ok(f64::from(value));
+    check_loss(name, value, steps)?;
+    Ok(f64::from(value))
+}
+
+/// `Ok` for a loss that is finite and has not exploded.
+pub(crate) fn check_loss(name: &str, value: f32, steps: u64) -> Result<(), LearnError> {
+    let tensor = name.to_owned();
+    match value {
+        value if !value.is_finite() => Err(LearnError::NotFinite { tensor, steps }),
+        value if value.abs() > EXPLODED => Err(LearnError::Exploded { tensor, value, steps }),
+        _ => Ok(()),
     }
-    Err(LearnError::NotFinite { tensor: name.to_owned(), steps })
 }

@@ -1,7 +1,9 @@
 //! Training of the skill model.
 
 use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
-use crate::nn::{ActionRows, Adam, AdamConfig, Dist, NamedGrads, ObsRows, argmax, host, matrix, scalar, tracked};
+use crate::nn::{
+    ActionRows, Adam, AdamConfig, Dist, NamedGrads, ObsRows, argmax, check_loss, host, matrix, scalar, tracked,
+};
 use crate::rng::{Streams, normal};
 use crate::{Actions, DeviceKind, LearnError};
 use std::ops::ControlFlow;
@@ -183,8 +185,8 @@ impl SkillTrainer {
             grad_norm: 0.0,
         };
         let parts = [("nll", metrics.nll), ("kl", metrics.kl), ("loss", metrics.loss)];
-        if let Some((name, _)) = parts.iter().find(|(_, x)| !x.is_finite()) {
-            return Err(LearnError::NotFinite { tensor: (*name).to_owned(), steps });
+        for (name, value) in parts {
+            check_loss(name, value, steps)?;
         }
         let grads = NamedGrads::take(&mut self.nets, "", loss.total.backward())?;
         let (norm, scale) = grads.clip_factor(self.config.max_grad_norm, steps)?;

@@ -3,8 +3,12 @@
 use crate::corridor::config;
 use crate::score::model;
 use crate::toy::{Driver, OBS, SPACE};
+use playbot_learner::nn::Activation;
 use playbot_learner::rng::{Streams, normal};
-use playbot_learner::{ActionSpace, DeviceKind, Policy, PolicyOutput, PolicySpec, PpoConfig, PpoLearner, ScoreConfig};
+use playbot_learner::{
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, Policy, PolicyOutput, PolicySpec, PpoConfig, PpoLearner,
+    ScoreConfig, SkillConfig, SkillTrainer,
+};
 
 fn numbers(n: usize) -> Vec<f32> {
     let mut rng = Streams::new(4).stream("numbers", 0);
@@ -79,19 +83,10 @@ fn threads_with_clones_of_a_policy_agree() {
     assert!(outputs.iter().all(|output| *output == expected));
 }
 
-#[test]
-fn updates_do_not_depend_on_the_number_of_threads() {
-    // The pool's size is fixed for a process, so the same run is made in two of them.
+/// Checks that `digest` gives the same number with 1, 2 and 4 threads. `test` is the name of the test that calls this:
+/// the pool's size is fixed for a process, so the test runs itself in others.
+fn same_on_any_number_of_threads(test: &str, digest: fn() -> u64) {
     const CHILD: &str = "PLAYBOT_TEST_THREADS_CHILD";
-    let digest = || {
-        let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
-        let config = PpoConfig { hidden: vec![256, 256], minibatches: 2, ..config() };
-        let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
-        let mut driver = Driver::new(64, 1);
-        learner.update(&driver.rollout(&learner, 32)).expect("finite");
-        let output = learner.policy().forward(&[], &numbers(64 * OBS), 64).expect("finite");
-        output.head.iter().fold(0u64, |h, x| h.rotate_left(7) ^ u64::from(x.to_bits()))
-    };
     if let Some(path) = std::env::var_os(CHILD) {
         std::fs::write(path, digest().to_string()).expect("writable");
         return;
@@ -100,7 +95,7 @@ fn updates_do_not_depend_on_the_number_of_threads() {
     let results = [1, 2, 4].map(|threads| {
         let path = folder.path().join(threads.to_string());
         let status = std::process::Command::new(std::env::current_exe().expect("this test"))
-            .args(["--exact", "determinism::updates_do_not_depend_on_the_number_of_threads"])
+            .args(["--exact", &format!("determinism::{test}")])
             .env(CHILD, &path)
             .env("RAYON_NUM_THREADS", threads.to_string())
             .stdout(std::process::Stdio::null())
@@ -110,4 +105,41 @@ fn updates_do_not_depend_on_the_number_of_threads() {
     });
     assert_eq!(results[0], results[1]);
     assert_eq!(results[0], results[2]);
+}
+
+fn mix(hash: u64, x: &f32) -> u64 {
+    hash.rotate_left(7) ^ u64::from(x.to_bits())
+}
+
+#[test]
+fn updates_do_not_depend_on_the_number_of_threads() {
+    same_on_any_number_of_threads("updates_do_not_depend_on_the_number_of_threads", || {
+        let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+        let config = PpoConfig { hidden: vec![256, 256], activation: Activation::Tanh, minibatches: 2, ..config() };
+        let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
+        let mut driver = Driver::new(64, 1);
+        learner.update(&driver.rollout(&learner, 32)).expect("finite");
+        let output = learner.policy().forward(&[], &numbers(64 * OBS), 64).expect("finite");
+        output.head.iter().fold(0, mix)
+    });
+}
+
+#[test]
+fn skill_training_does_not_depend_on_the_number_of_threads() {
+    same_on_any_number_of_threads("skill_training_does_not_depend_on_the_number_of_threads", || {
+        let (obs_dim, dim, steps) = (29, 8, 220);
+        let values = numbers(steps * (obs_dim + dim));
+        let episode = DemoEpisode {
+            observations: values[..steps * obs_dim].to_vec().into(),
+            actions: Actions::Continuous { dim, values: values[steps * obs_dim..].to_vec() },
+        };
+        let dataset = Dataset::new(obs_dim, ActionSpace::Continuous(dim), vec![episode]).expect("a good episode");
+        // Wide enough for matrix products, gates and weights to be split.
+        let config = SkillConfig { window: 4, gru_hidden: 200, gru_layers: 2, ..SkillConfig::default() };
+        let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("good settings");
+        (0..2).fold(0, |hash, _| {
+            let metrics = trainer.train_batch().expect("finite");
+            [metrics.loss, metrics.grad_norm].iter().fold(hash, mix)
+        })
+    });
 }

@@ -228,7 +228,7 @@ fn what_cannot_read_images_says_so() {
         assert!(error.to_string().contains(text), "{error}");
     };
     let ppo = PpoLearner::with_skill(PpoConfig::default(), ScoreConfig::default(), &model, 1, DeviceKind::Flex);
-    config_error(ppo.expect_err("images"), "PPO reads vectors, not images");
+    config_error(ppo.expect_err("images"), "reads vectors, not images");
     let (z, vector) = ([0.0; 2], vec![0.0; SHAPE.numbers()]);
     config_error(model.policy().forward(&z, &vector, 1).expect_err("a vector"), "`Policy::forward` reads vectors");
     let drawn = model.prior().sample(&vector, 1, SkillDraw::Mean, &mut |_| 0.0);
