@@ -71,7 +71,7 @@ fn a_killed_training_goes_on_bit_for_bit() {
         train(folder.path(), &["--run", "killed"]).stderr(Stdio::null()).spawn().expect("the program starts");
     while logged(&run) < 5 {
         assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
-        std::thread::sleep(Duration::from_millis(1));
+        std::thread::park_timeout(Duration::from_millis(1));
     }
     // SIGKILL: no handler runs, whatever was being written stays as it is.
     child.kill().expect("it runs");

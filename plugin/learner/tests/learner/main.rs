@@ -5,6 +5,7 @@ mod corridor;
 mod determinism;
 mod errors;
 mod files;
+mod half;
 mod images;
 mod point;
 mod sac;

@@ -23,6 +23,11 @@ pub fn config() -> SkillConfig {
 
 /// Players that walk to the goal but dawdle in one step of ten.
 pub fn corridor_demos(episodes: u64) -> Dataset {
+    demos_until(usize::MAX, episodes)
+}
+
+/// Those players' recordings, which break off at a place.
+pub fn demos_until(place: usize, episodes: u64) -> Dataset {
     let streams = Streams::new(11);
     let demos = (0..episodes).map(|i| {
         let mut rng = streams.stream("demo", i);
@@ -33,7 +38,7 @@ pub fn corridor_demos(episodes: u64) -> Dataset {
             let action = if unit(&mut rng) < 0.1 { 2 } else { corridor.best() };
             actions.push(action);
             let (_, end, cut) = corridor.step(action);
-            if end || cut {
+            if end || cut || corridor.place() >= place {
                 return DemoEpisode { observations: observations.into(), actions: Actions::Discrete(actions) };
             }
         }

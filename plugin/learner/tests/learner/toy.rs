@@ -30,6 +30,11 @@ impl Corridor {
         out.push(1.0);
     }
 
+    /// How far along it is; [`BEST`] is the goal.
+    pub fn place(&self) -> usize {
+        self.place
+    }
+
     /// The action that leads to the goal.
     pub fn best(&self) -> u32 {
         if self.place % 2 == 1 { 0 } else { 1 }
