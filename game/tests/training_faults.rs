@@ -134,3 +134,58 @@ fn a_full_disk_leaves_the_old_checkpoint() {
     let resumed = resume(folder.path(), "full");
     assert!(resumed.status.success(), "with room again it goes on: {}", errors(&resumed));
 }
+
+#[test]
+fn a_killed_skill_training_goes_on_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let playbot = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        command.args(args).current_dir(folder.path());
+        command
+    };
+    let done = |mut command: Command| {
+        let output = command.output().expect("the program starts");
+        assert!(output.status.success(), "{}", errors(&output));
+    };
+    let learn = |out: &str, more: &[&str]| {
+        let sets = ["hidden=[16]", "encoder_hidden=8", "gru_hidden=8", "window=5", "epochs=40"];
+        let mut command = playbot(&["learn-skills", "--demos", "few.demo", "--out", out]);
+        command.args(sets.iter().flat_map(|set| ["--set".to_owned(), format!("skills.{set}")])).args(more);
+        command
+    };
+    done(playbot(&["record", "coinrun", "--levels", "easy:0..9", "--out", "few.demo"]));
+    done(learn("whole", &[]));
+    let checkpoint = folder.path().join("killed.checkpoint");
+    let mut child = learn("killed", &[]).stderr(Stdio::null()).spawn().expect("the program starts");
+    while !checkpoint.exists() {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
+        std::thread::park_timeout(Duration::from_millis(1));
+    }
+    child.kill().expect("it runs");
+    child.wait().expect("a child");
+    assert!(checkpoint.exists() && !folder.path().join("killed").exists(), "it was killed too late");
+    let refused = learn("killed", &[]).output().expect("the program starts");
+    assert!(errors(&refused).contains("--resume") && refused.status.code() == Some(3), "{}", errors(&refused));
+    let other = learn("killed", &["--resume", "--set", "skills.lr=0.5"]).output().expect("the program starts");
+    assert!(errors(&other).contains("other settings") && other.status.code() == Some(3), "{}", errors(&other));
+    done(learn("killed", &["--resume"]));
+    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
+    assert!(read("whole") == read("killed"), "killing it changed the result");
+    assert!(!checkpoint.exists(), "nothing is left over");
+}
+
+#[test]
+fn recordings_that_are_too_short_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let playbot = |args: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_playbot"))
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .expect("the program starts")
+    };
+    assert!(playbot(&["record", "coinrun", "--levels", "easy:0..0", "--out", "one.demo"]).status.success());
+    let output = playbot(&["learn-skills", "--demos", "one.demo", "--out", "skills", "--set", "skills.window=900"]);
+    assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
+    assert!(errors(&output).contains("window of 900 steps"), "{}", errors(&output));
+}

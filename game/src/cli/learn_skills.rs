@@ -24,7 +24,8 @@ use crate::registry;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot learn-skills --out skills.safetensors
-  playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors")]
+  playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors
+  playbot learn-skills --out skills.safetensors --resume")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
@@ -37,9 +38,12 @@ pub struct Args {
     /// File to write.
     #[arg(long)]
     out: PathBuf,
-    /// Overwrite the file if it exists.
-    #[arg(long)]
+    /// Start anew: overwrite the file, and forget what Ctrl-C or a crash stopped, if there is any.
+    #[arg(long, conflicts_with = "resume")]
     force: bool,
+    /// Go on where Ctrl-C or a crash stopped, from FILE.checkpoint.
+    #[arg(long)]
+    resume: bool,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
     device: DeviceKind,
@@ -50,26 +54,62 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let experiment = args.from.load([option("skills.epochs", &args.epochs)])?;
-    if args.out.exists() && !args.force {
-        return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
-    }
+    let checkpoint = prepare(&args)?;
     let game = registry::game(&experiment.game)?;
     let demos = args.demos.clone().unwrap_or_else(|| experiment::resolve(&experiment.demos));
     let dataset = read_demos(game, &demos)?;
     interrupt::listen();
-    let json = args.json;
-    let model =
-        learn(
-            &experiment,
-            dataset,
-            args.device,
-            |epoch, metrics| {
-                if json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
-            },
-        )?;
-    model.save(&args.out)?;
-    eprintln!("skill model written to {}", args.out.display());
+    let report = |epoch, metrics: &SkillMetrics| {
+        if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
+    };
+    match learn(&experiment, dataset, args.device, Some(&checkpoint), report)? {
+        None => eprintln!("stopped and saved: go on with the same command and --resume"),
+        Some(model) => {
+            model.save(&args.out)?;
+            remove(&checkpoint)?;
+            eprintln!("skill model written to {}", args.out.display());
+        }
+    }
     Ok(Outcome::Pass)
+}
+
+/// Where the state of an unfinished training is kept.
+pub fn checkpoint_of(out: &Path) -> PathBuf {
+    let mut name = out.file_name().unwrap_or_default().to_owned();
+    name.push(".checkpoint");
+    out.with_file_name(name)
+}
+
+/// Removes a checkpoint that is not needed any more, if there is one.
+///
+/// # Errors
+///
+/// The system refuses.
+pub fn remove(checkpoint: &Path) -> Result<(), CliError> {
+    match std::fs::remove_file(checkpoint) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(CliError::Io(format!("cannot remove {}: {error}", checkpoint.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The checkpoint's path, if what lies there fits what was asked for.
+fn prepare(args: &Args) -> Result<PathBuf, CliError> {
+    let checkpoint = checkpoint_of(&args.out);
+    if args.force {
+        remove(&checkpoint)?;
+    } else if args.out.exists() {
+        return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
+    }
+    match (args.resume, checkpoint.exists()) {
+        (true, false) => Err(CliError::Usage(format!("nothing to resume: there is no {}", checkpoint.display()))),
+        (false, true) => Err(CliError::Usage(format!(
+            "{} holds an unfinished training: go on with --resume, or start anew with --force",
+            checkpoint.display()
+        ))),
+        _ => Ok(checkpoint),
+    }
 }
 
 fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
@@ -95,29 +135,60 @@ pub fn read_demos(game: &dyn Game, path: &Path) -> Result<Dataset, CliError> {
     Ok(dataset)
 }
 
-/// Learns the model, with a progress bar; stops early after Ctrl-C, with what has been learned so far.
+/// Learns the model, with a progress bar and, where there is room for one, a checkpoint after each epoch, from which a
+/// stopped training goes on bit for bit. `None` after Ctrl-C.
 ///
 /// # Errors
 ///
-/// A loss is not a number, or `after_epoch` fails.
+/// A loss is not a number, the checkpoint belongs to another training, or it or `after_epoch` fails.
 pub fn learn(
     experiment: &Experiment,
     dataset: Dataset,
     device: DeviceKind,
+    checkpoint: Option<&Path>,
     mut after_epoch: impl FnMut(u64, &SkillMetrics) -> Result<(), CliError>,
-) -> Result<SkillModel, CliError> {
+) -> Result<Option<SkillModel>, CliError> {
     let epochs = experiment.skills.epochs as u64;
-    let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?;
-    let bar = progress::bar("learn skills", epochs * trainer.batches_per_epoch() as u64, "batches");
-    for epoch in 1..=epochs {
+    let mut trainer = begin(experiment, dataset, device, checkpoint)?;
+    let per_epoch = trainer.batches_per_epoch() as u64;
+    let bar = progress::bar("learn skills", epochs * per_epoch, "batches");
+    bar.set_position(trainer.epochs_done() * per_epoch + trainer.batches_done() as u64);
+    while trainer.epochs_done() < epochs {
         let metrics = trainer.train_epoch(&mut |_| {
             bar.inc(1);
             if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        let Some(metrics) = metrics else { break };
+        if let Some(checkpoint) = checkpoint {
+            trainer.save(checkpoint)?;
+        }
+        let Some(metrics) = metrics else {
+            bar.finish_and_clear();
+            return Ok(None);
+        };
         bar.set_message(format!("NLL {:.3} KL {:.2}", metrics.nll, metrics.kl));
-        after_epoch(epoch, &metrics)?;
+        after_epoch(trainer.epochs_done(), &metrics)?;
     }
     bar.finish_and_clear();
-    Ok(trainer.into_model())
+    Ok(Some(trainer.into_model()))
+}
+
+/// A trainer at its start, or where the checkpoint left it.
+fn begin(
+    experiment: &Experiment,
+    dataset: Dataset,
+    device: DeviceKind,
+    checkpoint: Option<&Path>,
+) -> Result<SkillTrainer, CliError> {
+    let Some(path) = checkpoint.filter(|path| path.exists()) else {
+        return Ok(SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?);
+    };
+    let trainer = SkillTrainer::load(path, dataset, device)?;
+    if (trainer.config(), trainer.seed()) != (&experiment.skills, experiment.seed) {
+        return Err(CliError::Usage(format!(
+            "{} was made with other settings or another seed: take the same experiment, or start anew with --force",
+            path.display()
+        )));
+    }
+    eprintln!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
+    Ok(trainer)
 }

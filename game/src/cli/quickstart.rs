@@ -142,14 +142,12 @@ fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Optio
     interrupt::listen();
     let dataset = learn_skills::read_demos(game, &experiment::resolve(&experiment.demos))?;
     let mut log = String::new();
-    let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), |epoch, metrics| {
+    let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });
         log.push_str(&format!("{line}\n"));
         Ok(())
     })?;
-    if interrupt::asked() {
-        return Ok(None);
-    }
+    let Some(model) = model else { return Ok(None) };
     write_atomically(&args.run.join("skills.jsonl"), log.as_bytes())?;
     model.save(&args.run.join("skills.safetensors"))?;
     Ok(Some(model))

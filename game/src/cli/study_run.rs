@@ -25,7 +25,7 @@ use serde_json::json;
 use super::{
     error::CliError,
     eval::cloning,
-    experiment, interrupt, learn_skills, methods,
+    experiment, learn_skills, methods,
     train::{create_run, drive},
 };
 use crate::registry;
@@ -146,11 +146,14 @@ impl Runner {
         let is_new = self.force && !self.learned.contains(&name);
         if is_new || !file.exists() {
             let demos = self.demos(game, &run.experiment)?;
-            let model = learn_skills::learn(&run.experiment, demos, self.device, |_, _| Ok(()))?;
-            if interrupt::asked() {
-                return Ok(None);
+            let checkpoint = learn_skills::checkpoint_of(&file);
+            if is_new {
+                learn_skills::remove(&checkpoint)?;
             }
+            let learned = learn_skills::learn(&run.experiment, demos, self.device, Some(&checkpoint), |_, _| Ok(()))?;
+            let Some(model) = learned else { return Ok(None) };
             model.save(&file)?;
+            learn_skills::remove(&checkpoint)?;
             self.learned.insert(name);
         }
         Ok(Some(SkillModel::load(&file, self.device)?))

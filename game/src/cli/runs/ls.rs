@@ -64,6 +64,7 @@ fn table() -> PlainTable {
 fn row(run: &RunRecord) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(UNKNOWN.to_owned(), readable);
     let state = match (run.is_finished(), run.checkpoints.is_empty()) {
+        _ if !run.info.algorithm.is_trained() => "nothing to train",
         (true, false) => "finished",
         (true, true) => "finished, no checkpoint",
         (false, false) => "can be resumed",

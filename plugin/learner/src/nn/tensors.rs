@@ -44,3 +44,18 @@ pub(crate) fn check_loss(name: &str, value: f32, steps: u64) -> Result<(), Learn
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn losses_that_ran_away_are_named() {
+        assert!(check_loss("loss", -1e9, 7).is_ok());
+        for (value, words) in [(f32::NAN, "`loss` is not finite after 7"), (-1e13, "`loss` has exploded: it is -1e13")]
+        {
+            let error = check_loss("loss", value, 7).expect_err("ran away");
+            assert!(error.is_divergence() && error.to_string().contains(words), "{error}");
+        }
+    }
+}

@@ -92,6 +92,11 @@ impl SkillTrainer {
         &self.config
     }
 
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.streams.seed()
+    }
+
     /// Complete passes over the demonstrations.
     pub fn epochs_done(&self) -> u64 {
         self.epoch
