@@ -18,7 +18,7 @@ const TANH_ONE: f32 = 9.1;
 const TANH_P: [f32; 5] = [-0.333_332_8, 0.133_314_42, -0.053_739_715, 0.020_639_088, -0.005_704_987_3];
 
 /// exp(r) = 1 + r + r² Q(r) for |r| ≤ ln(2)/2; from the constant term up.
-const EXP_Q: [f32; 5] = [0.499_999_94, 0.166_665_21, 0.041_668_39, 0.008_368_745, 0.001_381_454_1];
+const EXP_Q: [f32; 5] = [0.499_999_94, 0.166_665_21, 0.041_668_39, 0.008_368_745, 0.001_381_454];
 /// ln 2 in two parts: the first has so few bits that its product with a small integer is exact.
 const LN_2: (f32, f32) = (0.693_359_4, -0.000_212_194_44);
 /// Adding this rounds a small number to an integer, which is then in the low bits.
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_number_has_the_same_bits_wherever_it_stands() {
-        let x: Vec<f32> = (0..3 * CHUNK + 5).map(|i| (i as f32 * 0.37).sin() * 12.0).collect();
+        let x: Vec<f32> = (0..3 * CHUNK + 5).map(|i| (i % 2401) as f32 * 0.01 - 12.0).collect();
         let mut whole = x.clone();
         tanh_in_place(&mut whole);
         for (i, (&x, got)) in x.iter().zip(&whole).enumerate() {
