@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_number_has_the_same_bits_wherever_it_stands() {
-        let x: Vec<f32> = (0..3 * CHUNK + 5).map(|i| (i * 37 % 101) as f32 * 0.23 - 11.5).collect();
+        let x: Vec<f32> = (0..3 * CHUNK + 5).map(|i| (i % 2401) as f32 * 0.01 - 12.0).collect();
         let mut whole = x.clone();
         tanh_in_place(&mut whole);
         for (i, (&x, got)) in x.iter().zip(&whole).enumerate() {
