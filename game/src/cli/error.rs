@@ -11,7 +11,8 @@ use bevy_playbot::{
     runs::RunsError,
     split::SplitError,
     train::{
-        config::ExperimentError, config_file::ConfigError, run_dir::RunError, study::StudyError, trainer::TrainError,
+        arena_state::RestoreError, config::ExperimentError, config_file::ConfigError, run_dir::RunError,
+        study::StudyError, trainer::TrainError,
     },
 };
 use thiserror::Error;
@@ -147,7 +148,7 @@ fn file_code(error: &FileError) -> u8 {
 
 fn train_code(error: &TrainError) -> u8 {
     match error {
-        TrainError::Fault(_) => 2,
+        TrainError::Fault(_) | TrainError::Restore(RestoreError::Fault(_)) => 2,
         TrainError::Learn(error) => learn_code(error),
         _ => 3,
     }

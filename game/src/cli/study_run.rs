@@ -184,7 +184,7 @@ fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<Tr
     let curves = RunCurves::read(run)?;
     Ok(TrainingResult {
         steps,
-        steps_to_threshold: steps_to_reach(curves.curve(SUCCESS), experiment.study.threshold),
+        steps_to_threshold: steps_to_reach(curves.settled(SUCCESS), experiment.study.threshold),
         success: curves.last(SUCCESS),
         episodic_return: curves.last("charts/episodic_return"),
     })

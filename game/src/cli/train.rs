@@ -95,11 +95,11 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     let game = registry::game(&saved.game)?;
     let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
     let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
+    experiment.check()?;
+    let trainer = run.resume(game, &experiment, args.device, args.threads)?;
     if experiment != saved {
-        experiment.check()?;
         run.write_experiment(&experiment)?;
     }
-    let trainer = run.resume(game, &experiment, args.device, args.threads)?;
     eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
     Ok((run, trainer))
 }
@@ -135,7 +135,7 @@ pub fn drive(
     let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
     let bar = progress::bar(title, trainer.experiment().steps, "steps");
     let mut saved = trainer.updates();
-    if saved == 0 {
+    if run.checkpoint(Which::Last).is_err() {
         // Whatever goes wrong later, there is something good to go back to.
         save(run, trainer)?;
     }

@@ -252,8 +252,12 @@ impl TensorFile {
     }
 }
 
-/// Puts `bytes` at `path` so that a reader sees the old contents or the new, never a part.
-fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+/// Puts `bytes` at `path` so that a reader sees the old contents or the new, never a part: under a temporary name first,
+/// flushed to the disk, then renamed.
+///
+/// # Errors
+/// What the system says; the old contents are still there, and nothing else.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(format!(".tmp{}", std::process::id()));
     let temporary = path.with_file_name(name);

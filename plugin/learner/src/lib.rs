@@ -48,6 +48,7 @@ mod space;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
+pub use file::write_atomically;
 pub use norm::RewardReset;
 pub use observation::{ImageShape, ObsKind, Observations};
 pub use policy::{Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};

@@ -7,7 +7,8 @@ use crate::{
     game::UnknownName,
     train::{
         json_lines::JsonLines,
-        metrics_log::{MetricsLog, SPS, scalars},
+        metrics_log::{EPISODES, MetricsLog, SPS, scalars},
+        trainer::RECENT,
     },
 };
 
@@ -64,6 +65,19 @@ impl RunCurves {
         self.curves.get(tag).map_or(&[], Vec::as_slice)
     }
 
+    /// The points of a curve from where on at least 100 episodes had ended, so that one of the means over episodes says
+    /// something. All of them where the run does not count its episodes.
+    pub fn settled(&self, tag: &str) -> &[(u64, f64)] {
+        let curve = self.curve(tag);
+        let counts = self.curve(EPISODES);
+        if counts.is_empty() {
+            return curve;
+        }
+        let few = counts.partition_point(|(_, episodes)| *episodes < RECENT as f64);
+        let from = counts.get(few).map_or(u64::MAX, |(step, _)| *step);
+        &curve[curve.partition_point(|(step, _)| *step < from)..]
+    }
+
     /// The last value of a metric that is a number.
     pub fn last(&self, tag: &str) -> Option<f64> {
         self.curve(tag).iter().rev().map(|(_, value)| *value).find(|value| !value.is_nan())
@@ -96,6 +110,18 @@ pub(super) fn check_metric<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn means_of_few_episodes_do_not_count() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let lines = [(8, 4, 1.0), (16, 99, 1.0), (24, 100, 0.5), (32, 130, 0.7)].map(|(step, episodes, value)| {
+            format!("{{\"step\":{step},\"charts/episodes\":{episodes},\"charts/a\":{value}}}\n")
+        });
+        std::fs::write(folder.path().join("metrics.jsonl"), lines.concat()).expect("writable");
+        let curves = RunCurves::read(folder.path()).expect("readable");
+        assert_eq!(curves.settled("charts/a"), [(24, 0.5), (32, 0.7)]);
+        assert!(curves.settled("charts/b").is_empty());
+    }
 
     #[test]
     fn curves_are_read_up_to_a_torn_line() {

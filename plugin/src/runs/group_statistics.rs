@@ -38,7 +38,8 @@ impl GroupStatistics {
         let (last_mean, last_sd) = mean_and_sd(&last);
         let speeds: Vec<f64> = group.runs.iter().filter_map(|run| run.curves.steps_per_s()).collect();
         let values = || group.runs.iter().flat_map(|run| run.curves.curve(metric)).map(|(_, value)| *value);
-        let reached = |threshold| group.runs.iter().map(move |run| steps_to_reach(run.curves.curve(metric), threshold));
+        let reached =
+            |threshold| group.runs.iter().map(move |run| steps_to_reach(run.curves.settled(metric), threshold));
         Self {
             label: group.label.clone(),
             seeds: group.seeds(),

@@ -60,9 +60,9 @@ impl RunRecord {
         })
     }
 
-    /// Whether all steps of the experiment are done.
+    /// Whether all steps of the experiment are done and saved.
     pub fn is_finished(&self) -> bool {
-        self.curves.last_step() >= self.experiment.steps
+        self.checkpoints.last().is_some_and(|last| last.summary.step >= self.experiment.steps)
     }
 
     /// The curve of a metric.

@@ -46,9 +46,9 @@ impl Default for CheckpointConfig {
 pub struct CheckpointSummary {
     /// Environment steps done.
     pub step: u64,
-    /// Mean return of the last 100 training episodes.
+    /// Mean return of the last 100 training episodes; `None` before as many have ended.
     pub episodic_return: Option<f64>,
-    /// Success rate of the last 100 training episodes.
+    /// Success rate of the last 100 training episodes; `None` before as many have ended.
     pub success_rate: Option<f64>,
 }
 
@@ -169,14 +169,32 @@ pub(super) fn write(
         let _ = remove_if_there(&fresh.path);
         return filled;
     }
-    // Only a training that is played again from an older checkpoint meets its own step again.
-    remove_if_there(&path)?;
+    put_aside(&path)?;
     fs::rename(&fresh.path, &path).map_err(io_error("move", &fresh.path))?;
     // Makes the new name durable where folders can be opened; elsewhere the rename is all there is.
     if let Ok(folder) = File::open(&folder) {
         let _ = folder.sync_all();
     }
     prune(run, keep)
+}
+
+/// Takes the checkpoints after `step` out of the list: a training that had to go back so far could not read them.
+pub(super) fn set_aside_after(run: &Path, step: u64) -> Result<(), RunError> {
+    for checkpoint in list(run)?.iter().filter(|checkpoint| checkpoint.summary.step > step) {
+        put_aside(&checkpoint.path)?;
+    }
+    Ok(())
+}
+
+/// Moves a checkpoint, if there is one, where no one looks for it but a person.
+fn put_aside(path: &Path) -> Result<(), RunError> {
+    if !path.exists() {
+        return Ok(());
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let aside = path.with_file_name(format!("damaged-{name}"));
+    remove_if_there(&aside)?;
+    fs::rename(path, &aside).map_err(io_error("move", path))
 }
 
 /// Removes all but the last `keep` (at least one) and the best.
@@ -265,6 +283,19 @@ mod tests {
         assert!(matches!(choose(run.path(), Which::Last), Err(RunError::NoCheckpoint { .. })));
         save(run.path(), 10, 1.0, 1).expect("writable");
         assert_eq!(steps(run.path()), [10]);
+    }
+
+    #[test]
+    fn what_could_not_be_read_is_neither_the_last_nor_the_best() {
+        let run = tempfile::tempdir().expect("a folder");
+        for (step, value) in [(10, 1.0), (20, 2.0), (30, 9.0)] {
+            save(run.path(), step, value, 3).expect("writable");
+        }
+        set_aside_after(run.path(), 20).expect("movable");
+        assert_eq!(steps(run.path()), [10, 20]);
+        save(run.path(), 25, 1.5, 1).expect("writable");
+        assert_eq!(steps(run.path()), [20, 25], "the best and the last of those that can be read");
+        assert!(folder(run.path()).join("damaged-step-000000000030").exists());
     }
 
     #[test]

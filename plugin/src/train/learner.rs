@@ -126,6 +126,13 @@ impl Learner {
         }
     }
 
+    /// Takes over what an experiment may change while a training is stopped: its length, over which a learning rate falls.
+    pub(crate) fn set_length(&mut self, experiment: &Experiment) {
+        if let Self::Ppo(learner) = self {
+            learner.set_total_updates(experiment.ppo_config().total_updates);
+        }
+    }
+
     /// Reads what the learner of this algorithm has saved.
     ///
     /// # Errors

@@ -21,6 +21,8 @@ use super::{
 
 /// Tag of the environment steps per second.
 pub const SPS: &str = "charts/SPS";
+/// Tag of the number of episodes that have ended.
+pub const EPISODES: &str = "charts/episodes";
 
 /// The files of a run that hold its metrics.
 #[derive(Clone, Debug)]

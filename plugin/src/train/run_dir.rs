@@ -10,8 +10,7 @@
 //! ```
 
 use std::{
-    fs::{self, File},
-    io::{self, Write},
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -95,14 +94,7 @@ pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Err
 ///
 /// [`RunError::Io`].
 pub fn write_atomically(path: &Path, content: &[u8]) -> Result<(), RunError> {
-    let temporary = path.with_extension("tmp");
-    let write = || -> io::Result<()> {
-        let mut file = File::create(&temporary)?;
-        file.write_all(content)?;
-        file.sync_all()
-    };
-    write().map_err(io_error("write", &temporary))?;
-    fs::rename(&temporary, path).map_err(io_error("write", path))
+    playbot_learner::write_atomically(path, content).map_err(io_error("write", path))
 }
 
 /// What `run.json` says.
@@ -172,8 +164,7 @@ impl RunDir {
     ///
     /// [`RunError::Io`].
     pub fn write_experiment(&self, experiment: &Experiment) -> Result<(), RunError> {
-        let text = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
-            .map_err(|error| damaged(&self.path, &error))?;
+        let text = experiment.to_ron().map_err(|error| damaged(&self.path, &error))?;
         write_atomically(&self.path.join("experiment.ron"), text.as_bytes())
     }
 
@@ -236,12 +227,14 @@ impl RunDir {
         threads: usize,
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
-        let (learner, state) = self.last_readable(experiment.algorithm, device)?;
+        let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
+        learner.set_length(experiment);
         let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
         for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
         trainer.progress = state.progress;
+        checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;
         self.metrics_log().rewind(trainer.progress.steps)?;
         Ok(trainer)
     }

@@ -13,6 +13,7 @@ use super::{
     collect::Collector,
     config::{Algorithm, Experiment, ExperimentError},
     learner::{Learner, LearnerMetrics},
+    metrics_log::EPISODES,
     worlds::on_threads,
 };
 use crate::{
@@ -23,7 +24,7 @@ use crate::{
 };
 
 /// Episodes over which the current return, length and success rate are averaged.
-const RECENT: usize = 100;
+pub(crate) const RECENT: usize = 100;
 
 /// Rows on which the first policy is compared with the decoder.
 const INITIAL_KL_ROWS: usize = 1024;
@@ -86,6 +87,8 @@ pub struct UpdateReport {
     pub update: u64,
     /// Environment steps done, over all arenas together.
     pub step: u64,
+    /// Episodes that have ended. Before the 100th the means below are of fewer, and of short ones more than of long.
+    pub episodes: u64,
     /// Mean return of the last 100 episodes; `None` before the first has ended.
     pub episodic_return: Option<f64>,
     /// Mean length of the last 100 episodes, ticks.
@@ -104,6 +107,7 @@ impl UpdateReport {
     /// Everything measured, by TensorBoard tag; the same numbers in every run with the same seed.
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let episodes = [
+            (EPISODES, Some(self.episodes as f64)),
             ("charts/episodic_return", self.episodic_return),
             ("charts/episodic_length", self.episodic_length),
             ("charts/success_rate", self.success_rate),
@@ -137,6 +141,7 @@ pub struct Trainer {
 pub(crate) struct Progress {
     pub(crate) updates: u64,
     pub(crate) steps: u64,
+    pub(crate) episodes: u64,
     pub(crate) recent: VecDeque<RecentEpisode>,
 }
 
@@ -257,6 +262,7 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
 
 impl Progress {
     fn note(&mut self, finished: &[EpisodeEnded]) {
+        self.episodes += finished.len() as u64;
         self.recent.extend(finished.iter().map(|episode| RecentEpisode {
             total_reward: episode.total_reward,
             ticks: episode.ticks,
@@ -280,11 +286,13 @@ impl Progress {
         self.mean(|episode| f64::from(u8::from(episode.success)))
     }
 
+    /// How good the policy is, where enough episodes have ended to say so.
     pub(crate) fn summary(&self) -> CheckpointSummary {
+        let settled = |mean: Option<f64>| mean.filter(|_| self.recent.len() == RECENT);
         CheckpointSummary {
             step: self.steps,
-            episodic_return: self.episodic_return(),
-            success_rate: self.success_rate(),
+            episodic_return: settled(self.episodic_return()),
+            success_rate: settled(self.success_rate()),
         }
     }
 
@@ -292,6 +300,7 @@ impl Progress {
         UpdateReport {
             update: self.updates,
             step: self.steps,
+            episodes: self.episodes,
             episodic_return: self.episodic_return(),
             episodic_length: self.mean(|episode| f64::from(episode.ticks)),
             success_rate: self.success_rate(),

@@ -101,6 +101,11 @@ impl PpoLearner {
         &self.config
     }
 
+    /// Sets over how many updates a falling learning rate falls, for a training that shall go on for longer.
+    pub fn set_total_updates(&mut self, total: Option<u64>) {
+        self.config.total_updates = total;
+    }
+
     /// The settings of SCORE, with a skill model.
     pub fn score_config(&self) -> Option<&ScoreConfig> {
         self.skill.as_ref().map(|skill| &skill.config)
