@@ -116,6 +116,12 @@ fn a_policy_of_another_game_names_the_difference() {
     file.card.observations[7] = "heat".to_owned();
     let error = check_policy(&game, &file).expect_err("another observation");
     assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
+    file.card.observations.pop();
+    assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
+    let mut file = policy_file(&game, learner(563).policy(), None, about());
+    file.card.actions.swap(1, 7);
+    let error = check_policy(&game, &file).expect_err("other actions");
+    assert!(matches!(&error, PolicyMisfit::ActionName { at: 1, expected, .. } if expected == "right"), "{error}");
     file.card.game_version = 9;
     assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Version { made_for: 9, now: 1, .. })));
     file.card.game = "chess".to_owned();

@@ -104,9 +104,15 @@ fn damaged_runs_are_named() {
     assert!(listed.contains("runs/a/1") && listed.contains("damaged: runs/b/run.json"), "{listed}");
     assert!(json_lines(&output(folder, &["runs", "ls", "--json"], 1).0)[2]["error"].is_string());
     output(folder, &["runs", "compare", "runs"], 3);
-    for file in ["metrics.jsonl", "timing.jsonl"] {
-        fs::remove_file(folder.join("runs/a/1").join(file)).expect("removed");
-    }
+    let forget = |run: &str| {
+        for file in ["metrics.jsonl", "timing.jsonl"] {
+            fs::remove_file(folder.join(run).join(file)).expect("removed");
+        }
+    };
+    forget("runs/a/1");
+    let (_, partly) = output(folder, &["runs", "compare", "runs/a", "--metric", "losses/entropy"], 0);
+    assert!(partly.contains("runs/a/1 is left out"), "{partly}");
+    forget("runs/a/2");
     let (_, early) = output(folder, &["runs", "compare", "runs/a"], 3);
     assert!(early.contains("runs/a/1 has no metrics yet"), "{early}");
 }

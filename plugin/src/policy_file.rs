@@ -47,6 +47,14 @@ pub enum PolicyMisfit {
         /// Version of the game.
         now: u32,
     },
+    /// The policy reads another number of values than its card names: it was trained with another observation.
+    #[error("the policy reads {reads} observation values, but {named} are named: train it again with this observation")]
+    Card {
+        /// Values that it reads.
+        reads: usize,
+        /// Values that are named.
+        named: usize,
+    },
     /// The observation has changed.
     #[error(
         "the policy reads {made_for} observation values and `{game}` gives {now}; the first difference is at number \
@@ -64,6 +72,18 @@ pub enum PolicyMisfit {
         /// Its name in the policy; empty if there is none.
         expected: String,
         /// Its name in the game; empty if there is none.
+        found: String,
+    },
+    /// A discrete choice or a dimension of the actions means something else now.
+    #[error("action {at} of the policy is `{expected}`, that of `{game}` is `{found}`: train and export it again")]
+    ActionName {
+        /// This game.
+        game: String,
+        /// Number of the first action that differs, from 0.
+        at: usize,
+        /// Its name in the policy.
+        expected: String,
+        /// Its name in the game.
         found: String,
     },
     /// The actions have changed.
@@ -92,6 +112,10 @@ pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisf
         return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version() });
     }
     let names = game.observation().names;
+    let reads = file.policy.obs_dim();
+    if reads != card.observations.len() {
+        return Err(PolicyMisfit::Card { reads, named: card.observations.len() });
+    }
     let longest = names.len().max(card.observations.len());
     if let Some(at) = (0..longest).find(|&at| names.get(at) != card.observations.get(at)) {
         let name_at = |names: &[String]| names.get(at).cloned().unwrap_or_default();
@@ -107,7 +131,13 @@ pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisf
     if file.policy.action_space() != game.actions() {
         return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions() });
     }
-    Ok(())
+    let (theirs, ours) = (&card.actions, game.action_names());
+    match theirs.iter().zip(ours).enumerate().find(|(_, (theirs, ours))| *theirs != ours) {
+        Some((at, (expected, found))) => {
+            Err(PolicyMisfit::ActionName { game: name, at, expected: expected.clone(), found })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Lets a policy, with its skills, drive every agent of this World that is under

@@ -7,7 +7,7 @@ use crate::{
     game::UnknownName,
     train::{
         json_lines::JsonLines,
-        metrics_log::{EPISODES, MetricsLog, SPS, scalars},
+        metrics_log::{EPISODE_MEANS, EPISODES, MetricsLog, SPS, scalars},
         trainer::RECENT,
     },
 };
@@ -65,12 +65,11 @@ impl RunCurves {
         self.curves.get(tag).map_or(&[], Vec::as_slice)
     }
 
-    /// The points of a curve from where on at least 100 episodes had ended, so that one of the means over episodes says
-    /// something. All of them where the run does not count its episodes.
+    /// The points of a curve that say something: of a mean over the last 100 episodes those from where on as many had
+    /// ended, of any other metric all.
     pub fn settled(&self, tag: &str) -> &[(u64, f64)] {
-        let curve = self.curve(tag);
-        let counts = self.curve(EPISODES);
-        if counts.is_empty() {
+        let (curve, counts) = (self.curve(tag), self.curve(EPISODES));
+        if counts.is_empty() || !EPISODE_MEANS.contains(&tag) {
             return curve;
         }
         let few = counts.partition_point(|(_, episodes)| *episodes < RECENT as f64);
@@ -115,11 +114,12 @@ mod tests {
     fn means_of_few_episodes_do_not_count() {
         let folder = tempfile::tempdir().expect("a folder");
         let lines = [(8, 4, 1.0), (16, 99, 1.0), (24, 100, 0.5), (32, 130, 0.7)].map(|(step, episodes, value)| {
-            format!("{{\"step\":{step},\"charts/episodes\":{episodes},\"charts/a\":{value}}}\n")
+            format!("{{\"step\":{step},\"charts/episodes\":{episodes},\"charts/success_rate\":{value}}}\n")
         });
         std::fs::write(folder.path().join("metrics.jsonl"), lines.concat()).expect("writable");
         let curves = RunCurves::read(folder.path()).expect("readable");
-        assert_eq!(curves.settled("charts/a"), [(24, 0.5), (32, 0.7)]);
+        assert_eq!(curves.settled("charts/success_rate"), [(24, 0.5), (32, 0.7)]);
+        assert_eq!(curves.settled(EPISODES).len(), 4);
         assert!(curves.settled("charts/b").is_empty());
     }
 

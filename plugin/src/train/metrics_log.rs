@@ -23,6 +23,8 @@ use super::{
 pub const SPS: &str = "charts/SPS";
 /// Tag of the number of episodes that have ended.
 pub const EPISODES: &str = "charts/episodes";
+/// Tags of the means over the last 100 episodes.
+pub const EPISODE_MEANS: [&str; 3] = ["charts/episodic_return", "charts/episodic_length", "charts/success_rate"];
 
 /// The files of a run that hold its metrics.
 #[derive(Clone, Debug)]

@@ -15,7 +15,7 @@ pub(super) struct Field<'a> {
 /// The fields of the struct `(key: value, ...)`, with or without a name before it, that begins at byte `at` of a text;
 /// `None` if there is something else. The text must be RON: a reader of RON has found nothing wrong with it.
 pub(super) fn fields(text: &str, at: usize) -> Option<Vec<Field<'_>>> {
-    let mut at = skip_blank(text, at);
+    let mut at = skip_extensions(text, skip_blank(text, at));
     at = skip_blank(text, at + word(&text[at..]).len());
     at = skip_blank(text, eat(text, at, '(')?);
     let mut fields = Vec::new();
@@ -46,6 +46,15 @@ pub(super) fn position(text: &str, at: usize) -> (usize, usize) {
 
 fn eat(text: &str, at: usize, token: char) -> Option<usize> {
     text[at..].starts_with(token).then_some(at + token.len_utf8())
+}
+
+/// The first byte from `at` behind lines such as `#![enable(implicit_some)]`, which is always on here.
+fn skip_extensions(text: &str, mut at: usize) -> usize {
+    while text[at..].starts_with("#![") {
+        let end = text[at..].find(']').map_or(text.len(), |end| at + end + 1);
+        at = skip_blank(text, end);
+    }
+    at
 }
 
 /// The identifier with which a text begins; empty if there is none.
@@ -162,6 +171,7 @@ mod tests {
         ];
         assert_eq!(pairs(text), expected);
         assert_eq!(pairs("()"), []);
+        assert_eq!(pairs("#![enable(implicit_some)]\n#![enable(unwrap_newtypes)] // on\n(a: 1)"), [("a", "1")]);
     }
 
     #[test]

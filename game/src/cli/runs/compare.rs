@@ -46,7 +46,13 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
-    let runs = read(&args.runs)?;
+    let mut runs = read(&args.runs)?;
+    if runs.iter().any(|run| run.curves.last_step() > 0) {
+        // Behaviour cloning trains nothing, and a run that has just begun has nothing to show.
+        for run in runs.extract_if(.., |run| run.curves.last_step() == 0) {
+            eprintln!("warning: {} is left out: it has no metrics", run.path.display());
+        }
+    }
     let groups = group_runs(&runs);
     let curves = mean_and_spread(&groups, &args.metric)?;
     groups.iter().flat_map(RunGroup::warnings).for_each(|warning| eprintln!("warning: {warning}"));
