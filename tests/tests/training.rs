@@ -37,7 +37,8 @@ fn experiment() -> Experiment {
 }
 
 fn info(algorithm: Algorithm) -> RunInfo {
-    RunInfo { algorithm, seed: 1, version: "test".into(), revision: "test".into() }
+    let device = DeviceKind::Flex;
+    RunInfo { algorithm, seed: 1, version: "test".into(), revision: "test".into(), skills: None, device }
 }
 
 /// A skill model from a random walker that is worth copying in half of its steps.

@@ -18,7 +18,7 @@ use bevy_playbot::{
         Experiment, Trainer,
         checkpoint::Which,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
-        run_dir::{RunDir, write_atomically},
+        run_dir::{RunDir, RunInfo, write_atomically},
         study::StudyRun,
     },
 };
@@ -45,7 +45,7 @@ pub struct Runner {
     /// Threads.
     threads: usize,
     /// Skill models that this process has learned already.
-    learned: BTreeSet<String>,
+    learned: BTreeSet<PathBuf>,
     /// The recordings that were read last, and what they are.
     demos: Option<(Recordings, Dataset)>,
 }
@@ -105,14 +105,27 @@ impl Runner {
         if self.force || !folder.exists() || is_unborn(folder) {
             return Ok(None);
         }
-        let (dir, saved, _) = RunDir::open(folder)?;
+        let (dir, saved, info) = RunDir::open(folder)?;
         if saved == run.experiment {
+            self.warn_of_others(folder, &info);
             return Ok(Some(dir));
         }
         Err(CliError::Usage(format!(
             "{} holds a run with other settings: choose another folder with --runs, or replace all with --force",
             folder.display()
         )))
+    }
+
+    /// Says if another program or device made a run whose results go into the same table.
+    fn warn_of_others(&self, folder: &Path, info: &RunInfo) {
+        let revision = env!("PLAYBOT_REVISION");
+        if info.revision != revision {
+            let folder = folder.display();
+            eprintln!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+        }
+        if info.device != self.device {
+            eprintln!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
+        }
     }
 
     /// A new folder for a run, in place of what is there.
@@ -122,7 +135,8 @@ impl Runner {
             // The program was stopped while it made the folder.
             fs::remove_dir_all(&folder).map_err(|error| io_error("remove", &folder, &error))?;
         }
-        Ok(create_run(&folder, &run.experiment, self.force)?)
+        let skills = self.skill_file(run)?;
+        Ok(create_run(&folder, &run.experiment, Some(&skills), self.device, self.force)?)
     }
 
     /// Trains what has to be trained. What is to be replaced stays until its skills are there.
@@ -166,9 +180,8 @@ impl Runner {
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
     fn skills(&mut self, game: &dyn Game, run: &StudyRun) -> Result<Option<SkillModel>, CliError> {
-        let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
-        let file = self.folder.join(&name);
-        let is_new = self.force && !self.learned.contains(&name);
+        let file = self.skill_file(run)?;
+        let is_new = self.force && !self.learned.contains(&file);
         if is_new || !file.exists() {
             let demos = self.demos(game, &run.experiment)?;
             let checkpoint = learn_skills::checkpoint_of(&file);
@@ -179,9 +192,14 @@ impl Runner {
             let Some(model) = learned else { return Ok(None) };
             model.save(&file)?;
             learn_skills::remove(&checkpoint)?;
-            self.learned.insert(name);
+            self.learned.insert(file.clone());
         }
         Ok(Some(SkillModel::load(&file, self.device)?))
+    }
+
+    fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, CliError> {
+        let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
+        Ok(self.folder.join(name))
     }
 
     fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {

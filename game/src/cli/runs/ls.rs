@@ -104,6 +104,8 @@ pub fn to_json(run: &RunRecord) -> Value {
         "checkpoints": run.checkpoints.iter().map(|checkpoint| checkpoint.summary).collect::<Vec<_>>(),
         "version": run.info.version,
         "revision": run.info.revision,
+        "skills": run.info.skills,
+        "device": run.info.device,
     })
 }
 

@@ -73,13 +73,15 @@ fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurv
 fn print_head(run: &RunRecord) -> Result<(), CliError> {
     let (info, experiment) = (&run.info, &run.experiment);
     print_line(format!(
-        "{}: {} on {}, seed {}, by version {} ({})",
+        "{}: {} on {}, seed {}, by version {} ({}) on {}{}",
         run.path.display(),
         info.algorithm,
         experiment.game,
         info.seed,
         info.version,
-        info.revision
+        info.revision,
+        info.device,
+        info.skills.as_ref().map_or(String::new(), |skills| format!(", skill model {skills}"))
     ))?;
     let state = if run.is_finished() { "finished" } else { "not finished" };
     let speed = run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", whole(speed)));
