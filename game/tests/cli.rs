@@ -195,6 +195,23 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     assert_eq!(methods, ["score-ppo", "bc", "random"]);
     assert!(rows.iter().all(|row| row["split"] == "hard:64..65" && row["episodes"] == 2));
 
+    let mut swapped = vec!["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--run", "runs/b"];
+    swapped.extend(["--set", "train=hard:64..65", "--set", "test=hard:0..3", "--steps", "128"]);
+    ok(run(&swapped));
+    let eval = |more: &[&str]| run(&[&["eval", "--run", "runs/a", "--run", "runs/b", "--json"], more].concat());
+    let seen = eval(&[]);
+    assert_eq!(code(&seen), 3);
+    for words in ["runs/b was trained on hard:64..65", "held-out levels hard:64..65", "--levels"] {
+        assert!(errors(&seen).contains(words), "{}", errors(&seen));
+    }
+    assert_eq!(lines(&ok(eval(&["--levels", "hard:64..65"]))).len(), 2, "on purpose");
+    let saved = folder.path().join("runs/b/experiment.ron");
+    let text = std::fs::read_to_string(&saved).expect("written").replace("\"coinrun\"", "\"maze\"");
+    std::fs::write(&saved, text).expect("writable");
+    let foreign = eval(&["--levels", "hard:64..65"]);
+    assert_eq!(code(&foreign), 3);
+    assert!(errors(&foreign).contains("runs/b is a run of `maze`"), "{}", errors(&foreign));
+
     let quick = ok(run(&["quickstart", "--experiment", "tiny.ron", "--run", "runs/quick", "--json"]));
     let methods: Vec<_> = lines(&quick).iter().filter_map(|row| row["method"].as_str().map(str::to_owned)).collect();
     assert_eq!(methods, ["score-ppo", "ppo", "bc", "right-jump", "random"]);

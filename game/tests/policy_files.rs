@@ -145,6 +145,8 @@ fn the_program_exports_shows_and_measures() {
     done(&playbot(&["policy", "export", "--run", "run", "--out", "bot.policy"]));
     let again = playbot(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
     assert_eq!(again.0, Some(3));
+    let ignored = playbot(&["policy", "export", "--run", "run", "--set", "seed=2", "--out", "other.policy"]);
+    assert!(ignored.0 == Some(3) && ignored.2.contains("cannot be used with"), "{}", ignored.2);
     let shown = playbot(&["policy", "show", "bot.policy", "--json"]);
     done(&shown);
     let card: Value = serde_json::from_str(&shown.1).expect("JSON");

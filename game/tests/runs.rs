@@ -30,7 +30,7 @@ fn three_runs(folder: &Path) {
     let config = |lr: &str| {
         format!(
             r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", demos: "none", steps: 512, arenas: 8, worlds: 2,
-            ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8], lr: {lr}))"#
+            study: (threshold: 0.25), ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8], lr: {lr}))"#
         )
     };
     fs::write(folder.join("a.ron"), config("0.001")).expect("writable");
@@ -68,6 +68,7 @@ fn runs_are_listed_shown_and_compared() {
     assert_eq!((svg.matches("class=\"band").count(), svg.matches("class=\"line").count()), (1, 4), "two are keys");
     let groups = json_lines(&output(folder, &[&compare[..3], &["--metric", "losses/entropy", "--json"]].concat(), 0).0);
     assert_eq!(groups[0]["group"]["seeds"], serde_json::json!([1, 2]));
+    assert!(groups[0]["threshold"].is_null(), "the threshold of an experiment is a success rate");
     let last = |run: &str| -> f64 {
         let text = fs::read_to_string(folder.join(run).join("metrics.jsonl")).expect("written");
         json_lines(&text).last().and_then(|line| line["losses/entropy"].as_f64()).expect("a number")
@@ -75,6 +76,31 @@ fn runs_are_listed_shown_and_compared() {
     let mean = (last("runs/a/1") + last("runs/a/2")) / 2.0;
     assert_eq!(groups[0]["group"]["last_mean"].as_f64(), Some(mean));
     assert_eq!(groups[1]["group"]["last_sd"].as_f64(), Some(0.0), "one seed");
+}
+
+#[test]
+fn the_threshold_is_that_of_the_experiments() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    let edit = |file: &str, from: &str, to: &str| {
+        let text = fs::read_to_string(folder.join(file)).expect("written");
+        assert!(text.contains(from), "{text}");
+        fs::write(folder.join(file), text.replace(from, to)).expect("writable");
+    };
+    // So short a training ends no episode: another curve stands in for the success rate.
+    for run in ["runs/a/1", "runs/a/2", "runs/b"] {
+        edit(&format!("{run}/metrics.jsonl"), "losses/entropy", "charts/success_rate");
+    }
+    let compare = |more: &[&str]| output(folder, &[&["runs", "compare", "runs", "--json"], more].concat(), 0);
+    assert_eq!(json_lines(&compare(&[]).0)[0]["threshold"], 0.25);
+    assert_eq!(json_lines(&compare(&["--threshold", "0.5"]).0)[0]["threshold"], 0.5);
+    edit("runs/b/experiment.ron", "threshold: 0.25", "threshold: 0.75");
+    let (groups, warnings) = compare(&[]);
+    assert!(
+        json_lines(&groups)[0]["threshold"].is_null() && warnings.contains("differ in study.threshold"),
+        "{warnings}"
+    );
 }
 
 #[test]

@@ -111,3 +111,49 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     assert_eq!(fs::metadata(&metrics).and_then(|data| data.modified()).expect("there"), before, "it ran again");
     refused(&study(folder, "killed", &["--resume", "--set", "ppo.lr=0.1"]), "other settings");
 }
+
+#[test]
+fn what_is_there_is_not_replaced_before_everything_can_be_read() {
+    let folder = prepared();
+    let folder = folder.path();
+    let small = |more: &[&str]| {
+        let variants = r#"variants=[(name: "plain", set: ["algorithm=ppo"]), (name: "full")]"#;
+        study(folder, "runs", &[&["--seeds", "1", "--set", "steps=128", "--set", variants], more].concat())
+    };
+    ok(small(&[]));
+    let results = ["plain-seed1", "full-seed1"].map(|run| folder.join("runs").join(run).join("result.json"));
+    refused(&small(&["--force", "--set", "demos=nowhere"]), "nowhere");
+    refused(&small(&["--force", "--set", "test=easy:4..9"]), "level 4 is one of the held-out levels easy:4..9");
+    assert!(results.iter().all(|result| result.exists()), "finished runs were lost");
+
+    let description = |run: &str| folder.join("runs").join(run).join("run.json");
+    let info = |run| -> Value { serde_json::from_slice(&fs::read(description(run)).expect("there")).expect("JSON") };
+    let made = info("full-seed1");
+    assert!(made["skills"].as_str().is_some_and(|checksum| checksum.len() == 8) && made["device"] == "flex", "{made}");
+    assert!(info("plain-seed1")["skills"].is_null(), "PPO has no skills");
+    let mut foreign = made.clone();
+    foreign["revision"] = "another".into();
+    fs::write(description("full-seed1"), foreign.to_string()).expect("writable");
+    let resumed = ok(small(&["--resume"]));
+    let warnings = String::from_utf8_lossy(&resumed.stderr).into_owned();
+    assert!(warnings.contains("full-seed1 was made by revision another"), "{warnings}");
+    assert!(!warnings.contains("plain-seed1 was made"), "{warnings}");
+
+    // Killed before there was a run.json.
+    let run = folder.join("runs/full-seed1");
+    for entry in fs::read_dir(&run).expect("there").flatten().filter(|entry| entry.file_name() != "experiment.ron") {
+        let path = entry.path();
+        if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) }.expect("removed");
+    }
+    ok(small(&["--force"]));
+    assert_eq!(info("full-seed1"), made, "the same skills again");
+
+    let kept = ["old", "old.checkpoint"].map(|name| folder.join(name));
+    kept.iter().for_each(|file| fs::write(file, "old").expect("writable"));
+    let learn = ["learn-skills", "--experiment", "tiny.ron", "--demos", "nowhere", "--out", "old", "--force"];
+    refused(&command(folder, &learn).output().expect("the program starts"), "nowhere");
+    assert!(kept.iter().all(|file| file.exists()), "an unfinished training was lost");
+    let learn = ["learn-skills", "--experiment", "tiny.ron", "--out", "old", "--force"];
+    ok(command(folder, &learn).output().expect("the program starts"));
+    assert!(kept[0].exists() && !kept[1].exists());
+}

@@ -36,6 +36,11 @@ impl LevelSplit {
         self.first..=self.last
     }
 
+    /// Whether a level of a mode is one of them.
+    pub fn contains(&self, mode: &str, level: u64) -> bool {
+        self.mode == mode && (self.first..=self.last).contains(&level)
+    }
+
     /// Whether some level belongs to both.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.mode == other.mode && self.first <= other.last && other.first <= self.last
@@ -97,6 +102,13 @@ mod tests {
         for bad in ["", "hard", "hard:9..3", ":1..2", "hard:a..b", "hard:-1..2", "easy:0..18446744073709551615"] {
             assert!(bad.parse::<LevelSplit>().is_err(), "{bad} was taken");
         }
+    }
+
+    #[test]
+    fn a_level_belongs_to_a_split_of_its_mode() {
+        let split: LevelSplit = "hard:64..127".parse().expect("a split");
+        assert!(split.contains("hard", 64) && split.contains("hard", 127));
+        assert!(!split.contains("hard", 63) && !split.contains("hard", 128) && !split.contains("easy", 64));
     }
 
     #[test]

@@ -86,8 +86,21 @@ fn kept_observations_equal_those_of_a_replay() {
     std::fs::create_dir_all(&full).expect("writable");
     record(&bare.join("walk.demo"), header(), 10);
     record(&full.join("walk.demo"), DemoHeader { observation_names: Corridor.observation().names, ..header() }, 10);
-    let load = |path: &Path| load_dataset(&Corridor, path, |_| {}).expect("readable");
+    let load = |path: &Path| load_dataset(&Corridor, path, None, |_| {}).expect("readable");
     assert_eq!(load(&bare), load(&full));
+}
+
+#[test]
+fn held_out_levels_are_not_learned_from() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("walk.demo");
+    record(&path, header(), 10);
+    let load = |held_out: &str| load_dataset(&Corridor, &path, Some(&held_out.parse().expect("a split")), |_| {});
+    let error = load("plain:7..15").expect_err("level 7 is recorded").to_string();
+    for words in ["walk.demo", "level 7", "plain:7..15", "`test`"] {
+        assert!(error.contains(words), "{error}");
+    }
+    assert!(load("other:0..15").is_ok() && load("plain:60..70").is_ok(), "other levels");
 }
 
 #[test]

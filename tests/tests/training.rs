@@ -37,7 +37,8 @@ fn experiment() -> Experiment {
 }
 
 fn info(algorithm: Algorithm) -> RunInfo {
-    RunInfo { algorithm, seed: 1, version: "test".into(), revision: "test".into() }
+    let device = DeviceKind::Flex;
+    RunInfo { algorithm, seed: 1, version: "test".into(), revision: "test".into(), skills: None, device }
 }
 
 /// A skill model from a random walker that is worth copying in half of its steps.
@@ -56,7 +57,7 @@ fn skills(folder: &Path) -> SkillModel {
     while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
         world.tick().expect("sound");
     }
-    let dataset = load_dataset(&Corridor, &path, |_| {}).expect("readable");
+    let dataset = load_dataset(&Corridor, &path, None, |_| {}).expect("readable");
     let config = experiment().skills;
     let epochs = config.epochs;
     let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");

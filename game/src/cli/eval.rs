@@ -115,7 +115,8 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut players = Vec::new();
     for path in &args.run {
-        let (run, _, info) = RunDir::open(path)?;
+        let (run, own, info) = RunDir::open(path)?;
+        check_run(path, &own, experiment, args)?;
         let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         players.push((
@@ -143,6 +144,25 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
         }
     }
     Ok(players)
+}
+
+/// A run is measured in its own game, and on levels it was trained on only if somebody names them.
+fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) -> Result<(), CliError> {
+    let path = path.display();
+    if own.game != measured.game {
+        return Err(CliError::Usage(format!(
+            "{path} is a run of `{}`, but `{}` is measured: call `playbot eval` once for each game",
+            own.game, measured.game
+        )));
+    }
+    if args.levels.is_empty() && own.train.overlaps(&measured.test) {
+        return Err(CliError::Usage(format!(
+            "{path} was trained on {}, which shares levels with the held-out levels {}: choose levels that none of the \
+             runs has seen, or measure there on purpose, with --levels",
+            own.train, measured.test
+        )));
+    }
+    Ok(())
 }
 
 /// A method's name; with its path where there are several of its kind.

@@ -9,6 +9,7 @@ use bevy_playbot::{
     demo::dataset::load_dataset,
     game::Game,
     learner::{Dataset, DeviceKind, SkillMetrics, SkillModel, SkillTrainer},
+    split::LevelSplit,
     train::Experiment,
 };
 use serde_json::json;
@@ -57,7 +58,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let checkpoint = prepare(&args)?;
     let game = registry::game(&experiment.game)?;
     let demos = args.demos.clone().unwrap_or_else(|| experiment::resolve(&experiment.demos));
-    let dataset = read_demos(game, &demos)?;
+    let dataset = read_demos(game, &demos, &experiment.test)?;
+    if args.force {
+        // Not earlier: what there is stays if there is nothing to learn from.
+        remove(&checkpoint)?;
+    }
     interrupt::listen();
     let report = |epoch, metrics: &SkillMetrics| {
         if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
@@ -97,12 +102,11 @@ pub fn remove(checkpoint: &Path) -> Result<(), CliError> {
 /// The checkpoint's path, if what lies there fits what was asked for.
 fn prepare(args: &Args) -> Result<PathBuf, CliError> {
     let checkpoint = checkpoint_of(&args.out);
-    if args.force {
-        remove(&checkpoint)?;
-    } else if args.out.exists() {
+    if args.out.exists() && !args.force {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
     }
     match (args.resume, checkpoint.exists()) {
+        _ if args.force => Ok(checkpoint),
         (true, false) => Err(CliError::Usage(format!("nothing to resume: there is no {}", checkpoint.display()))),
         (false, true) => Err(CliError::Usage(format!(
             "{} holds an unfinished training: go on with --resume, or start anew with --force",
@@ -122,10 +126,10 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 ///
 /// # Errors
 ///
-/// A recording cannot be read or belongs to another game.
-pub fn read_demos(game: &dyn Game, path: &Path) -> Result<Dataset, CliError> {
+/// A recording cannot be read, belongs to another game, or shows a held-out level.
+pub fn read_demos(game: &dyn Game, path: &Path, held_out: &LevelSplit) -> Result<Dataset, CliError> {
     let bar = progress::bar("replay recordings", 0, "steps");
-    let dataset = load_dataset(game, path, |steps| {
+    let dataset = load_dataset(game, path, Some(held_out), |steps| {
         bar.set_length(steps);
         bar.set_position(steps);
     });

@@ -49,10 +49,10 @@ enum Verb {
 #[derive(clap::Args)]
 struct Export {
     /// Folder of a run.
-    #[arg(long, conflicts_with = "skills", required_unless_present = "skills")]
+    #[arg(long, conflicts_with_all = ["skills", "experiment", "set"], required_unless_present = "skills")]
     run: Option<PathBuf>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
-    #[arg(long, default_value = "last")]
+    #[arg(long, default_value = "last", conflicts_with = "skills")]
     checkpoint: Which,
     /// Skill model: exports behaviour cloning, the decoder under the prior.
     #[arg(long)]

@@ -24,6 +24,9 @@ use super::{
 };
 use crate::registry;
 
+/// The file of the skill model.
+const SKILLS: &str = "skills.safetensors";
+
 /// Learns skills from the shipped demonstrations, trains SCORE-PPO and PPO for the same number of steps on the training
 /// levels, and measures both, behaviour cloning and the blind baselines on levels that none of them has seen.
 #[derive(clap::Args)]
@@ -140,7 +143,7 @@ fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Optio
     std::fs::create_dir_all(&args.run)
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}", args.run.display())))?;
     interrupt::listen();
-    let dataset = learn_skills::read_demos(game, &experiment::resolve(&experiment.demos))?;
+    let dataset = learn_skills::read_demos(game, &experiment::resolve(&experiment.demos), &experiment.test)?;
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });
@@ -149,7 +152,7 @@ fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Optio
     })?;
     let Some(model) = model else { return Ok(None) };
     write_atomically(&args.run.join("skills.jsonl"), log.as_bytes())?;
-    model.save(&args.run.join("skills.safetensors"))?;
+    model.save(&args.run.join(SKILLS))?;
     Ok(Some(model))
 }
 
@@ -164,7 +167,8 @@ fn train_one(
     let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
     let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads)?;
-    let run = create_run(&args.run.join(algorithm.name()), &experiment, true)?;
+    let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
+    let run = create_run(&folder, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {

@@ -73,6 +73,9 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     }
     interrupt::listen();
     let mut runner = Runner::new(&folder, args.force, args.device, args.threads);
+    if args.force {
+        runner.check_demos(&runs)?;
+    }
     let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
         eprintln!("stopped and saved: go on with `{} --resume`", restart(&args));
         return Ok(Outcome::Pass);

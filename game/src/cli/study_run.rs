@@ -13,10 +13,12 @@ use bevy_playbot::{
     policy::ActionDraw,
     report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
     runs::RunCurves,
+    split::LevelSplit,
     train::{
         Experiment, Trainer,
         checkpoint::Which,
-        run_dir::{RunDir, write_atomically},
+        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+        run_dir::{RunDir, RunInfo, write_atomically},
         study::StudyRun,
     },
 };
@@ -31,7 +33,6 @@ use super::{
 use crate::registry;
 
 const RESULT: &str = "result.json";
-const SUCCESS: &str = "charts/success_rate";
 
 /// Where the runs of a study live, and how they are computed.
 pub struct Runner {
@@ -44,10 +45,13 @@ pub struct Runner {
     /// Threads.
     threads: usize,
     /// Skill models that this process has learned already.
-    learned: BTreeSet<String>,
-    /// The recordings that were read last, and their game and path.
-    demos: Option<((String, PathBuf), Dataset)>,
+    learned: BTreeSet<PathBuf>,
+    /// The recordings that were read last, and what they are.
+    demos: Option<(Recordings, Dataset)>,
 }
+
+/// Game, path, and the levels that must not be among them.
+type Recordings = (String, PathBuf, LevelSplit);
 
 /// What came of a run, or `None` after Ctrl-C.
 pub type Ended = Option<(StudyResult, SuccessCurve)>;
@@ -65,11 +69,11 @@ impl Runner {
     pub fn run(&mut self, run: &StudyRun, title: &str, on_step: impl FnMut(u64)) -> Result<Ended, CliError> {
         let game = registry::game(&run.experiment.game)?;
         let folder = self.folder.join(run.id());
-        let dir = self.open(run, &folder)?;
-        if !self.force && folder.join(RESULT).exists() {
+        let saved = self.saved(run, &folder)?;
+        if saved.is_some() && folder.join(RESULT).exists() {
             return Ok(Some((read_result(&folder.join(RESULT))?, success_curve(&folder)?)));
         }
-        let Some((player, training, curve)) = self.player(game, run, &dir, title, on_step)? else { return Ok(None) };
+        let Some((player, training, curve)) = self.player(game, run, saved, title, on_step)? else { return Ok(None) };
         let experiment = &run.experiment;
         let plan = methods::plan(experiment, &experiment.test, experiment.eval.episodes_per_level, self.threads);
         let measured = methods::measure(game, &run.id(), &player, &plan)?;
@@ -84,19 +88,27 @@ impl Runner {
         Ok(Some((result, curve)))
     }
 
-    /// The folder of a run: a new one, or the one that is there if it holds the same run.
-    fn open(&self, run: &StudyRun, folder: &Path) -> Result<RunDir, CliError> {
-        if self.force || !folder.exists() {
-            return Ok(create_run(folder, &run.experiment, self.force)?);
+    /// Reads the demonstrations of all runs that learn skills, so that nothing is replaced if one cannot be read.
+    ///
+    /// # Errors
+    ///
+    /// Recordings cannot be read, belong to another game, or show held-out levels.
+    pub fn check_demos(&mut self, runs: &[StudyRun]) -> Result<(), CliError> {
+        for StudyRun { experiment, .. } in runs.iter().filter(|run| run.experiment.algorithm.needs_skills()) {
+            self.demos(registry::game(&experiment.game)?, experiment)?;
         }
-        if !folder.join("run.json").exists() && is_unborn(folder) {
-            // The program was stopped while it made the folder.
-            fs::remove_dir_all(folder).map_err(|error| io_error("remove", folder, &error))?;
-            return Ok(create_run(folder, &run.experiment, false)?);
+        Ok(())
+    }
+
+    /// The folder of a run that is there and is gone on with, if it holds the same run.
+    fn saved(&self, run: &StudyRun, folder: &Path) -> Result<Option<RunDir>, CliError> {
+        if self.force || !folder.exists() || is_unborn(folder) {
+            return Ok(None);
         }
-        let (dir, saved, _) = RunDir::open(folder)?;
+        let (dir, saved, info) = RunDir::open(folder)?;
         if saved == run.experiment {
-            return Ok(dir);
+            self.warn_of_others(folder, &info);
+            return Ok(Some(dir));
         }
         Err(CliError::Usage(format!(
             "{} holds a run with other settings: choose another folder with --runs, or replace all with --force",
@@ -104,24 +116,51 @@ impl Runner {
         )))
     }
 
-    /// Trains what has to be trained.
+    /// Says if another program or device made a run whose results go into the same table.
+    fn warn_of_others(&self, folder: &Path, info: &RunInfo) {
+        let revision = env!("PLAYBOT_REVISION");
+        if info.revision != revision {
+            let folder = folder.display();
+            eprintln!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+        }
+        if info.device != self.device {
+            eprintln!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
+        }
+    }
+
+    /// A new folder for a run, in place of what is there.
+    fn create(&self, run: &StudyRun) -> Result<RunDir, CliError> {
+        let folder = self.folder.join(run.id());
+        if is_unborn(&folder) {
+            // The program was stopped while it made the folder.
+            fs::remove_dir_all(&folder).map_err(|error| io_error("remove", &folder, &error))?;
+        }
+        let skills = self.skill_file(run)?;
+        Ok(create_run(&folder, &run.experiment, Some(&skills), self.device, self.force)?)
+    }
+
+    /// Trains what has to be trained. What is to be replaced stays until its skills are there.
     fn player(
         &mut self,
         game: &dyn Game,
         run: &StudyRun,
-        dir: &RunDir,
+        saved: Option<RunDir>,
         title: &str,
         mut on_step: impl FnMut(u64),
     ) -> Result<Option<(Player, Option<TrainingResult>, SuccessCurve)>, CliError> {
         let experiment = &run.experiment;
         let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
-        let begun = dir.checkpoint(Which::Last).is_ok();
+        let begun = saved.as_ref().is_some_and(|dir| dir.checkpoint(Which::Last).is_ok());
         let skills = match experiment.algorithm.needs_skills() && !begun {
             true => match self.skills(game, run)? {
                 Some(skills) => Some(skills),
                 None => return Ok(None),
             },
             false => None,
+        };
+        let dir = match saved {
+            Some(dir) => dir,
+            None => self.create(run)?,
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
             return Ok(Some((cloning(skills, experiment, draw), None, Vec::new())));
@@ -131,7 +170,7 @@ impl Runner {
         } else {
             Trainer::new(game, experiment, skills.as_ref(), self.device, self.threads)?
         };
-        if !drive(dir, &mut trainer, title, |report| on_step(report.step))? {
+        if !drive(&dir, &mut trainer, title, |report| on_step(report.step))? {
             return Ok(None);
         }
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
@@ -141,9 +180,8 @@ impl Runner {
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
     fn skills(&mut self, game: &dyn Game, run: &StudyRun) -> Result<Option<SkillModel>, CliError> {
-        let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
-        let file = self.folder.join(&name);
-        let is_new = self.force && !self.learned.contains(&name);
+        let file = self.skill_file(run)?;
+        let is_new = self.force && !self.learned.contains(&file);
         if is_new || !file.exists() {
             let demos = self.demos(game, &run.experiment)?;
             let checkpoint = learn_skills::checkpoint_of(&file);
@@ -154,17 +192,22 @@ impl Runner {
             let Some(model) = learned else { return Ok(None) };
             model.save(&file)?;
             learn_skills::remove(&checkpoint)?;
-            self.learned.insert(name);
+            self.learned.insert(file.clone());
         }
         Ok(Some(SkillModel::load(&file, self.device)?))
     }
 
+    fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, CliError> {
+        let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
+        Ok(self.folder.join(name))
+    }
+
     fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
-        let key = (experiment.game.clone(), experiment::resolve(&experiment.demos));
+        let key = (experiment.game.clone(), experiment::resolve(&experiment.demos), experiment.test.clone());
         match &self.demos {
             Some((known, dataset)) if *known == key => Ok(dataset.clone()),
             _ => {
-                let dataset = learn_skills::read_demos(game, &key.1)?;
+                let dataset = learn_skills::read_demos(game, &key.1, &key.2)?;
                 self.demos = Some((key, dataset.clone()));
                 Ok(dataset)
             }
@@ -184,15 +227,15 @@ fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<Tr
     let curves = RunCurves::read(run)?;
     Ok(TrainingResult {
         steps,
-        steps_to_threshold: steps_to_reach(curves.settled(SUCCESS), experiment.study.threshold),
-        success: curves.last(SUCCESS),
-        episodic_return: curves.last("charts/episodic_return"),
+        steps_to_threshold: steps_to_reach(curves.settled(SUCCESS_RATE), experiment.study.threshold),
+        success: curves.last(SUCCESS_RATE),
+        episodic_return: curves.last(EPISODIC_RETURN),
     })
 }
 
 /// The success rate of the last 100 training episodes, from the metrics of a run; empty if it was not trained.
 fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
-    Ok(RunCurves::read(run)?.curve(SUCCESS).to_vec())
+    Ok(RunCurves::read(run)?.curve(SUCCESS_RATE).to_vec())
 }
 
 fn read_result(path: &Path) -> Result<StudyResult, CliError> {

@@ -7,6 +7,7 @@ use bevy_playbot::{
     train::{
         Algorithm, Experiment, Trainer, UpdateReport,
         checkpoint::Which,
+        checksum::file_checksum,
         run_dir::{RunDir, RunError, RunInfo},
         trainer::TrainError,
         worlds::default_threads,
@@ -86,7 +87,7 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
         None => None,
     };
     let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.device, args.threads)?;
-    let run = create_run(&args.run, &experiment, args.force)?;
+    let run = create_run(&args.run, &experiment, args.skills.as_deref(), args.device, args.force)?;
     Ok((run, trainer))
 }
 
@@ -104,17 +105,26 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     Ok((run, trainer))
 }
 
-/// Makes the folder of a run.
+/// Makes the folder of a run, which says what file its skills are from.
 ///
 /// # Errors
 ///
 /// It exists and `force` is off, or it cannot be written.
-pub fn create_run(path: &Path, experiment: &Experiment, force: bool) -> Result<RunDir, RunError> {
+pub fn create_run(
+    path: &Path,
+    experiment: &Experiment,
+    skills: Option<&Path>,
+    device: DeviceKind,
+    force: bool,
+) -> Result<RunDir, RunError> {
+    let skills = skills.filter(|_| experiment.algorithm.needs_skills());
     let info = RunInfo {
         algorithm: experiment.algorithm,
         seed: experiment.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         revision: env!("PLAYBOT_REVISION").to_owned(),
+        skills: skills.map(file_checksum).transpose()?,
+        device,
     };
     RunDir::create(path, &experiment.without_study(), &info, force)
 }

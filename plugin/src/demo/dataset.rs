@@ -13,18 +13,25 @@ use super::{
 use crate::{
     game::{Game, check_mode},
     observation::Observation,
+    split::LevelSplit,
 };
 
 /// Reads all recordings of a game below a path and pairs each action with the observation that preceded it.
 ///
 /// Observations that a recording keeps are used as they are; otherwise the episode is replayed through the game's
 /// sensor, so that a recording survives a change of sensors. `progress` hears the number of steps done. The files may
-/// differ in mode; the observation must not depend on it.
+/// differ in mode; the observation must not depend on it. None may show a level of `held_out`, if there is such a split:
+/// what is measured there would be no generalisation.
 ///
 /// # Errors
 ///
-/// [`VerifyError`] for files that cannot be read or belong to another game or version.
-pub fn load_dataset(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<Dataset, VerifyError> {
+/// [`VerifyError`] for files that cannot be read, belong to another game or version, or show a held-out level.
+pub fn load_dataset(
+    game: &dyn Game,
+    path: &Path,
+    held_out: Option<&LevelSplit>,
+    mut progress: impl FnMut(u64),
+) -> Result<Dataset, VerifyError> {
     let names = game.observation().names;
     let mut episodes = Vec::new();
     let mut steps = 0;
@@ -35,6 +42,10 @@ pub fn load_dataset(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64))
         let mut stage = ReplayStage::new(game, &header.mode);
         for (index, episode) in reader.enumerate() {
             let episode = Arc::new(episode?);
+            let level = episode.level_seed;
+            if let Some(split) = held_out.filter(|split| split.contains(&header.mode, level)) {
+                return Err(VerifyError::HeldOut { path: file, level, split: split.clone() });
+            }
             let observations = if header.observation_names == names {
                 episode.observations.clone()
             } else {

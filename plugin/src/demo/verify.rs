@@ -21,6 +21,7 @@ use crate::{
     headless::tick_world,
     level::LevelQueue,
     policy::AgentStreams,
+    split::LevelSplit,
 };
 
 /// What a check by replay found.
@@ -60,6 +61,19 @@ pub enum VerifyError {
         path: PathBuf,
         /// The mode, and those there are.
         source: UnknownName,
+    },
+    /// A recording shows a level that is kept for the test.
+    #[error(
+        "{}: level {level} is one of the held-out levels {split}, which nobody may learn from: take recordings of other \
+         levels, or hold out others with `test`", path.display()
+    )]
+    HeldOut {
+        /// The file.
+        path: PathBuf,
+        /// The level.
+        level: u64,
+        /// The held-out levels.
+        split: LevelSplit,
     },
     /// The recordings do not make a data set.
     #[error(transparent)]

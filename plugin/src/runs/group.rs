@@ -7,6 +7,9 @@ use super::{record::RunRecord, settings::settings};
 /// More differing settings than this are not spelled out in a group's label.
 const NAMED: usize = 3;
 
+/// Under this name the skill models of a group stand among its settings.
+const SKILLS: &str = "skills";
+
 /// Runs of the same experiment and algorithm with several seeds.
 #[derive(Clone, Debug)]
 pub struct RunGroup<'a> {
@@ -25,7 +28,7 @@ impl RunGroup<'_> {
     }
 
     /// What makes the runs less comparable than they look: a seed that occurs twice, runs that are not finished, other
-    /// revisions of the code.
+    /// revisions of the code, devices or skill models.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         let first = &self.runs[0];
@@ -41,22 +44,39 @@ impl RunGroup<'_> {
         if self.runs.iter().any(|run| run.info.revision != first.info.revision) {
             warnings.push(format!("{}: made by different revisions of the code", self.label));
         }
+        if self.runs.iter().any(|run| run.info.device != first.info.device) {
+            warnings.push(format!("{}: made on different devices", self.label));
+        }
+        if let Some(skills) = self.differing.get(SKILLS) {
+            warnings.push(format!(
+                "{}: other runs with the same settings and a seed in common had another skill model than {skills}; they \
+                 are kept apart",
+                self.label
+            ));
+        }
         warnings
     }
 }
 
+/// A group while it is put together: the settings of its runs, and the runs.
+type Members<'a> = (BTreeMap<String, String>, Vec<&'a RunRecord>);
+
 /// Puts runs together that differ only in their seed; groups are in the order of their first run.
+///
+/// Runs with different seeds may have different skill models, as those of a study do; with the same seed they may not:
+/// such runs are no second seed, so they go into groups of their own, which are told apart by their `skills`.
 pub fn group_runs(runs: &[RunRecord]) -> Vec<RunGroup<'_>> {
-    let mut groups: Vec<(BTreeMap<String, String>, Vec<&RunRecord>)> = Vec::new();
+    let mut groups: Vec<Members> = Vec::new();
     for run in runs {
         let mut key = settings(&run.experiment);
         key.remove("seed");
         key.insert("algorithm".to_owned(), run.info.algorithm.name().to_owned());
-        match groups.iter_mut().find(|(other, _)| *other == key) {
-            Some((_, members)) => members.push(run),
+        match group_of(&groups, &key, run) {
+            Some(index) => groups[index].1.push(run),
             None => groups.push((key, vec![run])),
         }
     }
+    name_skills(&mut groups);
     let differs = |key: &String| groups.iter().any(|(other, _)| other.get(key) != groups[0].0.get(key));
     let keys: Vec<String> = groups.iter().flat_map(|(key, _)| key.keys()).filter(|key| differs(key)).cloned().collect();
     let mut finished = Vec::new();
@@ -70,6 +90,33 @@ pub fn group_runs(runs: &[RunRecord]) -> Vec<RunGroup<'_>> {
     finished
 }
 
+/// The group a run goes into: where its skill model is already, otherwise the first one where its seed has no other.
+fn group_of(groups: &[Members], key: &BTreeMap<String, String>, run: &RunRecord) -> Option<usize> {
+    let fits = |members: &[&RunRecord]| {
+        members.iter().all(|other| other.info.seed != run.info.seed || other.info.skills == run.info.skills)
+    };
+    let shares = |members: &[&RunRecord]| members.iter().any(|other| other.info.skills == run.info.skills);
+    let mut fitting = (0..groups.len()).filter(|&index| groups[index].0 == *key && fits(&groups[index].1));
+    fitting.clone().find(|&index| shares(&groups[index].1)).or_else(|| fitting.next())
+}
+
+/// Writes the skill models of groups that have nothing else to tell them apart among their settings.
+fn name_skills(groups: &mut [Members]) {
+    let keys: Vec<_> = groups.iter().map(|(key, _)| key.clone()).collect();
+    for (key, members) in groups {
+        if keys.iter().filter(|other| *other == key).count() > 1 {
+            let mut skills: Vec<&str> = Vec::new();
+            for run in members {
+                let name = run.info.skills.as_deref().unwrap_or("unknown");
+                if !skills.contains(&name) {
+                    skills.push(name);
+                }
+            }
+            key.insert(SKILLS.to_owned(), skills.join(","));
+        }
+    }
+}
+
 fn label(algorithm: &str, differing: &BTreeMap<String, String>, number: usize) -> String {
     if differing.len() > NAMED {
         return format!("{algorithm} #{number}");
@@ -80,6 +127,8 @@ fn label(algorithm: &str, differing: &BTreeMap<String, String>, number: usize) -
 
 #[cfg(test)]
 pub(super) mod tests {
+    use playbot_learner::DeviceKind;
+
     use super::{
         super::{curves::RunCurves, settings::tests::experiment},
         *,
@@ -88,7 +137,8 @@ pub(super) mod tests {
 
     pub fn run(algorithm: Algorithm, seed: u64, changes: &str) -> RunRecord {
         let experiment = experiment(&format!("seed: {seed}, {changes}"));
-        let info = RunInfo { algorithm, seed, version: "1".into(), revision: "r".into() };
+        let (version, revision) = ("1".into(), "r".into());
+        let info = RunInfo { algorithm, seed, version, revision, skills: None, device: DeviceKind::Flex };
         let path = format!("{algorithm}-{seed}").into();
         RunRecord { path, experiment, info, curves: RunCurves::default(), checkpoints: Vec::new(), updated: None }
     }
@@ -122,6 +172,28 @@ pub(super) mod tests {
         assert_eq!((groups[0].label.as_str(), groups[1].label.as_str()), ("ppo #1", "ppo #2"));
         assert_eq!((groups[0].differing["arenas"].as_str(), groups[1].differing["arenas"].as_str()), ("64", "8"));
         assert_eq!(groups[1].differing.len(), 4);
+    }
+
+    #[test]
+    fn another_skill_model_is_no_other_seed() {
+        let with = |seed, skills: &str| {
+            let mut run = run(Algorithm::ScorePpo, seed, "");
+            run.info.skills = Some(skills.to_owned());
+            run
+        };
+        let study = [with(1, "a"), with(2, "b")];
+        assert_eq!(grouped(&study), [("score-ppo".to_owned(), vec![1, 2])], "each seed has a model of its own");
+        let runs = [with(1, "a"), with(1, "b"), with(2, "b"), with(2, "a"), with(3, "c")];
+        let expected =
+            [("score-ppo skills=a,c".to_owned(), vec![1, 2, 3]), ("score-ppo skills=b".to_owned(), vec![1, 2])];
+        assert_eq!(grouped(&runs), expected);
+        for group in group_runs(&runs) {
+            assert!(group.warnings().iter().any(|warning| warning.contains("another skill model")));
+        }
+        let mut other = [with(1, "a"), with(2, "a")];
+        other[1].info.device = DeviceKind::Ndarray;
+        let warnings = group_runs(&other)[0].warnings().join("\n");
+        assert!(warnings.contains("devices") && !warnings.contains("skill"), "{warnings}");
     }
 
     #[test]

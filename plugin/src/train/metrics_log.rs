@@ -19,6 +19,10 @@ use super::{
     trainer::UpdateReport,
 };
 
+/// Tag of the success rate of the last 100 episodes.
+pub const SUCCESS_RATE: &str = "charts/success_rate";
+/// Tag of the mean return of the last 100 episodes.
+pub const EPISODIC_RETURN: &str = "charts/episodic_return";
 /// Tag of the environment steps per second.
 pub const SPS: &str = "charts/SPS";
 /// Tag of the number of episodes that have ended.

@@ -3,6 +3,7 @@
 mod algorithm;
 pub mod arena_state;
 pub mod checkpoint;
+pub mod checksum;
 pub mod collect;
 pub mod config;
 mod config_error;

@@ -108,6 +108,12 @@ pub struct RunInfo {
     pub version: String,
     /// Revision of the code, where it is known.
     pub revision: String,
+    /// [Checksum](super::checksum::file_checksum) of the skill model's file, if the algorithm needs one.
+    #[serde(default)]
+    pub skills: Option<String>,
+    /// What it was started on; the usual one where a run does not say.
+    #[serde(default)]
+    pub device: DeviceKind,
 }
 
 /// The saved state of a training besides the learner.

@@ -32,6 +32,14 @@ pub enum StudyError {
     /// The same seed is there twice.
     #[error("seed {0} is there twice: another run with it would be the same run")]
     SameSeed(u64),
+    /// A variant changes what the study itself says.
+    #[error("variant `{variant}`: `{key}` is not for a variant: every one runs with each of the study's `seeds`")]
+    OfTheStudy {
+        /// Its name.
+        variant: String,
+        /// What it tries to change.
+        key: String,
+    },
     /// A variant does not fit.
     #[error("variant `{variant}`: {source}")]
     Config {
@@ -83,11 +91,11 @@ pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> 
     }
     let mut runs = Vec::new();
     for variant in variants(experiment)? {
+        check_keys(&variant)?;
         let changed = experiment
             .without_study()
             .with_set(&variant.set)
-            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source: Box::new(source) })?
-            .without_study();
+            .map_err(|source| StudyError::Config { variant: variant.name.clone(), source: Box::new(source) })?;
         changed.check().map_err(|source| StudyError::Values { variant: variant.name.clone(), source })?;
         runs.extend(seeds.iter().map(|&seed| StudyRun {
             variant: variant.name.clone(),
@@ -95,6 +103,14 @@ pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> 
         }));
     }
     Ok(runs)
+}
+
+fn check_keys(variant: &Variant) -> Result<(), StudyError> {
+    let keys = variant.set.iter().filter_map(|set| Some(set.split_once('=')?.0.trim()));
+    match keys.into_iter().find(|key| ["seed", "seeds", "variants"].contains(key)) {
+        Some(key) => Err(StudyError::OfTheStudy { variant: variant.name.clone(), key: key.to_owned() }),
+        None => Ok(()),
+    }
 }
 
 fn variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyError> {
@@ -135,7 +151,7 @@ mod tests {
 
     #[test]
     fn every_variant_runs_with_every_seed_and_shares_skills_where_it_can() {
-        let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false", "seed=9"]),
+        let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false"]),
             (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"])"#;
         let runs = study_runs(&experiment(variants)).expect("valid");
         let ids: Vec<String> = runs.iter().map(StudyRun::id).collect();
@@ -164,6 +180,10 @@ mod tests {
         assert!(text.contains("variant `b`") && text.contains("`score.kl`"), "{text}");
         let text = error(r#"(name: "b", set: ["ppo.minibatches=7"])"#);
         assert!(text.contains("variant `b`") && text.contains("must divide"), "{text}");
+        for set in ["seed=9", " seeds = [1]", "variants=[]"] {
+            let text = error(&format!(r#"(name: "b", set: ["{set}"])"#));
+            assert!(text.contains("variant `b`") && text.contains("the study's `seeds`"), "{text}");
+        }
         assert!(error(r#"(name: "a"), (name: "a")"#).contains("two variants"));
         assert!(error(r#"(name: "../a")"#).contains("letters, digits"));
         let mut twice = experiment("");

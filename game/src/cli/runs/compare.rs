@@ -8,6 +8,7 @@ use std::{
 use bevy_playbot::{
     report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole},
     runs::{GroupStatistics, RunGroup, RunRecord, find_runs, group_runs, mean_and_spread},
+    train::metrics_log::SUCCESS_RATE,
 };
 use serde_json::json;
 
@@ -15,10 +16,6 @@ use super::{
     super::error::{CliError, Outcome, print_line},
     write_plot,
 };
-
-const SUCCESS: &str = "charts/success_rate";
-/// The success rate whose first step is counted where no other threshold is given.
-const USUAL_THRESHOLD: f64 = 0.8;
 
 /// Compares runs. Runs of the same experiment and algorithm with different seeds are one group, with mean and sample
 /// standard deviation; the label of a group names what sets it apart.
@@ -32,9 +29,10 @@ pub struct Args {
     #[arg(required = true)]
     runs: Vec<PathBuf>,
     /// The metric, by its TensorBoard tag.
-    #[arg(long, default_value = SUCCESS)]
+    #[arg(long, default_value = SUCCESS_RATE)]
     metric: String,
-    /// Count the steps until the metric first reaches this value; 0.8 for the success rate if not given.
+    /// Count the steps until the metric first reaches this value; for the success rate the runs' `study.threshold`
+    /// if not given.
     #[arg(long)]
     threshold: Option<f64>,
     /// Draw mean and spread over the seeds into this SVG file.
@@ -56,7 +54,7 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let groups = group_runs(&runs);
     let curves = mean_and_spread(&groups, &args.metric)?;
     groups.iter().flat_map(RunGroup::warnings).for_each(|warning| eprintln!("warning: {warning}"));
-    let threshold = args.threshold.or((args.metric == SUCCESS).then_some(USUAL_THRESHOLD));
+    let threshold = args.threshold.or_else(|| if args.metric == SUCCESS_RATE { common_threshold(&runs) } else { None });
     let rows: Vec<_> = groups.iter().map(|group| GroupStatistics::new(group, &args.metric, threshold)).collect();
     if args.json {
         for (group, row) in groups.iter().zip(&rows) {
@@ -91,6 +89,17 @@ fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
         }
     }
     Ok(runs)
+}
+
+/// The success rate whose first step the experiments of all runs look for.
+fn common_threshold(runs: &[RunRecord]) -> Option<f64> {
+    let threshold = |run: &RunRecord| run.experiment.study.threshold;
+    let first = runs.first().map(threshold)?;
+    if runs.iter().all(|run| threshold(run) == first) {
+        return Some(first);
+    }
+    eprintln!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
+    None
 }
 
 fn table(metric: &str, threshold: Option<f64>, groups: &[GroupStatistics]) -> PlainTable {

@@ -5,12 +5,14 @@ use std::{path::PathBuf, time::SystemTime};
 use bevy_playbot::{
     report::{PlainTable, readable, whole},
     runs::{RunRecord, RunsError, find_runs},
+    train::metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use serde_json::{Value, json};
 
 use super::super::error::{CliError, Outcome, print_line};
 
-const UNKNOWN: &str = "–";
+/// Stands where there is no number.
+pub const UNKNOWN: &str = "–";
 
 /// Lists the runs in a folder and the folders below it; exit code 1 if one is damaged.
 #[derive(clap::Args)]
@@ -77,8 +79,8 @@ fn row(run: &RunRecord) -> Vec<String> {
         run.info.seed.to_string(),
         whole(run.curves.last_step() as f64),
         whole(run.experiment.steps as f64),
-        number(run.curves.last("charts/episodic_return")),
-        number(run.curves.last("charts/success_rate")),
+        number(run.curves.last(EPISODIC_RETURN)),
+        number(run.curves.last(SUCCESS_RATE)),
         run.curves.steps_per_s().map_or(UNKNOWN.to_owned(), whole),
         age_s(run).map_or(UNKNOWN.to_owned(), |seconds| format!("{} ago", duration(seconds))),
         state.to_owned(),
@@ -95,13 +97,15 @@ pub fn to_json(run: &RunRecord) -> Value {
         "steps": run.curves.last_step(),
         "steps_planned": run.experiment.steps,
         "finished": run.is_finished(),
-        "episodic_return": run.curves.last("charts/episodic_return"),
-        "success_rate": run.curves.last("charts/success_rate"),
+        "episodic_return": run.curves.last(EPISODIC_RETURN),
+        "success_rate": run.curves.last(SUCCESS_RATE),
         "steps_per_s": run.curves.steps_per_s(),
         "age_s": age_s(run),
         "checkpoints": run.checkpoints.iter().map(|checkpoint| checkpoint.summary).collect::<Vec<_>>(),
         "version": run.info.version,
         "revision": run.info.revision,
+        "skills": run.info.skills,
+        "device": run.info.device,
     })
 }
 

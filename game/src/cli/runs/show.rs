@@ -5,13 +5,16 @@ use std::path::PathBuf;
 use bevy_playbot::{
     report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whole},
     runs::{RunRecord, changed_settings},
-    train::checkpoint::Checkpoint,
+    train::{
+        checkpoint::Checkpoint,
+        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+    },
 };
 use serde_json::{Value, json};
 
 use super::{
     super::error::{CliError, Outcome, print_line},
-    ls::{age_s, duration, to_json},
+    ls::{UNKNOWN, age_s, duration, to_json},
     write_plot,
 };
 
@@ -63,20 +66,22 @@ fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurv
     if !wanted.is_empty() {
         return wanted.iter().map(|tag| Ok((tag.as_str(), run.curve(tag)?))).collect();
     }
-    let usual = ["charts/episodic_return", "charts/success_rate"];
+    let usual = [EPISODIC_RETURN, SUCCESS_RATE];
     Ok(usual.into_iter().map(|tag| (tag, run.curves.curve(tag))).filter(|(_, curve)| !curve.is_empty()).collect())
 }
 
 fn print_head(run: &RunRecord) -> Result<(), CliError> {
     let (info, experiment) = (&run.info, &run.experiment);
     print_line(format!(
-        "{}: {} on {}, seed {}, by version {} ({})",
+        "{}: {} on {}, seed {}, by version {} ({}) on {}{}",
         run.path.display(),
         info.algorithm,
         experiment.game,
         info.seed,
         info.version,
-        info.revision
+        info.revision,
+        info.device,
+        info.skills.as_ref().map_or(String::new(), |skills| format!(", skill model {skills}"))
     ))?;
     let state = if run.is_finished() { "finished" } else { "not finished" };
     let speed = run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", whole(speed)));
@@ -120,7 +125,7 @@ fn metrics(run: &RunRecord) -> PlainTable {
     let columns = ["metric", "first", "lowest", "at step", "highest", "at step", "last"];
     let rows = run.curves.iter().map(|(tag, curve)| {
         let Some([first, lowest, highest, last]) = extremes(curve) else {
-            return vec![tag.to_owned(), "–".to_owned()];
+            return vec![tag.to_owned(), UNKNOWN.to_owned()];
         };
         let (low_step, high_step) = (whole(lowest.0 as f64), whole(highest.0 as f64));
         vec![
