@@ -38,7 +38,15 @@ fn experiment() -> Experiment {
 
 fn info(algorithm: Algorithm) -> RunInfo {
     let device = DeviceKind::Flex;
-    RunInfo { algorithm, seed: 1, version: "test".into(), revision: "test".into(), skills: None, device }
+    RunInfo {
+        algorithm,
+        seed: 1,
+        version: "test".into(),
+        revision: "test".into(),
+        game_version: 1,
+        skills: None,
+        device,
+    }
 }
 
 /// A skill model from a random walker that is worth copying in half of its steps.

@@ -101,7 +101,9 @@ fn from_run(path: &Path, which: Which) -> Result<Exported, CliError> {
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed
     );
     let about = (info.algorithm.name().to_owned(), training, code(&info.version, &info.revision));
-    let file = policy_file(game, learner.policy(), learner.skills(), about);
+    let mut file = policy_file(game, learner.policy(), learner.skills(), about);
+    // The rules that it was trained under, which may not be those of today.
+    file.card.game_version = info.game_version;
     Ok((game, experiment, file))
 }
 

@@ -168,7 +168,7 @@ fn train_one(
     let skills = algorithm.needs_skills().then_some(skills);
     let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads)?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
-    let run = create_run(&folder, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
+    let run = create_run(&folder, game, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {

@@ -136,7 +136,8 @@ impl Runner {
             fs::remove_dir_all(&folder).map_err(|error| io_error("remove", &folder, &error))?;
         }
         let skills = self.skill_file(run)?;
-        Ok(create_run(&folder, &run.experiment, Some(&skills), self.device, self.force)?)
+        let game = registry::game(&run.experiment.game)?;
+        Ok(create_run(&folder, game, &run.experiment, Some(&skills), self.device, self.force)?)
     }
 
     /// Trains what has to be trained. What is to be replaced stays until its skills are there.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
+    game::Game,
     learner::{DeviceKind, SkillModel},
     train::{
         Algorithm, Experiment, Trainer, UpdateReport,
@@ -87,7 +88,7 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
         None => None,
     };
     let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.device, args.threads)?;
-    let run = create_run(&args.run, &experiment, args.skills.as_deref(), args.device, args.force)?;
+    let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.device, args.force)?;
     Ok((run, trainer))
 }
 
@@ -112,6 +113,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 /// It exists and `force` is off, or it cannot be written.
 pub fn create_run(
     path: &Path,
+    game: &dyn Game,
     experiment: &Experiment,
     skills: Option<&Path>,
     device: DeviceKind,
@@ -123,6 +125,7 @@ pub fn create_run(
         seed: experiment.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         revision: env!("PLAYBOT_REVISION").to_owned(),
+        game_version: game.version(),
         skills: skills.map(file_checksum).transpose()?,
         device,
     };

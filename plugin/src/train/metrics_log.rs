@@ -23,12 +23,14 @@ use super::{
 pub const SUCCESS_RATE: &str = "charts/success_rate";
 /// Tag of the mean return of the last 100 episodes.
 pub const EPISODIC_RETURN: &str = "charts/episodic_return";
+/// Tag of the mean length of the last 100 episodes, ticks.
+pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
 /// Tag of the environment steps per second.
 pub const SPS: &str = "charts/SPS";
 /// Tag of the number of episodes that have ended.
 pub const EPISODES: &str = "charts/episodes";
 /// Tags of the means over the last 100 episodes.
-pub const EPISODE_MEANS: [&str; 3] = ["charts/episodic_return", "charts/episodic_length", "charts/success_rate"];
+pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
 
 /// The files of a run that hold its metrics.
 #[derive(Clone, Debug)]

@@ -108,6 +108,8 @@ pub struct RunInfo {
     pub version: String,
     /// Revision of the code, where it is known.
     pub revision: String,
+    /// Version of the game's rules.
+    pub game_version: u32,
     /// [Checksum](super::checksum::file_checksum) of the skill model's file, if the algorithm needs one.
     #[serde(default)]
     pub skills: Option<String>,

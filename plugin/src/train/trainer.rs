@@ -13,7 +13,7 @@ use super::{
     collect::Collector,
     config::{Algorithm, Experiment, ExperimentError},
     learner::{Learner, LearnerMetrics},
-    metrics_log::EPISODES,
+    metrics_log::{EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
     worlds::on_threads,
 };
 use crate::{
@@ -108,9 +108,9 @@ impl UpdateReport {
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let episodes = [
             (EPISODES, Some(self.episodes as f64)),
-            ("charts/episodic_return", self.episodic_return),
-            ("charts/episodic_length", self.episodic_length),
-            ("charts/success_rate", self.success_rate),
+            (EPISODIC_RETURN, self.episodic_return),
+            (EPISODIC_LENGTH, self.episodic_length),
+            (SUCCESS_RATE, self.success_rate),
             ("score/initial_kl", self.initial_kl.map(f64::from)),
         ];
         let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
