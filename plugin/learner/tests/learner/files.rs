@@ -3,7 +3,10 @@
 use crate::corridor::config as ppo_config;
 use crate::score::model;
 use crate::skill::{config, corridor_demos};
-use playbot_learner::{DeviceKind, FileError, PpoLearner, ScoreConfig, SkillModel, SkillTrainer};
+use playbot_learner::{
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, PpoLearner, ScoreConfig, SkillModel,
+    SkillTrainer,
+};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -120,4 +123,27 @@ fn a_skill_model_from_before_there_were_images_is_read() {
     contents.write(&path);
     let back = SkillModel::load(&path, DeviceKind::Flex).expect("an older file");
     assert_eq!(back.observation(), model.observation());
+}
+
+#[test]
+fn a_training_does_not_go_on_with_other_demonstrations() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("trainer");
+    let demos = |at: usize, by: f32| {
+        let mut values: Vec<f32> = (0..40).map(|t| t as f32).collect();
+        values[at] += by;
+        let episode = DemoEpisode { observations: values.into(), actions: Actions::Discrete(vec![1; 40]) };
+        Dataset::new(1, ActionSpace::Discrete(2), vec![episode]).expect("a good episode")
+    };
+    let trainer = SkillTrainer::new(config(), demos(0, 0.0), 1, DeviceKind::Flex).expect("windows fit");
+    trainer.save(&path).expect("written");
+    SkillTrainer::load(&path, demos(0, 0.0), DeviceKind::Flex).expect("the same");
+    let error = SkillTrainer::load(&path, demos(39, 0.5), DeviceKind::Flex).expect_err("one number differs");
+    assert!(error.to_string().contains("not those of this training"), "{error}");
+    let mut contents = Contents::read(&path);
+    let start = contents.description.find(r#","demo_hash""#).expect("a hash");
+    let end = start + contents.description[start..].find('}').expect("the last entry");
+    contents.description.replace_range(start..end, "");
+    contents.write(&path);
+    SkillTrainer::load(&path, demos(39, 0.5), DeviceKind::Flex).expect("an older file says less");
 }
