@@ -50,12 +50,12 @@ pub enum LearnError {
     /// Actions of the wrong kind, or a discrete action outside its range.
     #[error("action does not fit the action space: {0}")]
     Action(String),
-    /// No window of the wanted length lies inside an episode.
-    #[error("no episode is long enough for a window of {window} steps (the longest has {longest})")]
+    /// No window of the wanted length fits into the demonstrations.
+    #[error("no window of {window} steps fits into the demonstrations: the longest stretch to cut from has {longest}")]
     NoWindow {
         /// Window length in steps.
         window: usize,
-        /// Length of the longest episode in steps.
+        /// Steps of the longest episode; by [`crate::WindowRule::Legacy`] of all together.
         longest: usize,
     },
     /// A policy copied from the decoder does not act like the decoder.

@@ -5,7 +5,7 @@ use super::update::{StepMetrics, gradient_step};
 use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
 use crate::nn::{Adam, AdamConfig, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, Critic, NetShape, Policy, SkillSource, StdKind};
+use crate::policy::{Actor, Critic, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
 use crate::score::{DecoderRows, FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
@@ -65,12 +65,7 @@ impl PpoLearner {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
         let streams = Streams::new(seed);
-        let shape = NetShape {
-            obs_dim: spec.obs_dim,
-            latent: spec.latent,
-            hidden: config.hidden.clone(),
-            activation: config.activation,
-        };
+        let shape = config.net_shape(spec);
         let plain = device.plain();
         let copy = match &skill {
             Some(skill) => skill.copy(config.norm_obs)?,

@@ -7,7 +7,7 @@ use super::transitions::check_ends;
 use super::{EntropyCoef, SacBatch, SacConfig, SacMetrics, SacNets, actor_step, alpha_step, critic_step, soft_update};
 use crate::nn::{Adam, AdamConfig};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, NetShape, Policy, SkillSource};
+use crate::policy::{Actor, Policy, SkillSource};
 use crate::rng::{ChaCha8Rng, Streams};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
@@ -94,12 +94,7 @@ impl SacLearner {
             return Err(LearnError::Config(text.to_owned()));
         }
         let streams = Streams::new(seed);
-        let shape = NetShape {
-            obs_dim: spec.obs_dim,
-            latent: spec.latent,
-            hidden: config.hidden.clone(),
-            activation: config.activation,
-        };
+        let shape = config.net_shape(spec);
         let initial = match config.entropy {
             EntropyCoef::Auto { initial, .. } => initial,
             EntropyCoef::Fixed(_) => 1.0,

@@ -32,15 +32,29 @@ impl FrozenSkill {
         }
     }
 
-    /// Networks of the right sizes, to be filled by [`Self::take`]; `None` if the file was of a learner without skills.
+    /// Networks of the right sizes, to be filled by [`Self::take`] from `file`, a checkpoint of a policy of `spec`;
+    /// `None` if it was of a learner without skills.
     pub(crate) fn described(
         config: Option<ScoreConfig>,
         description: Option<SkillDescription>,
+        spec: PolicySpec,
+        file: &TensorFile,
         device: DeviceKind,
-    ) -> Result<Option<Self>, LearnError> {
+    ) -> Result<Option<Self>, FileError> {
         let Some((config, description)) = config.zip(description) else { return Ok(None) };
-        let nets = description.nets(device)?;
-        Ok(Some(Self { config, description, decoder: nets.decoder, prior: nets.prior }))
+        description.check_actors(file)?;
+        let (decoder, prior) = description.actors(device).map_err(|e| file.learner(e))?;
+        let skill = Self { config, description, decoder, prior };
+        let tied = skill.spec().map_err(|e| file.learner(e))?;
+        if tied != spec {
+            return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));
+        }
+        Ok(Some(skill))
+    }
+
+    /// Whether the policy's layers are those of the decoder, and not those that the learner's settings describe.
+    pub(crate) fn is_copied(&self) -> bool {
+        self.config.init_from_decoder
     }
 
     /// Adds the weights of decoder and prior to a file.

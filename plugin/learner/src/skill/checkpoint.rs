@@ -79,6 +79,7 @@ impl SkillTrainer {
         if skill.action_space != dataset.action_space() {
             return Err(file.format(format!("acts in {:?}, the demonstrations do not", skill.action_space)));
         }
+        skill.check(&file)?;
         let mut trainer = Self::new(skill.config, dataset, header.seed, device).map_err(|e| file.learner(e))?;
         if header.demo_hash.is_some_and(|hash| hash != trainer.fingerprint) {
             let text = "the demonstrations are not those of this training: as many episodes and steps, but other ones";
