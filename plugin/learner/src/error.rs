@@ -2,17 +2,27 @@
 
 use std::path::PathBuf;
 
-/// An error of a learner: a bad setting, data of the wrong size, or numbers that ran away.
+/// An error of a learner: a bad setting, data that do not fit or are not finite, or numbers that ran away.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
-    /// A loss, gradient or weight became NaN or infinite.
-    #[error("`{tensor}` is not finite after {steps} optimizer steps")]
+    /// A loss, gradient, weight or output of a network became NaN or infinite.
+    #[error("`{tensor}` is not finite{}", after(*steps))]
     NotFinite {
         /// Name of the first tensor that is not finite.
         tensor: String,
-        /// Optimizer steps done before.
-        steps: u64,
+        /// Optimizer steps done before; `None` where nothing is learned, as when a policy plays.
+        steps: Option<u64>,
+    },
+    /// Data that were given hold a number that is NaN or infinite.
+    #[error("{what}: row {row} holds {value}: every number must be finite")]
+    Input {
+        /// The data.
+        what: String,
+        /// Number of the first such row, from 0.
+        row: usize,
+        /// The first such number in it.
+        value: f32,
     },
     /// A loss has grown beyond all bounds.
     #[error("`{tensor}` has exploded: it is {value:e} after {steps} optimizer steps")]
@@ -40,12 +50,12 @@ pub enum LearnError {
     /// Actions of the wrong kind, or a discrete action outside its range.
     #[error("action does not fit the action space: {0}")]
     Action(String),
-    /// No window of the wanted length lies inside an episode.
-    #[error("no episode is long enough for a window of {window} steps (the longest has {longest})")]
+    /// No window of the wanted length fits into the demonstrations.
+    #[error("no window of {window} steps fits into the demonstrations: the longest stretch to cut from has {longest}")]
     NoWindow {
         /// Window length in steps.
         window: usize,
-        /// Length of the longest episode in steps.
+        /// Steps of the longest episode; by [`crate::WindowRule::Legacy`] of all together.
         longest: usize,
     },
     /// A policy copied from the decoder does not act like the decoder.
@@ -72,6 +82,28 @@ impl LearnError {
         }
         Err(Self::Shape { what: what.to_owned(), expected, found })
     }
+
+    /// `Ok` if all `values`, `width` to a row, are finite, else [`LearnError::Input`].
+    pub(crate) fn check_finite(what: &str, width: usize, values: &[f32]) -> Result<(), Self> {
+        // x · 0 is 0 for finite numbers and NaN otherwise. Eight sums side by side can be vectorised.
+        let (chunks, rest) = values.as_chunks::<8>();
+        let mut witness = [0.0f32; 8];
+        for chunk in chunks {
+            witness.iter_mut().zip(chunk).for_each(|(sum, x)| *sum += x * 0.0);
+        }
+        if witness.iter().chain(rest).all(|x| x.is_finite()) {
+            return Ok(());
+        }
+        match values.iter().position(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(at) => Err(Self::Input { what: what.to_owned(), row: at / width.max(1), value: values[at] }),
+        }
+    }
+}
+
+/// The end of a message about numbers that ran away.
+fn after(steps: Option<u64>) -> String {
+    steps.map_or(String::new(), |steps| format!(" after {steps} optimizer steps"))
 }
 
 /// An error of a model or checkpoint file.
@@ -162,4 +194,28 @@ pub enum FileError {
         /// The cause.
         source: LearnError,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_row_that_is_not_finite_is_named() {
+        let check = |at: usize, value| {
+            let mut values = vec![1e38; 21];
+            values[at] = value;
+            LearnError::check_finite("obs", 3, &values)
+        };
+        for at in 0..21 {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let error = check(at, value).expect_err("not finite");
+                assert!(matches!(&error, LearnError::Input { row, .. } if *row == at / 3), "{error}");
+                assert!(!error.is_divergence());
+            }
+        }
+        assert!(check(4, -f32::MAX).is_ok());
+        let error = check(7, f32::NAN).expect_err("not finite").to_string();
+        assert_eq!(error, "obs: row 2 holds NaN: every number must be finite");
+    }
 }

@@ -222,6 +222,22 @@ impl TensorFile {
         &self.path
     }
 
+    /// `Ok` if the tensor `name` is there and has `shape`.
+    pub(crate) fn expect(&self, name: &str, shape: &[usize]) -> Result<(), FileError> {
+        let Some(stored) = self.tensors.get(name) else {
+            return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
+        };
+        if stored.shape == shape {
+            return Ok(());
+        }
+        Err(FileError::WrongShape {
+            path: self.path.clone(),
+            name: name.to_owned(),
+            expected: shape.to_vec(),
+            found: stored.shape.clone(),
+        })
+    }
+
     /// An error about this file's contents.
     pub(crate) fn format(&self, detail: String) -> FileError {
         FileError::Format { path: self.path.clone(), detail }
@@ -233,17 +249,12 @@ impl TensorFile {
     }
 
     fn take_bytes(&mut self, name: &str, shape: Option<&[usize]>, dtype: Dtype) -> Result<Vec<u8>, FileError> {
+        if let Some(shape) = shape {
+            self.expect(name, shape)?;
+        }
         let Some(stored) = self.tensors.remove(name) else {
             return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
         };
-        if let Some(shape) = shape.filter(|shape| *shape != stored.shape) {
-            return Err(FileError::WrongShape {
-                path: self.path.clone(),
-                name: name.to_owned(),
-                expected: shape.to_vec(),
-                found: stored.shape,
-            });
-        }
         if stored.dtype != dtype {
             let detail = format!("tensor `{name}` is {:?}, expected {dtype:?}", stored.dtype);
             return Err(self.format(detail));

@@ -35,6 +35,7 @@
 mod device;
 mod error;
 mod file;
+mod layout;
 pub mod nn;
 pub mod norm;
 mod observation;

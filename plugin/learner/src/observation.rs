@@ -108,10 +108,7 @@ impl Observations {
     pub(crate) fn check(&self, what: &str, kind: &ObsKind, rows: usize) -> Result<(), LearnError> {
         LearnError::check(what, rows * kind.numbers(), self.numbers())?;
         match (self, kind) {
-            (Self::Vector(values), ObsKind::Vector(_)) => match values.iter().all(|x| x.is_finite()) {
-                true => Ok(()),
-                false => Err(LearnError::NotFinite { tensor: what.to_owned(), steps: 0 }),
-            },
+            (Self::Vector(values), ObsKind::Vector(width)) => LearnError::check_finite(what, *width, values),
             (Self::Image(_), ObsKind::Image(_)) => Ok(()),
             _ => Err(LearnError::Config(format!("{what} are not {kind}"))),
         }

@@ -48,7 +48,8 @@ impl Streams {
     }
 }
 
-fn fnv1a(bytes: &[u8]) -> u64 {
+/// The FNV-1a hash (64 bit) of `bytes`.
+pub(crate) fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3))
 }
 

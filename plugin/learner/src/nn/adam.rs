@@ -8,6 +8,7 @@ use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::iter::Peekable;
 
 /// Numbers that one thread updates at a time.
 const CHUNK: usize = 1 << 14;
@@ -77,7 +78,8 @@ impl Adam {
     /// The parameters stay tracked. Parameters without an entry in `grads` stay as they are.
     ///
     /// # Errors
-    /// [`LearnError::NotFinite`] names the first weight that stopped being finite; [`LearnError::Device`].
+    /// [`LearnError::NotFinite`] names the first weight that stopped being finite; [`LearnError::Config`] names the first
+    /// gradient that belongs to no parameter, or comes in another order than the parameters; [`LearnError::Device`].
     pub fn step<M: Parameters>(
         &mut self,
         network: &mut M,
@@ -92,19 +94,27 @@ impl Adam {
             formula: Formula::new(&self.config, lr, scale, t),
             steps: self.steps,
             moments: &mut self.moments,
-            grads: grads.iter(),
+            grads: grads.iter().peekable(),
             error: None,
         };
         network.visit(prefix, &mut visitor);
-        visitor.error.map_or(Ok(()), Err)
+        if let Some(error) = visitor.error {
+            return Err(error);
+        }
+        match visitor.grads.next() {
+            None => Ok(()),
+            Some((name, _)) => {
+                Err(LearnError::Config(format!("the gradient of `{name}` belongs to no parameter here")))
+            }
+        }
     }
 }
 
-struct Step<'a, I> {
+struct Step<'a, I: Iterator> {
     formula: Formula,
     steps: u64,
     moments: &'a mut BTreeMap<String, Moments>,
-    grads: I,
+    grads: Peekable<I>,
     error: Option<LearnError>,
 }
 
@@ -113,9 +123,8 @@ impl<'a, I: Iterator<Item = (&'a str, &'a [f32])>> ParamVisitor for Step<'a, I> 
         if self.error.is_some() {
             return;
         }
-        // `grads` were read from the same network, so that both come in the same order.
-        let Some((grad_name, grad)) = self.grads.next() else { return };
-        debug_assert_eq!(name, grad_name);
+        // Both come in the order of the network, so that the next gradient is this one's or that of a later parameter.
+        let Some((_, grad)) = self.grads.next_if(|(of, _)| *of == name) else { return };
         // Taken out of the network, so that its numbers are changed in place if nobody shares them.
         let device = tensor.device().inner();
         let plain = std::mem::replace(tensor, Tensor::empty([0; D], &device)).inner();
@@ -129,7 +138,7 @@ impl<'a, I: Iterator<Item = (&'a str, &'a [f32])>> ParamVisitor for Step<'a, I> 
     }
 }
 
-impl<I> Step<'_, I> {
+impl<I: Iterator> Step<'_, I> {
     fn update(&mut self, name: &str, weights: &mut TensorData, grad: &[f32]) -> Result<(), LearnError> {
         let shape = weights.shape().to_vec();
         let weights = weights.as_mut_slice::<f32>().map_err(|e| LearnError::Device(e.to_string()))?;
@@ -145,7 +154,7 @@ impl<I> Step<'_, I> {
         let moments = moments.m.par_chunks_mut(CHUNK).zip(moments.v.par_chunks_mut(CHUNK));
         let finite = rows.zip(moments).map(|((w, g), (m, v))| formula.apply(w, g, m, v));
         if !finite.reduce(|| true, |a, b| a && b) {
-            return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: self.steps });
+            return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: Some(self.steps) });
         }
         Ok(())
     }
@@ -208,5 +217,50 @@ impl Formula {
             }
         });
         witness.iter().sum::<f32>() == 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{path, tracked, vector};
+
+    /// Two numbers, of which the loss may depend on one.
+    #[derive(Clone)]
+    struct Pair(Tensor<1>, Tensor<1>);
+
+    impl Parameters for Pair {
+        fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+            visitor.visit(&path(prefix, "a"), &mut self.0);
+            visitor.visit(&path(prefix, "b"), &mut self.1);
+        }
+    }
+
+    /// The second number of a pair alone.
+    #[derive(Clone)]
+    struct Second(Tensor<1>);
+
+    impl Parameters for Second {
+        fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+            visitor.visit(&path(prefix, "b"), &mut self.0);
+        }
+    }
+
+    #[test]
+    fn gradients_go_by_name() {
+        let device = DeviceKind::Flex.plain();
+        let number = || vector(vec![1.0], &device);
+        let mut second = tracked(&Second(number()));
+        let loss = (second.0.clone() * 3.0).sum();
+        let grads = NamedGrads::read(&mut second, "", &loss.backward()).expect("readable");
+        let mut pair = tracked(&Pair(number(), number()));
+        let mut adam = Adam::new(AdamConfig::default());
+        adam.step(&mut pair, "", &grads, 0.1, 1.0).expect("`b` is there");
+        let numbers = |tensor: &Tensor<1>| crate::nn::host(tensor.clone().inner()).expect("readable")[0];
+        assert_eq!(numbers(&pair.0), 1.0);
+        assert!((numbers(&pair.1) - 0.9).abs() < 1e-3);
+        let error = adam.step(&mut pair, "other", &grads, 0.1, 1.0).expect_err("no `other.b`").to_string();
+        assert!(error.contains("`b`"), "{error}");
     }
 }

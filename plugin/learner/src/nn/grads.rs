@@ -60,7 +60,7 @@ impl NamedGrads {
         }
         let bad = self.entries.iter().find(|(_, values)| !square_sum(numbers(values)).is_finite());
         let tensor = bad.map_or("gradients", |(name, _)| name.as_str());
-        Err(LearnError::NotFinite { tensor: format!("gradient of {tensor}"), steps })
+        Err(LearnError::NotFinite { tensor: format!("gradient of {tensor}"), steps: Some(steps) })
     }
 }
 

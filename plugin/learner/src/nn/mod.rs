@@ -36,6 +36,7 @@ pub use impala::{Impala, ImpalaStage, ResidualBlock};
 pub use init::orthogonal;
 pub use linear::Linear;
 pub use mlp::Mlp;
+pub(crate) use nature::LAYERS as NATURE_LAYERS;
 pub use nature::Nature;
 pub use obs_rows::ObsRows;
 pub(crate) use params::path;

@@ -10,7 +10,7 @@ use rand::Rng;
 use std::f64::consts::SQRT_2;
 
 /// Output channels, kernel and stride of each convolution.
-const LAYERS: [(usize, usize, usize); 3] = [(32, 8, 4), (64, 4, 2), (64, 3, 1)];
+pub(crate) const LAYERS: [(usize, usize, usize); 3] = [(32, 8, 4), (64, 4, 2), (64, 3, 1)];
 
 /// Three convolutions and a linear layer, ReLU after each (Mnih et al. 2015, "Human-level control through deep
 /// reinforcement learning"). Several times cheaper than [`super::Impala`].

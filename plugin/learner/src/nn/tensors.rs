@@ -39,7 +39,7 @@ pub(crate) fn finite(name: &str, tensor: &Tensor<1>, steps: u64) -> Result<f64, 
 pub(crate) fn check_loss(name: &str, value: f32, steps: u64) -> Result<(), LearnError> {
     let tensor = name.to_owned();
     match value {
-        value if !value.is_finite() => Err(LearnError::NotFinite { tensor, steps }),
+        value if !value.is_finite() => Err(LearnError::NotFinite { tensor, steps: Some(steps) }),
         value if value.abs() > EXPLODED => Err(LearnError::Exploded { tensor, value, steps }),
         _ => Ok(()),
     }

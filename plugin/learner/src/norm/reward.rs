@@ -45,7 +45,8 @@ impl RewardNormalizer {
     /// Takes in and scales rewards `[T, envs]`, row-major; `done` marks the steps that ended an episode in any way.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] if `envs` is not what it was in earlier calls, or the lengths differ.
+    /// [`LearnError::Shape`] if `envs` is not what it was in earlier calls, or the lengths differ or are no multiple of
+    /// it; [`LearnError::Config`] if `envs` is 0. Nothing is taken in then.
     pub fn normalize(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<Vec<f32>, LearnError> {
         let mut out = Vec::with_capacity(rewards.len());
         self.each_step(rewards, done, envs, |scaler, rewards| out.extend(rewards.iter().map(|&r| scaler.scale(r))))?;
@@ -75,11 +76,15 @@ impl RewardNormalizer {
         envs: usize,
         mut seen: impl FnMut(&Self, &[f32]),
     ) -> Result<(), LearnError> {
+        if envs == 0 {
+            return Err(LearnError::Config("the reward normaliser needs at least one environment".to_owned()));
+        }
+        LearnError::check("episode ends", rewards.len(), done.len())?;
+        LearnError::check("rewards of whole steps", rewards.len() / envs * envs, rewards.len())?;
         if self.returns.is_empty() {
             self.returns = vec![0.0; envs];
         }
         LearnError::check("environments of the reward normaliser", self.returns.len(), envs)?;
-        LearnError::check("episode ends", rewards.len(), done.len())?;
         for (rewards, done) in rewards.chunks_exact(envs).zip(done.chunks_exact(envs)) {
             for ((g, &r), &done) in self.returns.iter_mut().zip(rewards).zip(done) {
                 let before = if done && self.reset == RewardReset::SameStep { 0.0 } else { *g };
@@ -94,5 +99,24 @@ impl RewardNormalizer {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_refused_and_leaves_nothing_behind() {
+        let mut normalizer = RewardNormalizer::new(0.9);
+        let fresh = normalizer.clone();
+        assert!(matches!(normalizer.normalize(&[], &[], 0), Err(LearnError::Config(_))));
+        assert!(matches!(normalizer.update(&[1.0; 4], &[false; 3], 2), Err(LearnError::Shape { .. })));
+        assert!(matches!(normalizer.update(&[1.0; 3], &[false; 3], 2), Err(LearnError::Shape { .. })));
+        assert_eq!(normalizer, fresh);
+        normalizer.update(&[1.0; 3], &[false; 3], 3).expect("three environments");
+        let before = normalizer.clone();
+        assert!(matches!(normalizer.update(&[1.0; 4], &[false; 4], 2), Err(LearnError::Shape { .. })));
+        assert_eq!(normalizer, before);
     }
 }

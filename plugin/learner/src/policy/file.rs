@@ -1,12 +1,11 @@
 //! A policy that a game ships with: one self-describing file.
 
-use super::{Actor, Critic, LogStd, NetShape, Policy, StdKind};
+use super::Policy;
+use super::shape::{PolicyShape, SkillsShape};
 use crate::file::TensorFile;
-use crate::nn::Mlp;
 use crate::norm::ObsStats;
-use crate::rng::Streams;
 use crate::skill::{Prior, SkillDraw};
-use crate::{ActionSpace, DeviceKind, FileError, LearnError};
+use crate::{DeviceKind, FileError, LearnError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -74,42 +73,6 @@ struct Header {
     examples: usize,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PolicyShape {
-    action_space: ActionSpace,
-    actor: ActorShape,
-    critic: Option<NetShape>,
-    normalised: bool,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ActorShape {
-    net: NetShape,
-    std: StdShape,
-}
-
-/// How an actor's standard deviation is made; without meaning for discrete actions.
-#[derive(Serialize, Deserialize)]
-enum StdShape {
-    Vector,
-    State,
-    Squashed(f64, f64),
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SkillsShape {
-    latent: usize,
-    tanh: bool,
-    /// `None` is a standard normal.
-    prior: Option<ActorShape>,
-    decoder: ActorShape,
-    horizon: usize,
-    draw: SkillDraw,
-}
-
 impl PolicyFile {
     /// Writes the file, in one step. `obs` (`n * obs_dim`, raw) and `z` (`n * latent`) are the rows by which readers check
     /// themselves; a few that the policy meets in play are enough.
@@ -118,21 +81,20 @@ impl PolicyFile {
     /// [`FileError::Learner`] if the rows do not fit the policy, [`FileError::Io`] if the file cannot be written.
     pub fn save(&self, path: &Path, obs: &[f32], z: &[f32], n: usize) -> Result<(), FileError> {
         let policy = &self.policy;
-        let vector = policy.observation().vector("a policy file");
-        let obs_dim = vector.map_err(|source| FileError::Learner { path: path.to_owned(), source })?;
+        let learner = |source| FileError::Learner { path: path.to_owned(), source };
+        if n == 0 {
+            let text = "a policy file needs at least one row by which its readers check themselves";
+            return Err(learner(LearnError::Config(text.to_owned())));
+        }
         let header = Header {
             kind: KIND.to_owned(),
             version: VERSION,
             card: self.card.clone(),
-            policy: PolicyShape {
-                action_space: policy.space,
-                actor: ActorShape::of(&policy.actor, obs_dim),
-                critic: policy.critic.as_ref().map(|critic| net_shape(&critic.net, obs_dim)),
-                normalised: policy.stats.is_some(),
-            },
-            skills: self.skills.as_ref().map(SkillsShape::of),
+            policy: PolicyShape::of(policy).map_err(learner)?,
+            skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
             examples: n,
         };
+        let examples = self.examples(obs, z, n).map_err(learner)?;
         let mut file = TensorFile::new(path, &header)?;
         file.put_network("actor", &policy.actor)?;
         if let Some(critic) = &policy.critic {
@@ -148,9 +110,8 @@ impl PolicyFile {
                 file.put_network("prior", net)?;
             }
         }
-        file.put("examples.obs", &[n, obs_dim], obs);
+        file.put("examples.obs", &[n, policy.obs_dim()], obs);
         file.put("examples.z", &[n, policy.latent], if policy.latent == 0 { &[] } else { z });
-        let examples = self.examples(obs, z, n).map_err(|source| file.learner(source))?;
         for (name, width, values) in examples {
             file.put(&format!("examples.{name}"), &[n, width], &values);
         }
@@ -177,10 +138,16 @@ impl PolicyFile {
     fn take(mut file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
         let header: Header = file.description(KIND, VERSION)?;
         let shape = header.policy;
+        shape.check(&file)?;
+        if let Some(skills) = &header.skills {
+            skills.check(&file, &shape)?;
+        }
+        if header.examples == 0 {
+            return Err(file.format("holds no examples by which it could be checked".to_owned()));
+        }
         let plain = device.plain();
-        let mut actor = shape.actor.build(shape.action_space, device);
+        let (mut actor, mut critic) = shape.build(device);
         file.take_network("actor", &mut actor, &plain)?;
-        let mut critic = shape.critic.as_ref().map(|net| Critic::new(net, &mut Streams::new(0).stream("", 0), &plain));
         if let Some(critic) = &mut critic {
             file.take_network("critic", critic, &plain)?;
         }
@@ -234,68 +201,13 @@ impl PolicyFile {
             vec![("head", dim, output.head), ("log_std", std_width, output.log_std), ("value", 1, output.values)];
         if let Some(skills) = &self.skills {
             let mean = skills.prior.sample(obs, n, SkillDraw::Mean, &mut |_| 0.0)?;
+            // The skills that the policy reads or, if it reads none, those of the prior.
+            let decoded = skills.decoder.forward(if self.policy.latent > 0 { z } else { &mean }, obs, n)?;
+            let std_width = if decoded.log_std.is_empty() { 0 } else { dim };
+            all.push(("decoder_head", dim, decoded.head));
+            all.push(("decoder_log_std", std_width, decoded.log_std));
             all.push(("prior_mean", skills.prior.latent(), mean));
         }
         Ok(all)
-    }
-}
-
-impl SkillsShape {
-    fn of(skills: &SkillSource) -> Self {
-        Self {
-            latent: skills.prior.latent(),
-            tanh: skills.prior.tanh,
-            prior: skills.prior.net.as_ref().map(|(net, obs, _)| ActorShape::of(net, obs.numbers())),
-            decoder: ActorShape::of(&skills.decoder.actor, skills.decoder.obs_dim()),
-            horizon: skills.horizon,
-            draw: skills.draw,
-        }
-    }
-
-    fn take(self, file: &mut TensorFile, space: ActionSpace, device: DeviceKind) -> Result<SkillSource, FileError> {
-        let plain = device.plain();
-        let mut decoder = self.decoder.build(space, device);
-        file.take_network("decoder", &mut decoder, &plain)?;
-        let prior = match &self.prior {
-            None => Prior::standard_normal(self.latent, self.tanh),
-            Some(shape) => {
-                let mut net = shape.build(ActionSpace::Continuous(self.latent), device);
-                file.take_network("prior", &mut net, &plain)?;
-                Prior::learned(&net, shape.net.obs_dim, self.latent, self.tanh, plain.clone())
-            }
-        };
-        let widths = (self.decoder.net.obs_dim, self.decoder.net.latent);
-        let decoder = Policy::new(&decoder, None, None, space, widths, plain);
-        Ok(SkillSource { prior, decoder, horizon: self.horizon, draw: self.draw })
-    }
-}
-
-impl ActorShape {
-    fn of(actor: &Actor, obs_dim: usize) -> Self {
-        let std = match actor.log_std {
-            LogStd::None | LogStd::Vector(_) => StdShape::Vector,
-            LogStd::State(_) => StdShape::State,
-            LogStd::Squashed { range: (low, high), .. } => StdShape::Squashed(low, high),
-        };
-        Self { net: net_shape(&actor.net, obs_dim), std }
-    }
-
-    /// An actor of this shape, to be filled from a file.
-    fn build(&self, space: ActionSpace, device: DeviceKind) -> Actor {
-        let (rng, device) = (&mut Streams::new(0).stream("", 0), &device.plain());
-        match self.std {
-            StdShape::Vector => Actor::new(&self.net, space, StdKind::Vector, rng, device),
-            StdShape::State => Actor::new(&self.net, space, StdKind::State, rng, device),
-            StdShape::Squashed(low, high) => Actor::squashed(&self.net, space, (low, high), rng, device),
-        }
-    }
-}
-
-fn net_shape(net: &Mlp, obs_dim: usize) -> NetShape {
-    NetShape {
-        obs_dim,
-        latent: net.inputs() - obs_dim,
-        hidden: net.layers.iter().map(|layer| layer.weight.dims()[1]).collect(),
-        activation: net.activation,
     }
 }

@@ -5,6 +5,7 @@ mod critic;
 mod file;
 mod join;
 mod output;
+mod shape;
 mod snapshot;
 
 pub use actor::{Actor, LogStd, NetShape, StdKind};

@@ -124,7 +124,7 @@ impl Policy {
         for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
             // A log-probability may be -infinity without harm.
             if numbers.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
-                return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: 0 });
+                return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: None });
             }
         }
         Ok(self.output(head, log_std, values))

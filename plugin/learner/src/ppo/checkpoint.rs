@@ -2,6 +2,7 @@
 
 use super::{PolicySpec, PpoConfig, PpoLearner};
 use crate::file::TensorFile;
+use crate::layout::{check_actor, check_mlp, joined_width};
 use crate::nn::tracked;
 use crate::norm::{put_normalizers, take_normalizers};
 use crate::score::{FrozenSkill, ScoreConfig};
@@ -66,7 +67,12 @@ impl PpoLearner {
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
-        let skill = FrozenSkill::described(header.score, header.skill, device).map_err(|e| file.learner(e))?;
+        let skill = FrozenSkill::described(header.score, header.skill, header.spec, &file, device)?;
+        let shape = header.config.net_shape(header.spec);
+        check_mlp(&file, "critic", (joined_width(&file, "critic", &shape)?, &shape.hidden, 1))?;
+        if !skill.as_ref().is_some_and(FrozenSkill::is_copied) {
+            check_actor(&file, "actor", &shape, header.spec.action_space, false)?;
+        }
         let mut learner =
             Self::build(header.config, header.spec, skill, header.seed, device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut learner.nets, &device.plain())?;

@@ -2,6 +2,7 @@
 
 use crate::nn::Activation;
 use crate::norm::{RewardNormalizer, RewardReset};
+use crate::policy::NetShape;
 use crate::{ActionSpace, LearnError};
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +21,7 @@ pub enum TimeLimit {
 pub struct PolicySpec {
     /// Width of an observation.
     pub obs_dim: usize,
-    /// Width of the skill before it; 0 for plain PPO.
+    /// Width of the skill before it; 0 for a policy that reads none.
     pub latent: usize,
     /// What it acts in.
     pub action_space: ActionSpace,
@@ -106,6 +107,16 @@ impl Default for PpoConfig {
 }
 
 impl PpoConfig {
+    /// Sizes of a network with these hidden layers that reads what `spec` says.
+    pub(crate) fn net_shape(&self, spec: PolicySpec) -> NetShape {
+        NetShape {
+            obs_dim: spec.obs_dim,
+            latent: spec.latent,
+            hidden: self.hidden.clone(),
+            activation: self.activation,
+        }
+    }
+
     /// `Ok` if these settings can work.
     ///
     /// # Errors

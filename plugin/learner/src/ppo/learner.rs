@@ -5,7 +5,7 @@ use super::update::{StepMetrics, gradient_step};
 use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
 use crate::nn::{Adam, AdamConfig, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, Critic, NetShape, Policy, SkillSource, StdKind};
+use crate::policy::{Actor, Critic, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
 use crate::score::{DecoderRows, FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
@@ -65,12 +65,7 @@ impl PpoLearner {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
         let streams = Streams::new(seed);
-        let shape = NetShape {
-            obs_dim: spec.obs_dim,
-            latent: spec.latent,
-            hidden: config.hidden.clone(),
-            activation: config.activation,
-        };
+        let shape = config.net_shape(spec);
         let plain = device.plain();
         let copy = match &skill {
             Some(skill) => skill.copy(config.norm_obs)?,
@@ -111,7 +106,8 @@ impl PpoLearner {
         self.skill.as_ref().map(|skill| &skill.config)
     }
 
-    /// What the policy reads and does. Rollouts need skills also where `latent` is 0 if there is a penalty.
+    /// What the policy reads and does. With a skill model rollouts need skills also where `latent` is 0
+    /// ([`Self::rollout_latent`]).
     pub fn spec(&self) -> PolicySpec {
         self.spec
     }
@@ -163,10 +159,12 @@ impl PpoLearner {
     /// Trains on a rollout: epochs × minibatches gradient steps.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] or [`LearnError::Action`] if the rollout does not fit, before anything is changed;
-    /// [`LearnError::NotFinite`] names what ran away, and the learner is of no further use then.
+    /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
+    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed;
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
+    /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
-        self.check(rollout)?;
+        rollout.check_for(&self.spec, self.rollout_latent())?;
         let rewards = match &mut self.rewards {
             Some(normalizer) => normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?,
             None => rollout.rewards.clone(),
@@ -226,16 +224,5 @@ impl PpoLearner {
         let Some(skill) = &self.skill else { return Ok(None) };
         let mut rng = self.streams.stream("score.own_samples", self.updates);
         skill.rows((&rollout.z, &rollout.obs), &rollout.actions, false, &mut rng, self.device)
-    }
-
-    fn check(&self, rollout: &Rollout) -> Result<(), LearnError> {
-        rollout.check()?;
-        self.spec.action_space.check(&rollout.actions)?;
-        LearnError::check("obs_dim of the rollout", self.spec.obs_dim, rollout.obs_dim)?;
-        LearnError::check("latent of the rollout", self.rollout_latent(), rollout.latent)?;
-        if rollout.rows() == 0 {
-            return Err(LearnError::Config("the rollout is empty".to_owned()));
-        }
-        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! What was played since the last update.
 
+use super::PolicySpec;
 use crate::{ActionSpace, Actions, LearnError};
 
 /// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
@@ -223,12 +224,12 @@ impl Rollout {
         }
     }
 
-    /// `Ok` if all lengths fit T and B.
+    /// `Ok` if all lengths fit T and B, and [`EndStates::cut_rows`] ascend and are rows of this rollout.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] names the first that does not.
+    /// [`LearnError::Shape`] names the first length that does not; [`LearnError::Config`] names a row.
     pub fn check(&self) -> Result<(), LearnError> {
-        let rows = self.rows();
+        let (rows, cuts) = (self.rows(), self.ends.cut_rows.len());
         for (name, expected, found) in [
             ("rollout obs", rows * self.obs_dim, self.obs.len()),
             ("rollout z", rows * self.latent, self.z.len()),
@@ -240,8 +241,46 @@ impl Rollout {
             ("rollout truncated", rows, self.truncated.len()),
             ("rollout final_values", rows, self.final_values.len()),
             ("rollout next_values", self.envs, self.next_values.len()),
+            ("rollout ends cut_obs", cuts * self.obs_dim, self.ends.cut_obs.len()),
+            ("rollout ends cut_z", cuts * self.latent, self.ends.cut_z.len()),
         ] {
             LearnError::check(name, expected, found)?;
+        }
+        let cut_rows = &self.ends.cut_rows;
+        if let Some(row) = cut_rows.iter().find(|row| **row >= rows) {
+            return Err(LearnError::Config(format!("rollout ends: row {row} is listed, but there are {rows} rows")));
+        }
+        if let Some(pair) = cut_rows.windows(2).find(|pair| pair[0] >= pair[1]) {
+            let text = format!("rollout ends: row {} is listed after row {}: they must ascend", pair[1], pair[0]);
+            return Err(LearnError::Config(text));
+        }
+        Ok(())
+    }
+
+    /// `Ok` if a learner of `spec` can learn from this rollout with skills of width `latent`: it fits, it is not empty,
+    /// and every observation, skill and number that is learned from is finite.
+    ///
+    /// # Errors
+    /// As [`Self::check`]; [`LearnError::Action`] if the actions do not fit; [`LearnError::Input`] names the first row
+    /// that is not finite; [`LearnError::Config`] if there are no rows.
+    pub(crate) fn check_for(&self, spec: &PolicySpec, latent: usize) -> Result<(), LearnError> {
+        self.check()?;
+        spec.action_space.check(&self.actions)?;
+        LearnError::check("obs_dim of the rollout", spec.obs_dim, self.obs_dim)?;
+        LearnError::check("latent of the rollout", latent, self.latent)?;
+        if self.rows() == 0 {
+            return Err(LearnError::Config("the rollout is empty".to_owned()));
+        }
+        for (name, width, values) in [
+            ("rollout obs", self.obs_dim, &self.obs),
+            ("rollout z", self.latent, &self.z),
+            ("rollout rewards", 1, &self.rewards),
+            ("rollout ends cut_obs", self.obs_dim, &self.ends.cut_obs),
+            ("rollout ends cut_z", self.latent, &self.ends.cut_z),
+            ("rollout ends next_obs", self.obs_dim, &self.ends.next_obs),
+            ("rollout ends next_z", self.latent, &self.ends.next_z),
+        ] {
+            LearnError::check_finite(name, width, values)?;
         }
         Ok(())
     }
@@ -297,5 +336,20 @@ mod tests {
         let mut rollout = part(2, 0.0);
         rollout.rewards.pop();
         assert!(rollout.check().expect_err("too short").to_string().contains("rewards"));
+    }
+
+    #[test]
+    fn rollouts_with_ends_that_do_not_fit_are_not_joined() {
+        let after = |change: fn(&mut EndStates)| {
+            let mut rollout = part(2, 0.0);
+            change(&mut rollout.ends);
+            Rollout::join(&[part(1, 5.0), rollout]).expect_err("does not fit").to_string()
+        };
+        assert!(after(|ends| ends.cut_obs.clear()).contains("cut_obs"));
+        assert!(after(|ends| ends.cut_z.push(1.0)).contains("cut_z"));
+        assert!(after(|ends| ends.cut_rows[0] = 4).contains("row 4"));
+        assert!(after(|ends| (ends.cut_rows, ends.cut_obs) = (vec![3, 1], vec![0.0; 2])).contains("ascend"));
+        let without = Rollout { ends: EndStates::default(), ..part(2, 0.0) };
+        assert!(Rollout::join(&[without.clone(), without]).is_ok(), "PPO needs none");
     }
 }

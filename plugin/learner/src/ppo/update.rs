@@ -51,7 +51,8 @@ impl StepMetrics {
 /// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss.
 ///
 /// # Errors
-/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite.
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
+/// first loss beyond all bounds.
 pub fn gradient_step(
     nets: &mut PpoNets,
     adam: &mut Adam,

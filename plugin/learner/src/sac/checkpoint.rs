@@ -2,11 +2,12 @@
 
 use super::{SacConfig, SacLearner};
 use crate::file::TensorFile;
+use crate::layout::{check_actor, check_mlp, joined_width};
 use crate::nn::tracked;
 use crate::norm::{put_normalizers, take_normalizers};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::SkillDescription;
-use crate::{DeviceKind, FileError, PolicySpec};
+use crate::{ActionSpace, DeviceKind, FileError, PolicySpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -83,7 +84,19 @@ impl SacLearner {
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
-        let skill = FrozenSkill::described(header.score, header.skill, device).map_err(|e| file.learner(e))?;
+        let skill = FrozenSkill::described(header.score, header.skill, header.spec, &file, device)?;
+        let (shape, space) = (header.config.net_shape(header.spec), header.spec.action_space);
+        let width = joined_width(&file, "q1", &shape)?;
+        let (inputs, outputs) = match space {
+            ActionSpace::Discrete(choices) => (width, choices),
+            ActionSpace::Continuous(dim) => (width.saturating_add(dim), 1),
+        };
+        for critic in ["q1", "q2"] {
+            check_mlp(&file, critic, (inputs, &shape.hidden, outputs))?;
+        }
+        if !skill.as_ref().is_some_and(FrozenSkill::is_copied) {
+            check_actor(&file, "actor", &shape, space, true)?;
+        }
         let mut learner =
             Self::build(header.config, header.spec, skill, header.seed, device).map_err(|e| file.learner(e))?;
         let (nets, adams, plain) = (&mut learner.nets, &mut learner.optimizers, device.plain());

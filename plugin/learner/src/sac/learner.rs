@@ -7,7 +7,7 @@ use super::transitions::check_ends;
 use super::{EntropyCoef, SacBatch, SacConfig, SacMetrics, SacNets, actor_step, alpha_step, critic_step, soft_update};
 use crate::nn::{Adam, AdamConfig};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, NetShape, Policy, SkillSource};
+use crate::policy::{Actor, Policy, SkillSource};
 use crate::rng::{ChaCha8Rng, Streams};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
@@ -94,12 +94,7 @@ impl SacLearner {
             return Err(LearnError::Config(text.to_owned()));
         }
         let streams = Streams::new(seed);
-        let shape = NetShape {
-            obs_dim: spec.obs_dim,
-            latent: spec.latent,
-            hidden: config.hidden.clone(),
-            activation: config.activation,
-        };
+        let shape = config.net_shape(spec);
         let initial = match config.entropy {
             EntropyCoef::Auto { initial, .. } => initial,
             EntropyCoef::Fixed(_) => 1.0,
@@ -134,7 +129,8 @@ impl SacLearner {
         self.skill.as_ref().map(|skill| &skill.config)
     }
 
-    /// What the policy reads and does. Rollouts need skills also where `latent` is 0 if there is a penalty.
+    /// What the policy reads and does. With a skill model rollouts need skills also where `latent` is 0
+    /// ([`Self::rollout_latent`]).
     pub fn spec(&self) -> PolicySpec {
         self.spec
     }
@@ -207,10 +203,13 @@ impl SacLearner {
     /// [`SacConfig::learning_starts`] transitions, does the gradient steps that are due.
     ///
     /// # Errors
-    /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, before
-    /// anything is changed; [`LearnError::NotFinite`] names what ran away, and the learner is of no further use then.
+    /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
+    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed;
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
+    /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
-        self.check(rollout)?;
+        rollout.check_for(&self.spec, self.rollout_latent())?;
+        check_ends(rollout)?;
         if let Some(normalizer) = &mut self.rewards {
             normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
         }
@@ -286,16 +285,5 @@ impl SacLearner {
             EntropyCoef::Auto { .. } => self.nets.alpha(),
             EntropyCoef::Fixed(alpha) => Ok(alpha),
         }
-    }
-
-    fn check(&self, rollout: &Rollout) -> Result<(), LearnError> {
-        rollout.check()?;
-        self.spec.action_space.check(&rollout.actions)?;
-        LearnError::check("obs_dim of the rollout", self.spec.obs_dim, rollout.obs_dim)?;
-        LearnError::check("latent of the rollout", self.rollout_latent(), rollout.latent)?;
-        if rollout.rows() == 0 {
-            return Err(LearnError::Config("the rollout is empty".to_owned()));
-        }
-        check_ends(rollout)
     }
 }

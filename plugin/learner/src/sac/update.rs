@@ -28,7 +28,7 @@ pub struct ActorStep {
     pub entropy: f64,
     /// Mean divergence between decoder and policy, not weighted.
     pub decoder_kl: f64,
-    /// mean(α · divergence), α being the decoder's confidence, without kl_coef.
+    /// The penalty that is added to the loss, in the form of [`ScoreConfig::penalty`], without kl_coef.
     pub kl_penalty: f64,
     /// Mean of the decoder's confidence.
     pub confidence: f64,
@@ -111,8 +111,8 @@ pub fn target_of(
 /// One step of Adam on both critics.
 ///
 /// # Errors
-/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite; [`LearnError::Action`] as
-/// [`target_of`].
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
+/// first loss beyond all bounds; [`LearnError::Action`] as [`target_of`].
 pub fn critic_step(
     nets: &mut SacNets,
     adam: &mut Adam,
@@ -134,8 +134,7 @@ pub fn critic_step(
 
 /// One step of Adam on the actor, under the present critics.
 ///
-/// With a decoder in `batch` and settings of SCORE, kl_coef · mean(confidence · divergence) is added to the loss. A
-/// squashed policy is compared before its tanh (see [`crate::score::unsquashed`]).
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss. A squashed policy is compared before its tanh (see [`crate::score::unsquashed`]).
 ///
 /// # Errors
 /// As [`critic_step`].

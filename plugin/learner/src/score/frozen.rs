@@ -32,15 +32,29 @@ impl FrozenSkill {
         }
     }
 
-    /// Networks of the right sizes, to be filled by [`Self::take`]; `None` if the file was of a learner without skills.
+    /// Networks of the right sizes, to be filled by [`Self::take`] from `file`, a checkpoint of a policy of `spec`;
+    /// `None` if it was of a learner without skills.
     pub(crate) fn described(
         config: Option<ScoreConfig>,
         description: Option<SkillDescription>,
+        spec: PolicySpec,
+        file: &TensorFile,
         device: DeviceKind,
-    ) -> Result<Option<Self>, LearnError> {
+    ) -> Result<Option<Self>, FileError> {
         let Some((config, description)) = config.zip(description) else { return Ok(None) };
-        let nets = description.nets(device)?;
-        Ok(Some(Self { config, description, decoder: nets.decoder, prior: nets.prior }))
+        description.check_actors(file)?;
+        let (decoder, prior) = description.actors(device).map_err(|e| file.learner(e))?;
+        let skill = Self { config, description, decoder, prior };
+        let tied = skill.spec().map_err(|e| file.learner(e))?;
+        if tied != spec {
+            return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));
+        }
+        Ok(Some(skill))
+    }
+
+    /// Whether the policy's layers are those of the decoder, and not those that the learner's settings describe.
+    pub(crate) fn is_copied(&self) -> bool {
+        self.config.init_from_decoder
     }
 
     /// Adds the weights of decoder and prior to a file.
@@ -164,15 +178,52 @@ impl FrozenSkill {
         for start in (0..n).step_by(DECODER_CHUNK) {
             let rows = start..(start + DECODER_CHUNK).min(n);
             let len = rows.len();
-            let inputs = joined_rows(z, latent, obs, obs_dim, None, rows);
-            let part = self.decoder.forward(matrix(inputs, len, latent + obs_dim, &device)).to_host()?;
+            let mut inputs = joined_rows(z, latent, obs, obs_dim, None, rows);
+            if len == 1 {
+                // As in `Policy`: a single row would be summed in another order.
+                inputs.extend_from_within(..);
+            }
+            let mut part = self.decoder.forward(matrix(inputs, len.max(2), latent + obs_dim, &device)).to_host()?;
+            part.head.truncate(len * part.dim);
             dist.head.extend(part.head);
-            if let Some(stds) = part.log_std {
+            if let Some(mut stds) = part.log_std {
+                stds.truncate(len * part.dim);
                 dist.log_std.get_or_insert_default().extend(stds);
             }
         }
         let alpha = row_weights(&self.config, &dist, actions, own_samples_from)?;
         let dist = if squashed { unsquashed(&dist) } else { dist };
         Ok(Some(DecoderRows { dist, alpha }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Streams, normal};
+    use crate::skill::SkillConfig;
+    use crate::{ActionSpace, ObsKind};
+
+    #[test]
+    fn a_row_left_over_is_like_any_other() {
+        let device = DeviceKind::Flex;
+        let (obs_dim, space) = (130, ActionSpace::Discrete(15));
+        let config = SkillConfig { gru_hidden: 1, encoder_hidden: 1, ..SkillConfig::default() };
+        let description = SkillDescription { config, observation: ObsKind::Vector(obs_dim), action_space: space };
+        let nets = description.nets(device).expect("good settings");
+        let model = SkillModel::new(description, &nets, device);
+        let skill = FrozenSkill::new(ScoreConfig::default(), &model);
+        let mut rng = Streams::new(1).stream("rows", 0);
+        let n = DECODER_CHUNK + 1;
+        let mut numbers = |width: usize| -> Vec<f32> { (0..n * width).map(|_| normal(&mut rng)).collect() };
+        let (z, obs) = (numbers(skill.latent()), numbers(obs_dim));
+        let actions = Actions::Discrete(vec![0; n]);
+        let rows = skill.rows((&z, &obs), &actions, false, &mut Streams::new(1).stream("own", 0), device);
+        let rows = rows.expect("finite").expect("there is a penalty");
+        // The same row among others.
+        let tail = |values: &[f32], width: usize| values[(n - 3) * width..].to_vec();
+        let among = model.policy().forward(&tail(&z, skill.latent()), &tail(&obs, obs_dim), 3).expect("finite");
+        assert_eq!(rows.dist.head.len(), n * 15);
+        assert_eq!(rows.dist.head[(n - 1) * 15..], among.head[2 * 15..]);
     }
 }

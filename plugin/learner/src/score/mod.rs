@@ -1,8 +1,9 @@
 //! SCORE: what ties an online policy to the skill decoder.
 //!
-//! Three switches over PPO: the policy reads the skill z ([`ScoreConfig::condition`]), starts as a copy of the decoder
-//! ([`ScoreConfig::init_from_decoder`]), and its loss gains kl_coef · mean(α KL(decoder ‖ policy))
-//! ([`ScoreConfig::kl`]; the SCORE paper's Eq. 3 as a loss to minimise), where α is the decoder's confidence.
+//! Three switches over PPO or SAC: the policy reads the skill z ([`ScoreConfig::condition`]), starts as a copy of the
+//! decoder ([`ScoreConfig::init_from_decoder`]; not where SAC squashes actions), and its loss gains kl_coef times a
+//! penalty ([`ScoreConfig::kl`]). The penalty is mean(α KL(decoder ‖ policy)) (the SCORE paper's Eq. 3 as a loss to
+//! minimise), where α is the decoder's confidence, or one of the other forms of [`PenaltyForm`].
 
 mod alpha;
 mod config;

@@ -1,6 +1,6 @@
 //! How the encoder sees actions.
 
-use crate::{ActionSpace, Actions};
+use crate::{ActionSpace, Actions, LearnError};
 use serde::{Deserialize, Serialize};
 
 /// How the encoder reads a discrete action. Continuous ones are read as they are.
@@ -23,8 +23,12 @@ impl ActionInput {
     }
 
     /// `actions` of `space` as the encoder reads them, row-major, `[n, width]`.
-    pub fn encode(self, actions: &Actions, space: ActionSpace) -> Vec<f32> {
-        match (actions, self) {
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] names the first action that is not in `space`.
+    pub fn encode(self, actions: &Actions, space: ActionSpace) -> Result<Vec<f32>, LearnError> {
+        space.check(actions)?;
+        Ok(match (actions, self) {
             (Actions::Continuous { values, .. }, _) => values.clone(),
             (Actions::Discrete(values), Self::OneHot) => {
                 let dim = space.dim();
@@ -38,7 +42,7 @@ impl ActionInput {
                 let last = space.dim().saturating_sub(1).max(1) as f64;
                 values.iter().map(|&a| (f64::from(a) / last) as f32).collect()
             }
-        }
+        })
     }
 }
 
@@ -48,14 +52,17 @@ mod tests {
 
     #[test]
     fn each_form_by_hand() {
+        let encode = |input: ActionInput, actions, space| input.encode(actions, space).expect("in the space");
         let (space, actions) = (ActionSpace::Discrete(3), Actions::Discrete(vec![2, 1]));
-        assert_eq!(ActionInput::OneHot.encode(&actions, space), [0.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
-        assert_eq!(ActionInput::ScaledIndex.encode(&actions, space), [1.0, 0.5]);
+        assert_eq!(encode(ActionInput::OneHot, &actions, space), [0.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(encode(ActionInput::ScaledIndex, &actions, space), [1.0, 0.5]);
+        let outside = ActionInput::OneHot.encode(&Actions::Discrete(vec![0, 3]), space);
+        assert!(matches!(outside, Err(LearnError::Action(text)) if text.contains("row 1")));
         let (space, actions) = (ActionSpace::Continuous(2), Actions::Continuous { dim: 2, values: vec![0.3, -2.0] });
         for input in [ActionInput::OneHot, ActionInput::ScaledIndex] {
             assert_eq!(input.width(space), 2);
-            assert_eq!(input.encode(&actions, space), [0.3, -2.0]);
+            assert_eq!(encode(input, &actions, space), [0.3, -2.0]);
         }
-        assert_eq!(ActionInput::ScaledIndex.encode(&Actions::Discrete(vec![0]), ActionSpace::Discrete(1)), [0.0]);
+        assert_eq!(encode(ActionInput::ScaledIndex, &Actions::Discrete(vec![0]), ActionSpace::Discrete(1)), [0.0]);
     }
 }

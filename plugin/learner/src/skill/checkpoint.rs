@@ -26,6 +26,9 @@ struct Header {
     batches: usize,
     demo_episodes: usize,
     demo_steps: usize,
+    /// A hash of the demonstrations; the first checkpoints had none.
+    #[serde(default)]
+    demo_hash: Option<u64>,
 }
 
 impl SkillTrainer {
@@ -46,6 +49,7 @@ impl SkillTrainer {
             batches: self.sums.count,
             demo_episodes: self.dataset.episodes(),
             demo_steps: self.dataset.steps(),
+            demo_hash: Some(self.fingerprint),
         };
         let mut file = TensorFile::new(path, &header)?;
         file.put_network("", &self.nets)?;
@@ -75,7 +79,12 @@ impl SkillTrainer {
         if skill.action_space != dataset.action_space() {
             return Err(file.format(format!("acts in {:?}, the demonstrations do not", skill.action_space)));
         }
+        skill.check(&file)?;
         let mut trainer = Self::new(skill.config, dataset, header.seed, device).map_err(|e| file.learner(e))?;
+        if header.demo_hash.is_some_and(|hash| hash != trainer.fingerprint) {
+            let text = "the demonstrations are not those of this training: as many episodes and steps, but other ones";
+            return Err(file.format(text.to_owned()));
+        }
         file.take_network("", &mut trainer.nets, &device.plain())?;
         trainer.nets = tracked(&trainer.nets);
         file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;

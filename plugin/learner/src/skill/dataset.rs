@@ -1,7 +1,9 @@
 //! Demonstrations.
 
 use super::Window;
+use crate::rng::fnv1a;
 use crate::{ActionSpace, Actions, LearnError, ObsKind, Observations};
+use rayon::prelude::*;
 
 /// One recorded episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +27,8 @@ impl Dataset {
     ///
     /// # Errors
     /// [`LearnError::Shape`] if an episode's observations do not match its actions, [`LearnError::Config`] if they are of
-    /// another kind, [`LearnError::Action`] if an action is outside `space`, [`LearnError::NotFinite`] if an observation
-    /// is.
+    /// another kind, [`LearnError::Action`] if an action is outside `space`, [`LearnError::Input`] if an observation is
+    /// not finite.
     pub fn new(
         observation: impl Into<ObsKind>,
         space: ActionSpace,
@@ -67,6 +69,26 @@ impl Dataset {
     /// Steps in all episodes together.
     pub fn steps(&self) -> usize {
         self.episodes.iter().map(|episode| episode.actions.len()).sum()
+    }
+
+    /// A hash of all observations and actions, the same on any number of threads.
+    pub(super) fn fingerprint(&self) -> u64 {
+        let hashes: Vec<[u64; 2]> = self
+            .episodes
+            .par_iter()
+            .map(|episode| {
+                let observations = match &episode.observations {
+                    Observations::Vector(values) => fnv1a(bytemuck::cast_slice(values)),
+                    Observations::Image(pixels) => fnv1a(pixels),
+                };
+                let actions = match &episode.actions {
+                    Actions::Discrete(choices) => fnv1a(bytemuck::cast_slice(choices)),
+                    Actions::Continuous { values, .. } => fnv1a(bytemuck::cast_slice(values)),
+                };
+                [observations, actions]
+            })
+            .collect();
+        fnv1a(bytemuck::cast_slice(&hashes))
     }
 
     /// Observations and actions of `windows`, time-major: row `t * windows + b`.
@@ -112,7 +134,7 @@ pub(super) mod tests {
         assert!(new(vector, episode(vec![0.0; 6].into(), 1)).is_ok());
         assert!(matches!(new(vector, episode(vec![0.0; 5].into(), 1)), Err(LearnError::Shape { .. })));
         assert!(matches!(new(vector, episode(vec![0.0; 6].into(), 2)), Err(LearnError::Action(_))));
-        assert!(matches!(new(vector, episode(vec![f32::NAN; 6].into(), 1)), Err(LearnError::NotFinite { .. })));
+        assert!(matches!(new(vector, episode(vec![f32::NAN; 6].into(), 1)), Err(LearnError::Input { row: 0, .. })));
         assert!(matches!(new(vector, episode(vec![0u8; 6].into(), 1)), Err(LearnError::Config(_))));
         let image = ObsKind::Image(ImageShape { channels: 1, height: 1, width: 2 });
         assert!(new(image, episode(vec![0u8; 6].into(), 1)).is_ok());

@@ -2,8 +2,9 @@
 
 use super::{Prior, SkillConfig, SkillNets};
 use crate::file::TensorFile;
-use crate::nn::frozen;
-use crate::policy::{Actor, Policy};
+use crate::layout::{check_actor, check_cnn, check_mlp, check_tensor, product};
+use crate::nn::{Activation, frozen};
+use crate::policy::{Actor, NetShape, Policy, StdKind};
 use crate::rng::Streams;
 use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
@@ -116,6 +117,7 @@ impl SkillModel {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
         let description = header.skill;
+        description.check(&file)?;
         let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut nets, &device.plain())?;
         file.finish()?;
@@ -129,5 +131,58 @@ impl SkillDescription {
         self.config.validate()?;
         let (config, space) = (&self.config, self.action_space);
         SkillNets::new(config, self.observation, space, &Streams::new(0), &device.plain())
+    }
+
+    /// Decoder and prior alone.
+    pub(crate) fn actors(&self, device: DeviceKind) -> Result<(Actor, Actor), LearnError> {
+        self.config.validate()?;
+        SkillNets::actors(&self.config, self.observation, self.action_space, &Streams::new(0), &device.plain())
+    }
+
+    /// `Ok` if `file` holds networks of these sizes.
+    pub(crate) fn check(&self, file: &TensorFile) -> Result<(), FileError> {
+        self.check_actors(file)?;
+        let config = &self.config;
+        let features = match self.observation {
+            ObsKind::Vector(obs_dim) => {
+                let width = config.encoder_hidden;
+                check_mlp(file, "encoder.state", (obs_dim, &[width; 2], width))?;
+                width
+            }
+            ObsKind::Image(image) => {
+                check_cnn(file, "encoder.cnn", &config.cnn, image)?;
+                config.cnn.features()
+            }
+        };
+        // Features and actions are as wide as tensors that are there.
+        let mut width = features + config.action_input.width(self.action_space);
+        let gates = product(file, "encoder.gru", &[3, config.gru_hidden])?;
+        for layer in 0..config.gru_layers {
+            check_tensor(file, &format!("encoder.gru.l{layer}.weight_ih"), &[2, width, gates])?;
+            check_tensor(file, &format!("encoder.gru.l{layer}.weight_hh"), &[2, config.gru_hidden, gates])?;
+            width = 2 * config.gru_hidden;
+        }
+        check_tensor(file, "encoder.mean.weight", &[width, config.latent])
+    }
+
+    /// `Ok` if `file` holds a decoder and a prior of these sizes.
+    pub(crate) fn check_actors(&self, file: &TensorFile) -> Result<(), FileError> {
+        let config = &self.config;
+        config.validate().map_err(|e| file.learner(e))?;
+        let prior = (0, ActionSpace::Continuous(config.latent), config.prior_std);
+        for (name, (latent, space, std)) in
+            [("decoder", (config.latent, self.action_space, config.decoder_std)), ("prior", prior)]
+        {
+            let obs_dim = match self.observation {
+                ObsKind::Vector(width) => width,
+                ObsKind::Image(image) => {
+                    check_cnn(file, &format!("{name}.cnn"), &config.cnn, image)?;
+                    config.cnn.features()
+                }
+            };
+            let shape = NetShape { obs_dim, latent, hidden: config.hidden.clone(), activation: Activation::Relu };
+            check_actor(file, name, &shape, space, std == StdKind::State)?;
+        }
+        Ok(())
     }
 }

@@ -46,8 +46,29 @@ impl SkillNets {
         streams: &Streams,
         device: &Device,
     ) -> Result<Self, LearnError> {
-        let rng = |name: &str| streams.stream(name, 0);
         let action_width = config.action_input.width(space);
+        let (decoder, prior) = Self::actors(config, observation, space, streams, device)?;
+        let mut rng = streams.stream("skill.encoder", 0);
+        Ok(Self {
+            encoder: Encoder::new(config, observation, action_width, &mut rng, device)?,
+            decoder,
+            prior,
+            tanh_latent: config.tanh_latent,
+        })
+    }
+
+    /// Decoder and prior alone, as in [`Self::new`].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn actors(
+        config: &SkillConfig,
+        observation: ObsKind,
+        space: ActionSpace,
+        streams: &Streams,
+        device: &Device,
+    ) -> Result<(Actor, Actor), LearnError> {
+        let rng = |name: &str| streams.stream(name, 0);
         let actor = |name: &str, latent, space, std| -> Result<Actor, LearnError> {
             let obs_dim = match observation {
                 ObsKind::Vector(width) => width,
@@ -59,12 +80,9 @@ impl SkillNets {
             let ObsKind::Image(shape) = observation else { return Ok(actor) };
             Ok(actor.with_cnn(ImageNet::new(&config.cnn, shape, &mut rng(&format!("{name}.cnn")), device)?))
         };
-        Ok(Self {
-            encoder: Encoder::new(config, observation, action_width, &mut rng("skill.encoder"), device)?,
-            decoder: actor("skill.decoder", config.latent, space, config.decoder_std)?,
-            prior: actor("skill.prior", 0, ActionSpace::Continuous(config.latent), config.prior_std)?,
-            tanh_latent: config.tanh_latent,
-        })
+        let decoder = actor("skill.decoder", config.latent, space, config.decoder_std)?;
+        let prior = actor("skill.prior", 0, ActionSpace::Continuous(config.latent), config.prior_std)?;
+        Ok((decoder, prior))
     }
 
     /// Runs a batch of B windows through all three networks.

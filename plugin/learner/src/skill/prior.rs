@@ -53,7 +53,7 @@ impl Prior {
     ///
     /// # Errors
     /// [`LearnError::Shape`] for observations of the wrong length, [`LearnError::Config`] if the prior reads images;
-    /// [`LearnError::NotFinite`] if a skill is not finite.
+    /// [`LearnError::Input`] if an observation is not finite, [`LearnError::NotFinite`] if a skill is not.
     pub fn sample(
         &self,
         obs: &[f32],
@@ -113,7 +113,7 @@ impl Prior {
             }
         }
         if z.iter().any(|x| !x.is_finite()) {
-            return Err(LearnError::NotFinite { tensor: "prior output".to_owned(), steps: 0 });
+            return Err(LearnError::NotFinite { tensor: "prior output".to_owned(), steps: None });
         }
         Ok(z)
     }

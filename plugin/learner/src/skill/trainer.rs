@@ -43,6 +43,8 @@ pub struct SkillProgress {
 pub struct SkillTrainer {
     pub(super) config: SkillConfig,
     pub(super) dataset: Dataset,
+    /// The hash of `dataset`.
+    pub(super) fingerprint: u64,
     pub(super) nets: SkillNets,
     pub(super) adam: Adam,
     pub(super) streams: Streams,
@@ -80,6 +82,7 @@ impl SkillTrainer {
             sums: Sums::default(),
             last_epoch: SkillMetrics::default(),
             config,
+            fingerprint: dataset.fingerprint(),
             dataset,
             streams,
             device,
@@ -115,7 +118,7 @@ impl SkillTrainer {
     /// Trains on the next batch; the last one of an epoch may be smaller.
     ///
     /// # Errors
-    /// [`LearnError::NotFinite`] names what ran away; the trainer is of no further use then.
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away; the trainer is of no further use then.
     pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
         let end = (self.next + self.config.batch).min(self.windows.len());
         let windows = self.windows[self.next..end].to_vec();
@@ -206,7 +209,7 @@ impl SkillTrainer {
         let device = self.device.plain();
         let (observations, actions) = self.dataset.gather(windows, steps)?;
         let states = ObsRows::new(observations, &self.dataset.observation, &device);
-        let encoded = matrix(input.encode(&actions, space), steps * batch, input.width(space), &device);
+        let encoded = matrix(input.encode(&actions, space)?, steps * batch, input.width(space), &device);
         let mut rng = self.streams.stream("skill.noise", self.adam.steps());
         let noise = (0..batch * self.config.latent).map(|_| normal(&mut rng)).collect();
         let noise = matrix(noise, batch, self.config.latent, &device);

@@ -44,7 +44,10 @@ impl Dataset {
             WindowRule::Legacy => self.legacy_windows(window, streams),
         };
         if windows.is_empty() {
-            let longest = self.lengths().max().unwrap_or(0);
+            let longest = match rule {
+                WindowRule::WithinEpisodes => self.lengths().max().unwrap_or(0),
+                WindowRule::Legacy => self.steps(),
+            };
             return Err(LearnError::NoWindow { window, longest });
         }
         Ok(windows)
@@ -145,9 +148,9 @@ mod tests {
 
     #[test]
     fn too_short_episodes_are_an_error() {
-        for rule in [WindowRule::WithinEpisodes, WindowRule::Legacy] {
+        for (rule, stretch) in [(WindowRule::WithinEpisodes, 9), (WindowRule::Legacy, 12)] {
             let error = dataset(&[3, 9]).windows(13, rule, &Streams::new(1), 0).expect_err("none fits");
-            assert!(matches!(error, LearnError::NoWindow { window: 13, longest: 9 }));
+            assert!(matches!(error, LearnError::NoWindow { window: 13, longest } if longest == stretch), "{error}");
         }
         assert!(dataset(&[3, 9]).windows(10, WindowRule::WithinEpisodes, &Streams::new(1), 0).is_err());
         assert!(dataset(&[3, 9]).windows(10, WindowRule::Legacy, &Streams::new(1), 0).is_ok());

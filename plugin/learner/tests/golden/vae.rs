@@ -117,7 +117,8 @@ impl<'a> Run<'a> {
     fn run(mut self) {
         let (case, steps) = (self.case, self.steps);
         let (states, actions) = (self.states(), self.actions());
-        let encoded = self.matrix(&self.config.action_input.encode(&actions, self.space), steps * self.batch);
+        let encoded = self.config.action_input.encode(&actions, self.space).expect("actions of the space");
+        let encoded = self.matrix(&encoded, steps * self.batch);
         let noise = self.matrix(&case.f32s("in.eps"), self.batch);
         self.check_inner(&states, &encoded, &noise);
 

@@ -1,13 +1,14 @@
 //! The same seed gives the same bits, whatever the number of threads and the size of the batch.
 
 use crate::corridor::config;
+use crate::point::{self, Field};
 use crate::score::model;
 use crate::toy::{Driver, OBS, SPACE};
-use playbot_learner::nn::Activation;
+use playbot_learner::nn::{Activation, CnnKind};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, Policy, PolicyOutput, PolicySpec, PpoConfig, PpoLearner,
-    ScoreConfig, SkillConfig, SkillTrainer,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Policy, PolicyOutput, PolicySpec, PpoConfig,
+    PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
 };
 
 fn numbers(n: usize) -> Vec<f32> {
@@ -136,6 +137,53 @@ fn skill_training_does_not_depend_on_the_number_of_threads() {
         let dataset = Dataset::new(obs_dim, ActionSpace::Continuous(dim), vec![episode]).expect("a good episode");
         // Wide enough for matrix products, gates and weights to be split.
         let config = SkillConfig { window: 4, gru_hidden: 200, gru_layers: 2, ..SkillConfig::default() };
+        let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("good settings");
+        (0..2).fold(0, |hash, _| {
+            let metrics = trainer.train_batch().expect("finite");
+            [metrics.loss, metrics.grad_norm].iter().fold(hash, mix)
+        })
+    });
+}
+
+#[test]
+fn discrete_sac_does_not_depend_on_the_number_of_threads() {
+    same_on_any_number_of_threads("discrete_sac_does_not_depend_on_the_number_of_threads", || {
+        let mut driver = Driver::new(8, 1);
+        sac(crate::sac::config(), crate::sac::SPEC, |learner| driver.rollout(learner, 8))
+    });
+}
+
+#[test]
+fn continuous_sac_does_not_depend_on_the_number_of_threads() {
+    same_on_any_number_of_threads("continuous_sac_does_not_depend_on_the_number_of_threads", || {
+        let mut field = Field::new(8, 1);
+        sac(point::sac_config(), point::SPEC, |learner| field.rollout(learner, 8))
+    });
+}
+
+/// What a policy says after a few gradient steps with networks wide enough to be split.
+fn sac(config: SacConfig, spec: PolicySpec, mut rollout: impl FnMut(&SacLearner) -> Rollout) -> u64 {
+    let config = SacConfig { hidden: vec![256, 256], batch: 128, learning_starts: 1, updates_per_step: 0.05, ..config };
+    let mut learner = SacLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
+    for _ in 0..2 {
+        let played = rollout(&learner);
+        learner.update(&played).expect("finite");
+    }
+    assert!(learner.gradient_steps() > 4);
+    let output = learner.policy().forward(&[], &numbers(64 * spec.obs_dim), 64).expect("finite");
+    output.head.iter().chain(&output.log_std).fold(0, mix)
+}
+
+#[test]
+fn skill_training_on_images_does_not_depend_on_the_number_of_threads() {
+    same_on_any_number_of_threads("skill_training_on_images_does_not_depend_on_the_number_of_threads", || {
+        let (shape, steps) = (ImageShape { channels: 3, height: 32, width: 32 }, 44);
+        let pixels: Vec<u8> = numbers(steps * shape.numbers()).iter().map(|x| (x * 60.0 + 128.0) as u8).collect();
+        let actions = Actions::Discrete((0..steps as u32).map(|t| t % 5).collect());
+        let episode = DemoEpisode { observations: pixels.into(), actions };
+        let dataset = Dataset::new(shape, ActionSpace::Discrete(5), vec![episode]).expect("a good episode");
+        let cnn = CnnKind::Impala { channels: vec![16, 16], feature: 64 };
+        let config = SkillConfig { window: 4, batch: 5, cnn, ..SkillConfig::default() };
         let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("good settings");
         (0..2).fold(0, |hash, _| {
             let metrics = trainer.train_batch().expect("finite");

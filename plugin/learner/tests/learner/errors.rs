@@ -18,15 +18,39 @@ fn after(change: impl Fn(&mut Rollout)) -> LearnError {
 
 #[test]
 fn numbers_that_run_away_are_named() {
-    let error = after(|rollout| rollout.rewards[3] = f32::NAN);
+    let error = after(|rollout| rollout.values[3] = f32::NAN);
     assert!(matches!(&error, LearnError::NotFinite { tensor, .. } if tensor == "policy_loss"), "{error}");
-    let error = after(|rollout| rollout.obs[5] = f32::INFINITY);
-    assert!(matches!(&error, LearnError::NotFinite { .. }), "{error}");
     let mut learner = learner(PpoConfig { lr: 1e38, ..config() });
     let mut driver = Driver::new(4, 1);
     let rollout = driver.rollout(&learner, 16);
     let result = (0..5).try_for_each(|_| learner.update(&rollout).map(|_| ()));
     assert!(matches!(result, Err(LearnError::NotFinite { .. })));
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_before_anything_changes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut learner = learner(PpoConfig { norm_obs: true, norm_reward: true, ..config() });
+    let rollout = Driver::new(4, 1).rollout(&learner, 16);
+    let bytes = |learner: &PpoLearner| {
+        let path = folder.path().join("checkpoint");
+        learner.save(&path).expect("written");
+        std::fs::read(path).expect("readable")
+    };
+    let before = bytes(&learner);
+    let changes: [(&str, fn(&mut Rollout)); 3] = [
+        ("rollout rewards: row 3", |rollout| rollout.rewards[3] = f32::NAN),
+        ("rollout obs: row 1", |rollout| rollout.obs[OBS] = f32::INFINITY),
+        ("rollout ends next_obs: row 2", |rollout| rollout.ends.next_obs[2 * OBS] = f32::NAN),
+    ];
+    for (text, change) in changes {
+        let mut bad = rollout.clone();
+        change(&mut bad);
+        let error = learner.update(&bad).expect_err("not finite");
+        assert!(matches!(error, LearnError::Input { .. }) && error.to_string().starts_with(text), "{error}");
+        assert!(bytes(&learner) == before, "{text}");
+    }
+    learner.update(&rollout).expect("finite");
 }
 
 #[test]
@@ -44,7 +68,7 @@ fn a_policy_checks_its_inputs() {
     let policy = learner(config()).policy();
     assert!(matches!(policy.forward(&[], &[0.0; OBS + 1], 1), Err(LearnError::Shape { .. })));
     let error = policy.forward(&[], &[f32::NAN; OBS], 1).expect_err("not a number");
-    assert!(error.to_string().contains("actor"), "{error}");
+    assert_eq!(error.to_string(), "`actor output` is not finite");
     assert!(policy.forward(&[], &[], 0).expect("nothing to do").is_empty());
 }
 

@@ -3,8 +3,13 @@
 use crate::corridor::config as ppo_config;
 use crate::score::model;
 use crate::skill::{config, corridor_demos};
-use playbot_learner::{DeviceKind, FileError, PpoLearner, ScoreConfig, SkillModel, SkillTrainer};
+use crate::toy::OBS;
+use playbot_learner::{
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, PolicyCard, PolicyFile, PpoLearner, ScoreConfig,
+    SkillModel, SkillTrainer,
+};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -58,6 +63,13 @@ impl Contents {
         let header = HashMap::from([("playbot".to_owned(), self.description.clone())]);
         std::fs::write(path, safetensors::serialize(views, Some(header)).expect("names differ")).expect("written");
     }
+}
+
+/// Puts `value` at `pointer` in the JSON of a file's header.
+fn describe(contents: &mut Contents, pointer: &str, value: Value) {
+    let mut json: Value = serde_json::from_str(&contents.description).expect("JSON");
+    *json.pointer_mut(pointer).expect(pointer) = value;
+    contents.description = json.to_string();
 }
 
 /// What reading the file says after `change`.
@@ -120,4 +132,108 @@ fn a_skill_model_from_before_there_were_images_is_read() {
     contents.write(&path);
     let back = SkillModel::load(&path, DeviceKind::Flex).expect("an older file");
     assert_eq!(back.observation(), model.observation());
+}
+
+#[test]
+fn a_training_does_not_go_on_with_other_demonstrations() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("trainer");
+    let demos = |at: usize, by: f32| {
+        let mut values: Vec<f32> = (0..40).map(|t| t as f32).collect();
+        values[at] += by;
+        let episode = DemoEpisode { observations: values.into(), actions: Actions::Discrete(vec![1; 40]) };
+        Dataset::new(1, ActionSpace::Discrete(2), vec![episode]).expect("a good episode")
+    };
+    let trainer = SkillTrainer::new(config(), demos(0, 0.0), 1, DeviceKind::Flex).expect("windows fit");
+    trainer.save(&path).expect("written");
+    SkillTrainer::load(&path, demos(0, 0.0), DeviceKind::Flex).expect("the same");
+    let error = SkillTrainer::load(&path, demos(39, 0.5), DeviceKind::Flex).expect_err("one number differs");
+    assert!(error.to_string().contains("not those of this training"), "{error}");
+    let mut contents = Contents::read(&path);
+    let start = contents.description.find(r#","demo_hash""#).expect("a hash");
+    let end = start + contents.description[start..].find('}').expect("the last entry");
+    contents.description.replace_range(start..end, "");
+    contents.write(&path);
+    SkillTrainer::load(&path, demos(39, 0.5), DeviceKind::Flex).expect("an older file says less");
+}
+
+/// More than any machine has.
+const HUGE: u64 = 1 << 40;
+
+#[test]
+fn sizes_that_the_file_does_not_hold_are_refused_before_anything_is_made() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let files = files(folder.path());
+    let skill = [
+        ("/skill/config/hidden", json!([HUGE]), "decoder.l0.weight"),
+        ("/skill/config/latent", json!(u64::MAX), "decoder"),
+        ("/skill/config/gru_hidden", json!(HUGE), "encoder.gru.l0"),
+        ("/skill/config/gru_layers", json!(HUGE), "encoder.gru.l1"),
+        ("/skill/config/encoder_hidden", json!(HUGE), "encoder.state.l0"),
+        ("/skill/action_space", json!({"Discrete": HUGE}), "head.weight"),
+    ];
+    let ppo = [
+        ("/config/hidden", json!([HUGE]), "critic.l0.weight"),
+        ("/skill/config/hidden", json!([u64::MAX]), "decoder.l0.weight"),
+        ("/spec/obs_dim", json!(HUGE), "its skill model makes it"),
+    ];
+    for (at, cases) in [(0, &skill[..]), (2, &ppo[..])] {
+        let (path, load, _) = &files[at];
+        for (pointer, value, text) in cases {
+            let error = after(path, *load, |c| describe(c, pointer, value.clone())).to_string();
+            assert!(error.contains(text), "{pointer}: {error}");
+        }
+    }
+}
+
+/// A policy file of an untrained policy with skills.
+fn policy_file(path: &Path, condition: bool) {
+    let score = ScoreConfig { condition, init_from_decoder: condition, ..ScoreConfig::default() };
+    let learner = PpoLearner::with_skill(ppo_config(), score, &model(1), 1, DeviceKind::Flex).expect("good settings");
+    let file = PolicyFile { card: PolicyCard::default(), policy: learner.policy(), skills: learner.skills() };
+    let (obs, z) = (vec![0.5; 3 * OBS], vec![0.25; 3 * learner.rollout_latent()]);
+    assert!(file.save(path, &obs, &z, 0).expect_err("no examples").to_string().contains("at least one row"));
+    file.save(path, &obs, &z, 3).expect("written");
+}
+
+fn load_policy(path: &Path) -> Result<(), FileError> {
+    PolicyFile::load(path, DeviceKind::Flex).map(drop)
+}
+
+#[test]
+fn a_policy_file_whose_parts_do_not_go_together_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("policy");
+    policy_file(&path, true);
+    load_policy(&path).expect("whole");
+    for (pointer, value, text) in [
+        ("/policy/actor/net/hidden", json!([u64::MAX]), "actor.l0.weight"),
+        ("/policy/actor/net/hidden", json!([0]), "size of 0"),
+        ("/policy/actor/net/latent", json!(u64::MAX), "actor"),
+        ("/policy/critic/latent", json!(0), "`critic` reads"),
+        ("/policy/critic/hidden", json!([HUGE]), "critic.l0.weight"),
+        ("/skills/latent", json!(HUGE), "`decoder` reads"),
+        ("/skills/decoder/net/obs_dim", json!(1), "decoder"),
+        ("/skills/prior/net/hidden", json!([HUGE]), "prior.l0.weight"),
+        ("/skills/horizon", json!(0), "at least 1 tick"),
+        ("/examples", json!(0), "no examples"),
+    ] {
+        let error = after(&path, load_policy, |c| describe(c, pointer, value.clone())).to_string();
+        assert!(error.contains(text), "{pointer}: {error}");
+    }
+}
+
+#[test]
+fn a_decoder_that_computes_something_else_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for condition in [true, false] {
+        let path = folder.path().join("policy");
+        policy_file(&path, condition);
+        load_policy(&path).expect("whole");
+        let error = after(&path, load_policy, |c| {
+            let bias = &mut c.tensors.get_mut("decoder.head.bias").expect("there").2;
+            bias[..4].copy_from_slice(&3.0f32.to_le_bytes());
+        });
+        assert!(matches!(&error, FileError::Example { what: "decoder_head", example: 0, .. }), "{error}");
+    }
 }
