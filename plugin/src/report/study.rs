@@ -110,7 +110,8 @@ impl StudyReport {
             }
             let mean = mean_curve(&seeds);
             let line = Curve::new(variant, mean.iter().map(|point| (point.step as f64, point.mean)).collect());
-            let band = mean.iter().map(|point| (point.low, point.high)).collect();
+            // A rate lies in 0..1, whatever its deviation.
+            let band = mean.iter().map(|point| (point.low.max(0.0), point.high.min(1.0))).collect();
             Some(if seeds.len() > 1 { line.with_band(band) } else { line })
         });
         Chart {
