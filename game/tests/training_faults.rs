@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-const UPDATES: usize = 60;
+const UPDATES: usize = 120;
 
 /// A small training; `more` is added to its settings of PPO.
 fn write_experiment(folder: &Path, more: &str) {
@@ -148,7 +148,7 @@ fn a_killed_skill_training_goes_on_bit_for_bit() {
         assert!(output.status.success(), "{}", errors(&output));
     };
     let learn = |out: &str, more: &[&str]| {
-        let sets = ["hidden=[16]", "encoder_hidden=8", "gru_hidden=8", "window=5", "epochs=40"];
+        let sets = ["hidden=[16]", "encoder_hidden=8", "gru_hidden=8", "window=5", "epochs=200"];
         let mut command = playbot(&["learn-skills", "--demos", "few.demo", "--out", out]);
         command.args(sets.iter().flat_map(|set| ["--set".to_owned(), format!("skills.{set}")])).args(more);
         command

@@ -14,7 +14,8 @@
 //! - A [`SkillPrior`](skill_prior::SkillPrior) draws a skill z for each agent every T ticks; a policy decodes it into
 //!   actions together with the observation.
 //! - [`demo`] records who did what, and replays it to the bit. [`train`] learns from recordings and from play, headless,
-//!   over many levels. [`eval`] measures.
+//!   over many levels. [`eval`] measures, and [`runs`] reads back and compares what was trained.
+//! - A [`policy_file`] brings a trained policy into a game that ships with it.
 //!
 //! # One tick
 //!

@@ -58,6 +58,9 @@ impl Learner {
         let spec = PolicySpec { obs_dim: game.observation().len(), latent: 0, action_space: game.actions() };
         let skills = if algorithm.needs_skills() { Some(fitting(game, algorithm, skills)?) } else { None };
         let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
+        if algorithm.is_sac() {
+            warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
+        }
         Ok(match (algorithm.is_sac(), skills) {
             (false, None) => Self::Ppo(PpoLearner::new(ppo, spec, seed, device)?.into()),
             (false, Some(model)) => Self::Ppo(PpoLearner::with_skill(ppo, score, model, seed, device)?.into()),
@@ -143,6 +146,21 @@ impl Learner {
             false => Self::Ppo(PpoLearner::load(path, device)?.into()),
             true => Self::Sac(SacLearner::load(path, device)?.into()),
         })
+    }
+}
+
+/// Says so if the replay buffer will need more memory than people expect.
+fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize) {
+    const GIB: f64 = (1u64 << 30) as f64;
+    let transitions = (experiment.sac.buffer as u64).min(experiment.steps);
+    let numbers = 2 * (spec.obs_dim + latent) + spec.action_space.dim() + 2;
+    let size = transitions as f64 * (4 * numbers) as f64 / GIB;
+    if size > 1.0 {
+        tracing::warn!(
+            "the replay buffer will grow to {size:.1} GiB of memory, and each checkpoint with it on the disk: \
+             `sac.buffer` can be smaller than {}, and `checkpoints.every` larger",
+            experiment.sac.buffer
+        );
     }
 }
 
