@@ -42,10 +42,12 @@ mod observation;
 pub mod policy;
 pub mod ppo;
 pub mod rng;
+mod rollout;
 pub mod sac;
 pub mod score;
 pub mod skill;
 mod space;
+mod spec;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
@@ -53,8 +55,9 @@ pub use file::write_atomically;
 pub use norm::RewardReset;
 pub use observation::{ImageShape, ObsKind, Observations};
 pub use policy::{Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
-pub use ppo::{EndStates, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep, TimeLimit, UpdateMetrics};
+pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};
 pub use rng::{RngState, Streams};
+pub use rollout::{EndStates, Rollout, RolloutStep};
 pub use sac::{EntropyCoef, SacConfig, SacLearner, SacMetrics};
 pub use score::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{
@@ -62,3 +65,4 @@ pub use skill::{
     SkillProgress, SkillTrainer, WindowRule,
 };
 pub use space::{Action, ActionSpace, Actions};
+pub use spec::{PolicySpec, TimeLimit};

@@ -1,11 +1,11 @@
 //! A rollout made ready for its update, and the minibatches taken from it.
 
-use super::{PpoBatch, Rollout, normalize_advantages};
-use crate::Actions;
+use super::{PpoBatch, normalize_advantages};
 use crate::nn::{ActionRows, matrix, vector};
 use crate::norm::ObsStats;
 use crate::policy::joined_rows;
 use crate::score::{DecoderBatch, DecoderRows};
+use crate::{Actions, Rollout};
 use burn::tensor::{Device, Tensor};
 
 /// Everything an update reads, one entry per row.

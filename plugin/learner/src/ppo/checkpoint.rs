@@ -1,13 +1,13 @@
 //! A learner's complete state in one file.
 
-use super::{PolicySpec, PpoConfig, PpoLearner};
+use super::{PpoConfig, PpoLearner};
 use crate::file::TensorFile;
 use crate::layout::{check_actor, check_mlp, joined_width};
 use crate::nn::tracked;
 use crate::norm::{put_normalizers, take_normalizers};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::SkillDescription;
-use crate::{DeviceKind, FileError};
+use crate::{DeviceKind, FileError, PolicySpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -3,29 +3,8 @@
 use crate::nn::Activation;
 use crate::norm::{RewardNormalizer, RewardReset};
 use crate::policy::NetShape;
-use crate::{ActionSpace, LearnError};
+use crate::{LearnError, PolicySpec, TimeLimit};
 use serde::{Deserialize, Serialize};
-
-/// What a step that ran into the time limit leads to.
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
-pub enum TimeLimit {
-    /// The value of the episode's last observation: the game would have gone on.
-    Bootstrap,
-    /// Nothing, as if the episode had ended by itself (the released code).
-    Legacy,
-}
-
-/// What a policy reads and does.
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
-#[serde(deny_unknown_fields)]
-pub struct PolicySpec {
-    /// Width of an observation.
-    pub obs_dim: usize,
-    /// Width of the skill before it; 0 for a policy that reads none.
-    pub latent: usize,
-    /// What it acts in.
-    pub action_space: ActionSpace,
-}
 
 /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]

@@ -1,6 +1,6 @@
 //! Generalised advantage estimation.
 
-use super::{Rollout, TimeLimit};
+use crate::{Rollout, TimeLimit};
 
 /// Advantages and returns, one per row of the rollout.
 #[derive(Clone, Debug, PartialEq)]

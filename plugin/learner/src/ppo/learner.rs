@@ -2,14 +2,14 @@
 
 use super::batch::Prepared;
 use super::update::{StepMetrics, gradient_step};
-use super::{PolicySpec, PpoConfig, PpoNets, Rollout, UpdateMetrics, explained_variance, gae};
+use super::{PpoConfig, PpoNets, UpdateMetrics, explained_variance, gae};
 use crate::nn::{Adam, AdamConfig, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
 use crate::policy::{Actor, Critic, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
 use crate::score::{DecoderRows, FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
-use crate::{DeviceKind, LearnError};
+use crate::{DeviceKind, LearnError, PolicySpec, Rollout};
 
 /// Improves a policy from rollouts.
 ///

@@ -8,15 +8,13 @@ mod learner;
 mod loss;
 mod metrics;
 mod nets;
-mod rollout;
 mod update;
 
 pub use batch::Minibatch;
-pub use config::{PolicySpec, PpoConfig, TimeLimit};
+pub use config::PpoConfig;
 pub use gae::{Advantages, gae};
 pub use learner::PpoLearner;
 pub use loss::{PpoBatch, PpoLoss, normalize_advantages, ppo_loss};
 pub use metrics::{RatioStats, UpdateMetrics, explained_variance, ratio_stats};
 pub use nets::PpoNets;
-pub use rollout::{EndStates, Rollout, RolloutStep};
 pub use update::{StepMetrics, gradient_step};

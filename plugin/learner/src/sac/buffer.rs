@@ -2,9 +2,8 @@
 
 use super::transitions::{slice, transitions};
 use crate::file::TensorFile;
-use crate::ppo::TimeLimit;
 use crate::rng::below;
-use crate::{Actions, FileError, LearnError, PolicySpec, Rollout};
+use crate::{Actions, FileError, LearnError, PolicySpec, Rollout, TimeLimit};
 use rand::Rng;
 
 /// The newest transitions, raw as they were played: a ring of `capacity` slots in flat memory, which grows as it fills.

@@ -2,8 +2,7 @@
 
 use crate::nn::Activation;
 use crate::policy::NetShape;
-use crate::ppo::TimeLimit;
-use crate::{ActionSpace, LearnError, PolicySpec};
+use crate::{ActionSpace, LearnError, PolicySpec, TimeLimit};
 use serde::{Deserialize, Serialize};
 
 /// How much entropy is worth: the temperature α of the soft value.

@@ -1,7 +1,6 @@
 //! What was played since the last update.
 
-use super::PolicySpec;
-use crate::{ActionSpace, Actions, LearnError};
+use crate::{ActionSpace, Actions, LearnError, PolicySpec};
 
 /// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
 #[derive(Clone, Debug, PartialEq)]
