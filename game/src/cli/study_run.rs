@@ -218,10 +218,9 @@ impl Runner {
 
 /// Whether a folder holds at most what is written before `run.json`.
 fn is_unborn(folder: &Path) -> bool {
-    let first = ["experiment.ron", "experiment.tmp", "run.tmp"];
-    fs::read_dir(folder).is_ok_and(|entries| {
-        entries.flatten().all(|entry| first.iter().any(|name| entry.file_name().to_str() == Some(name)))
-    })
+    let comes_first = |name: &str| name.starts_with("experiment.ron") || name.starts_with("run.json.tmp");
+    fs::read_dir(folder)
+        .is_ok_and(|entries| entries.flatten().all(|entry| entry.file_name().to_str().is_some_and(comes_first)))
 }
 
 fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, CliError> {
