@@ -1,6 +1,8 @@
 //! What a policy reads and does, and what the end of its time means to a learner.
 
-use crate::ActionSpace;
+use crate::nn::Activation;
+use crate::policy::NetShape;
+use crate::{ActionSpace, LearnError};
 use serde::{Deserialize, Serialize};
 
 /// What a policy reads and does.
@@ -13,6 +15,24 @@ pub struct PolicySpec {
     pub latent: usize,
     /// What it acts in.
     pub action_space: ActionSpace,
+}
+
+impl PolicySpec {
+    /// `Ok` if there is something to read and something to do.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if there is not.
+    pub(crate) fn validate(&self) -> Result<(), LearnError> {
+        if self.obs_dim == 0 || self.action_space.dim() == 0 {
+            return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Sizes of a network with these hidden layers that reads this.
+    pub(crate) fn net_shape(&self, hidden: &[usize], activation: Activation) -> NetShape {
+        NetShape { obs_dim: self.obs_dim, latent: self.latent, hidden: hidden.to_vec(), activation }
+    }
 }
 
 /// What a step that ran into the time limit leads to.

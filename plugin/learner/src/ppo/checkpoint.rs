@@ -68,7 +68,7 @@ impl PpoLearner {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
         let skill = FrozenSkill::described(header.score, header.skill, header.spec, &file, device)?;
-        let shape = header.config.net_shape(header.spec);
+        let shape = header.spec.net_shape(&header.config.hidden, header.config.activation);
         check_mlp(&file, "critic", (joined_width(&file, "critic", &shape)?, &shape.hidden, 1))?;
         if !skill.as_ref().is_some_and(FrozenSkill::is_copied) {
             check_actor(&file, "actor", &shape, header.spec.action_space, false)?;

@@ -2,8 +2,7 @@
 
 use crate::nn::Activation;
 use crate::norm::{RewardNormalizer, RewardReset};
-use crate::policy::NetShape;
-use crate::{LearnError, PolicySpec, TimeLimit};
+use crate::{LearnError, TimeLimit};
 use serde::{Deserialize, Serialize};
 
 /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
@@ -86,16 +85,6 @@ impl Default for PpoConfig {
 }
 
 impl PpoConfig {
-    /// Sizes of a network with these hidden layers that reads what `spec` says.
-    pub(crate) fn net_shape(&self, spec: PolicySpec) -> NetShape {
-        NetShape {
-            obs_dim: spec.obs_dim,
-            latent: spec.latent,
-            hidden: self.hidden.clone(),
-            activation: self.activation,
-        }
-    }
-
     /// `Ok` if these settings can work.
     ///
     /// # Errors

@@ -61,11 +61,9 @@ impl PpoLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         config.validate()?;
-        if spec.obs_dim == 0 || spec.action_space.dim() == 0 {
-            return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
-        }
+        spec.validate()?;
         let streams = Streams::new(seed);
-        let shape = config.net_shape(spec);
+        let shape = spec.net_shape(&config.hidden, config.activation);
         let plain = device.plain();
         let copy = match &skill {
             Some(skill) => skill.copy(config.norm_obs)?,

@@ -85,7 +85,8 @@ impl SacLearner {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
         let skill = FrozenSkill::described(header.score, header.skill, header.spec, &file, device)?;
-        let (shape, space) = (header.config.net_shape(header.spec), header.spec.action_space);
+        let (shape, space) =
+            (header.spec.net_shape(&header.config.hidden, header.config.activation), header.spec.action_space);
         let width = joined_width(&file, "q1", &shape)?;
         let (inputs, outputs) = match space {
             ActionSpace::Discrete(choices) => (width, choices),

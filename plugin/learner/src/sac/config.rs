@@ -1,8 +1,7 @@
 //! Settings of SAC.
 
 use crate::nn::Activation;
-use crate::policy::NetShape;
-use crate::{ActionSpace, LearnError, PolicySpec, TimeLimit};
+use crate::{ActionSpace, LearnError, TimeLimit};
 use serde::{Deserialize, Serialize};
 
 /// How much entropy is worth: the temperature α of the soft value.
@@ -107,16 +106,6 @@ impl Default for SacConfig {
 }
 
 impl SacConfig {
-    /// Sizes of a network with these hidden layers that reads what `spec` says.
-    pub(crate) fn net_shape(&self, spec: PolicySpec) -> NetShape {
-        NetShape {
-            obs_dim: spec.obs_dim,
-            latent: spec.latent,
-            hidden: self.hidden.clone(),
-            activation: self.activation,
-        }
-    }
-
     /// `Ok` if these settings can work.
     ///
     /// # Errors

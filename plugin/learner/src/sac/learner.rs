@@ -81,9 +81,7 @@ impl SacLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         config.validate()?;
-        if spec.obs_dim == 0 || spec.action_space.dim() == 0 {
-            return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
-        }
+        spec.validate()?;
         let copy = match &skill {
             Some(skill) => skill.copy(config.norm_obs)?,
             None => None,
@@ -94,7 +92,7 @@ impl SacLearner {
             return Err(LearnError::Config(text.to_owned()));
         }
         let streams = Streams::new(seed);
-        let shape = config.net_shape(spec);
+        let shape = spec.net_shape(&config.hidden, config.activation);
         let initial = match config.entropy {
             EntropyCoef::Auto { initial, .. } => initial,
             EntropyCoef::Fixed(_) => 1.0,
