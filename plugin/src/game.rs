@@ -3,7 +3,12 @@
 use bevy::prelude::*;
 use thiserror::Error;
 
-use crate::{action::ActionSpace, bot::BlindBot, observation::ObservationSpace};
+use crate::{
+    action::ActionSpace,
+    bot::BlindBot,
+    observation::ObservationSpace,
+    vision::{Picture, Sight, VisionError},
+};
 
 /// A game that can be trained on and tested without a window.
 ///
@@ -31,6 +36,16 @@ pub trait Game: Send + Sync {
 
     /// Observation of every agent.
     fn observation(&self) -> ObservationSpace;
+
+    /// How the game is drawn for agents that see pictures; `None` if it cannot be drawn.
+    fn picture(&self) -> Option<Picture> {
+        None
+    }
+
+    /// Adds what is drawn to an app, after [`build`](Self::build): sprites, tiles and transforms for everything that the
+    /// game spawns, brought up to date in [`VisionSystems::Dress`](crate::vision::VisionSystems::Dress). Needs a
+    /// [`picture`](Self::picture).
+    fn build_picture(&self, _app: &mut App) {}
 
     /// Adds the game's plugins to a headless app, in a mode from [`modes`](Self::modes).
     fn build(&self, app: &mut App, mode: &str);
@@ -103,15 +118,35 @@ pub fn check_mode(game: &dyn Game, mode: &str) -> Result<(), UnknownName> {
     if game.modes().contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, game.modes())) }
 }
 
-/// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread.
+/// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see vectors.
 ///
 /// Returns the World and its agents in the order of their numbers.
 pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u32) -> (World, Vec<Entity>) {
+    build_seeing_world(game, mode, &Sight::default(), seed, first, count).expect("nothing can be wrong with a vector")
+}
+
+/// [`build_world`] with agents that see vectors or pictures.
+///
+/// # Errors
+///
+/// The pictures cannot be made: see [`VisionError`].
+pub fn build_seeing_world(
+    game: &dyn Game,
+    mode: &str,
+    sight: &Sight,
+    seed: u64,
+    first: u32,
+    count: u32,
+) -> Result<(World, Vec<Entity>), VisionError> {
     let mut app = crate::headless::headless_app();
     crate::headless::set_tick_rate(&mut app, game.tick_hz());
     app.insert_resource(crate::policy::PlaybotSeed(seed));
     game.build(&mut app, mode);
+    sight.build(game, &mut app)?;
     let mut world = crate::headless::into_world(app);
-    let agents = (first..first + count).map(|index| game.spawn_agent(&mut world, index)).collect();
-    (world, agents)
+    let agents: Vec<_> = (first..first + count).map(|index| game.spawn_agent(&mut world, index)).collect();
+    for &agent in &agents {
+        sight.equip(game, &mut world, agent);
+    }
+    Ok((world, agents))
 }

@@ -81,6 +81,8 @@
 pub mod action;
 pub mod agent;
 pub mod bot;
+#[cfg(feature = "camera")]
+pub mod camera;
 pub mod control;
 pub mod demo;
 pub mod episode;
@@ -94,6 +96,7 @@ pub mod plugin;
 pub mod policy;
 pub mod policy_file;
 pub mod prelude;
+pub mod raster;
 pub mod report;
 pub mod reward;
 pub mod runs;
@@ -104,6 +107,7 @@ pub mod state_hash;
 pub mod systems;
 pub mod test_app;
 pub mod train;
+pub mod vision;
 
 pub use playbot_learner as learner;
 pub use plugin::PlaybotPlugin;

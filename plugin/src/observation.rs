@@ -55,8 +55,11 @@ impl VectorSensor {
 /// The observation of the current tick.
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct Observation {
-    /// Values in the order of the sensor's names.
+    /// Values in the order of the sensor's names; empty without a [`VectorSensor`].
     pub vector: Vec<f32>,
+    /// Pixels `[channels, height, width]` of 0 to 255, top row first; empty without an
+    /// [`ImageSensor`](crate::vision::ImageSensor). With stacked pictures the oldest comes first.
+    pub image: Vec<u8>,
 }
 
 impl Observation {

@@ -8,7 +8,8 @@ use thiserror::Error;
 
 pub use super::algorithm::Algorithm;
 use super::checkpoint::CheckpointConfig;
-use crate::split::LevelSplit;
+pub use crate::vision::ObservationKind;
+use crate::{split::LevelSplit, vision::ImageOptions};
 
 /// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
 /// defaults.
@@ -24,6 +25,9 @@ pub struct Experiment {
     /// What agents see of it.
     #[serde(default)]
     pub observation: ObservationKind,
+    /// Size and form of the pictures, for agents that see some.
+    #[serde(default)]
+    pub image: ImageOptions,
     /// How the policy is made.
     #[serde(default = "score_ppo")]
     pub algorithm: Algorithm,
@@ -88,14 +92,6 @@ fn default_arenas() -> u32 {
 
 fn default_worlds() -> u32 {
     2
-}
-
-/// What agents see.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ObservationKind {
-    /// The game's vector of numbers.
-    #[default]
-    Vector,
 }
 
 /// How policies are measured.

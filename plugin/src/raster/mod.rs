@@ -1,0 +1,15 @@
+//! Pictures of 2D sprites drawn on the CPU.
+
+mod sensor;
+
+pub use sensor::RasterSensor;
+
+use bevy::prelude::*;
+
+/// Adds [`RasterSensor`]s to a game.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RasterPlugin;
+
+impl Plugin for RasterPlugin {
+    fn build(&self, _app: &mut App) {}
+}

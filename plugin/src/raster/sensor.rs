@@ -1,0 +1,22 @@
+//! The eye that draws on the CPU.
+
+use bevy::prelude::*;
+
+use crate::vision::{ImageOptions, ImageSensor};
+
+/// Draws what lies around an entity, as a [`CameraSensor`](crate::camera) would show it, without a GPU.
+#[derive(Component, Clone, Copy, Debug)]
+#[require(ImageSensor)]
+pub struct RasterSensor {
+    /// The entity in the middle of the picture.
+    pub target: Entity,
+    /// World units from the left to the right edge of the picture.
+    pub width: f32,
+}
+
+impl RasterSensor {
+    /// The components of an agent that sees `width` units of the world around `target`.
+    pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
+        (Self { target, width }, ImageSensor(image))
+    }
+}

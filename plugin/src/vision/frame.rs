@@ -1,0 +1,15 @@
+//! The picture of one tick.
+
+use bevy::prelude::*;
+
+/// What an agent's eye saw last: red, green, blue and an unused byte per pixel, top row first, left to right.
+///
+/// Filled by a sensor; the options of [`ImageSensor`](super::ImageSensor) (grey, painted velocity, stack) are applied
+/// when the observation is made of it.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+pub struct Frame {
+    /// `[height, width]` pixels of `[red, green, blue, 255]`.
+    pub pixels: Vec<[u8; 4]>,
+    /// The tick ([`Tick`](crate::headless::Tick)) it was taken in; `None` before the first.
+    pub tick: Option<u64>,
+}

@@ -1,0 +1,38 @@
+//! Agents that see pictures.
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`ImageSensor`] | size and form of the pictures an agent's policy reads |
+//! | [`Frame`] | the RGB picture of this tick, stamped with it, from whichever sensor |
+//! | [`Stage`] | the root of an arena that is drawn by itself |
+//! | [`TileLayer`] | a grid of tiles, drawn at once |
+//!
+//! A sensor fills [`Frame`] in [`VisionSystems::Look`]; [`VisionSystems::Compose`] checks its tick and makes
+//! [`Observation::image`](crate::observation::Observation::image) of it.
+
+mod frame;
+mod options;
+mod sight;
+mod stage;
+mod tile_layer;
+mod velocity;
+
+pub use frame::Frame;
+pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
+pub use sight::{ObservationKind, Picture, Sight};
+pub use stage::Stage;
+pub use tile_layer::TileLayer;
+pub use velocity::PaintedVelocity;
+
+use bevy::ecs::schedule::SystemSet;
+
+/// Parts of [`ObserveSchedule`](crate::systems::ObserveSchedule) for agents that see pictures, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum VisionSystems {
+    /// The game brings what is drawn up to date: transforms, sprites, tiles.
+    Dress,
+    /// Sensors fill each agent's [`Frame`].
+    Look,
+    /// The frame's tick is checked, and the observation made of it.
+    Compose,
+}

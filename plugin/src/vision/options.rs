@@ -1,0 +1,107 @@
+//! Size and form of the pictures that a policy reads.
+
+use bevy::prelude::*;
+use playbot_learner::{ImageShape, ObsKind};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Frame;
+
+/// Largest width and height of a picture, in pixels.
+pub const MAX_SIDE: u32 = 1024;
+
+/// Size and form of the pictures that a policy reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImageOptions {
+    /// Columns of pixels, 1 to [`MAX_SIDE`].
+    pub width: u32,
+    /// Rows of pixels, 1 to [`MAX_SIDE`].
+    pub height: u32,
+    /// How many successive pictures make one observation, oldest first. At the start of an episode the first picture
+    /// stands in for the missing ones.
+    pub stack: u32,
+    /// One channel of brightness instead of red, green and blue (ITU-R BT.601 weights).
+    pub grayscale: bool,
+    /// Two squares at the top left, a fifth of the picture's width each, whose grey tells the agent's velocity, as in
+    /// the first CoinRun. The game fills [`PaintedVelocity`](super::PaintedVelocity).
+    pub paint_velocity: bool,
+}
+
+impl Default for ImageOptions {
+    fn default() -> Self {
+        Self { width: 64, height: 64, stack: 1, grayscale: false, paint_velocity: false }
+    }
+}
+
+/// Why pictures cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum VisionError {
+    /// A width, height or stack that is 0 or too large.
+    #[error("{what} is {value}; it must be 1 to {most}")]
+    Size {
+        /// Which size.
+        what: &'static str,
+        /// What it is.
+        value: u32,
+        /// The largest it may be.
+        most: u32,
+    },
+    /// The game has nothing to draw.
+    #[error("{game} cannot be drawn; use `observation: Vector`")]
+    NoPicture {
+        /// Name of the game.
+        game: &'static str,
+    },
+    /// The program was built without cameras.
+    #[error("this program was built without cameras; build it with `--features camera`, or use `observation: Raster`")]
+    NoCamera,
+}
+
+impl ImageOptions {
+    /// Most pictures in a stack.
+    pub const MAX_STACK: u32 = 16;
+
+    /// Checks the sizes.
+    ///
+    /// # Errors
+    ///
+    /// [`VisionError::Size`], which names the size.
+    pub fn check(&self) -> Result<(), VisionError> {
+        let sizes = [
+            ("width", self.width, MAX_SIDE),
+            ("height", self.height, MAX_SIDE),
+            ("stack", self.stack, Self::MAX_STACK),
+        ];
+        for (what, value, most) in sizes {
+            if !(1..=most).contains(&value) {
+                return Err(VisionError::Size { what, value, most });
+            }
+        }
+        Ok(())
+    }
+
+    /// Channels of one picture: 1 or 3.
+    pub fn colours(&self) -> u32 {
+        if self.grayscale { 1 } else { 3 }
+    }
+
+    /// The shape of an observation: channels are colours times stacked pictures.
+    pub fn shape(&self) -> ImageShape {
+        ImageShape {
+            channels: (self.colours() * self.stack) as usize,
+            height: self.height as usize,
+            width: self.width as usize,
+        }
+    }
+
+    /// The shape, for a learner.
+    pub fn obs_kind(&self) -> ObsKind {
+        ObsKind::Image(self.shape())
+    }
+}
+
+/// Marks an agent whose policy reads pictures of this size and form. Comes with every sensor that makes pictures.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[require(Frame)]
+pub struct ImageSensor(pub ImageOptions);

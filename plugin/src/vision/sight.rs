@@ -1,0 +1,101 @@
+//! What the agents of an experiment see, and the sensors it takes.
+
+use bevy::prelude::*;
+use playbot_learner::ObsKind;
+use serde::{Deserialize, Serialize};
+
+use super::{ImageOptions, VisionError};
+use crate::{game::Game, observation::VectorSensor, raster::RasterSensor};
+
+/// What agents see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ObservationKind {
+    /// The game's vector of numbers.
+    #[default]
+    Vector,
+    /// Pictures drawn on the CPU.
+    Raster,
+    /// Pictures from a Bevy camera; needs the feature `camera` and a GPU or software Vulkan.
+    Camera,
+}
+
+/// What agents see, with the form of the pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sight {
+    /// Vector or pictures.
+    pub kind: ObservationKind,
+    /// Size and form of the pictures.
+    pub image: ImageOptions,
+}
+
+/// How a game is drawn for agents that see pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// World units from the left to the right edge of what an agent sees, centred on the agent.
+    pub width: f32,
+}
+
+impl Sight {
+    /// What one observation of the game is.
+    pub fn obs_kind(&self, game: &dyn Game) -> ObsKind {
+        match self.kind {
+            ObservationKind::Vector => ObsKind::Vector(game.observation().len()),
+            ObservationKind::Raster | ObservationKind::Camera => self.image.obs_kind(),
+        }
+    }
+
+    /// Checks the sizes, that the game can be drawn, and that this build has the sensor.
+    ///
+    /// # Errors
+    ///
+    /// See [`VisionError`].
+    pub fn check(&self, game: &dyn Game) -> Result<(), VisionError> {
+        if self.kind == ObservationKind::Vector {
+            return Ok(());
+        }
+        self.image.check()?;
+        if game.picture().is_none() {
+            return Err(VisionError::NoPicture { game: game.name() });
+        }
+        if self.kind == ObservationKind::Camera && !cfg!(feature = "camera") {
+            return Err(VisionError::NoCamera);
+        }
+        Ok(())
+    }
+
+    /// Adds what the sensors need to an app, before it is finished.
+    ///
+    /// # Errors
+    ///
+    /// See [`VisionError`].
+    pub(crate) fn build(&self, game: &dyn Game, app: &mut App) -> Result<(), VisionError> {
+        self.check(game)?;
+        match self.kind {
+            ObservationKind::Vector => return Ok(()),
+            ObservationKind::Raster => app.add_plugins(crate::raster::RasterPlugin),
+            #[cfg(feature = "camera")]
+            ObservationKind::Camera => app.add_plugins(crate::camera::CameraSensorPlugin::headless()?),
+            #[cfg(not(feature = "camera"))]
+            ObservationKind::Camera => return Err(VisionError::NoCamera),
+        };
+        game.build_picture(app);
+        Ok(())
+    }
+
+    /// Gives an agent the sensor. One that sees pictures needs no vector, which costs time to fill.
+    pub(crate) fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity) {
+        let Some(picture) = game.picture() else { return };
+        let mut entity = world.entity_mut(agent);
+        match self.kind {
+            ObservationKind::Vector => return,
+            ObservationKind::Raster => entity.insert(RasterSensor::following(agent, picture.width, self.image)),
+            #[cfg(feature = "camera")]
+            ObservationKind::Camera => {
+                entity.insert(crate::camera::CameraSensor::following(agent, picture.width, self.image))
+            }
+            #[cfg(not(feature = "camera"))]
+            ObservationKind::Camera => return,
+        };
+        entity.remove::<VectorSensor>();
+    }
+}

@@ -1,0 +1,35 @@
+//! A grid of tiles that is drawn at once.
+
+use bevy::prelude::*;
+
+/// A grid of square tiles with side 1 in its own coordinates; its `Transform` places and scales it. Cell (0, 0) has its
+/// bottom left corner at the origin.
+///
+/// The tileset is a vertical strip of square tiles: tile `i` is rows `i * w..(i + 1) * w` of an image of width `w`.
+/// Pixels of a tile are drawn or not: an alpha of at least 128 is opaque.
+#[derive(Component, Clone, Debug)]
+#[require(Transform, Visibility)]
+pub struct TileLayer {
+    /// The strip of tiles.
+    pub tileset: Handle<Image>,
+    /// Cells from left to right.
+    pub columns: u32,
+    /// Cells from bottom to top.
+    pub rows: u32,
+    /// `rows * columns` tile numbers, bottom row first; [`TileLayer::EMPTY`] is not drawn.
+    pub cells: Vec<u16>,
+    /// The tile of everything outside the grid; [`TileLayer::EMPTY`] for nothing.
+    pub outside: u16,
+}
+
+impl TileLayer {
+    /// The number of no tile.
+    pub const EMPTY: u16 = u16::MAX;
+
+    /// The tile at a cell, inside or outside the grid.
+    #[inline]
+    pub fn tile(&self, column: i32, row: i32) -> u16 {
+        let inside = (0..self.columns as i32).contains(&column) && (0..self.rows as i32).contains(&row);
+        if inside { self.cells[row as usize * self.columns as usize + column as usize] } else { self.outside }
+    }
+}
