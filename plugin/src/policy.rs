@@ -134,7 +134,7 @@ pub(crate) fn run_policy(
     if entities.is_empty() {
         return;
     }
-    let output = match active.policy.forward(skills, observations, entities.len()) {
+    let output = match active.policy.forward(skills, &*observations, entities.len()) {
         Ok(output) => output,
         Err(error) => return faults.report(format!("the policy cannot decide: {error}")),
     };

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use playbot_learner::{FileError, Policy};
+use playbot_learner::{FileError, Observations, Policy};
 pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};
 use thiserror::Error;
 
@@ -174,6 +174,7 @@ pub fn policy_file(
         game: game.name().to_owned(),
         game_version: game.version(),
         observations: game.observation().names,
+        picture: None,
         actions: game.action_names(),
         algorithm,
         training,
@@ -198,11 +199,11 @@ pub fn export_policy(
     let latent = file.policy.latent();
     let (rollout, _) =
         Collector::new(game, levels, seed, 0, EXAMPLE_ARENAS, prior).collect(&file.policy, latent, EXAMPLE_TICKS)?;
-    let (mut obs, mut z) = (Vec::new(), Vec::new());
+    let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
     let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
     let n = rows.len();
     for row in rows {
-        obs.extend_from_slice(&rollout.obs[row * rollout.obs_dim..(row + 1) * rollout.obs_dim]);
+        obs.push(rollout.obs.row(row, rollout.obs_kind.numbers())).map_err(|error| Fault(error.to_string()))?;
         z.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
     }
     Ok(file.save(path, &obs, &z, n)?)

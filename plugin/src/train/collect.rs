@@ -1,7 +1,7 @@
 //! One World that plays with the current policy and keeps what the learner needs.
 
 use bevy::prelude::*;
-use playbot_learner::{Actions, LearnError, Policy, Rollout, RolloutStep};
+use playbot_learner::{Actions, LearnError, Observations, Policy, Rollout, RolloutStep};
 
 use crate::{
     action::Action,
@@ -131,13 +131,13 @@ fn peek(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(),
         push_state(world, entities[row], &mut skills, &mut observations);
     }
     let values = policy.values(&skills, &observations, running.len())?;
-    let (obs_dim, latent) = (rollout.obs_dim, rollout.latent);
+    let (obs_dim, latent) = (rollout.obs_kind.numbers(), rollout.latent);
     rollout.next_values = vec![0.0; entities.len()];
-    rollout.ends.next_obs = vec![0.0; entities.len() * obs_dim];
+    rollout.ends.next_obs = Observations::zeros(&rollout.obs_kind, entities.len());
     rollout.ends.next_z = vec![0.0; entities.len() * latent];
     for (i, (&row, value)) in running.iter().zip(values).enumerate() {
         rollout.next_values[row] = value;
-        copy_row(&mut rollout.ends.next_obs, row, &observations, i, obs_dim);
+        rollout.ends.next_obs.set_row(row, &observations[i * obs_dim..(i + 1) * obs_dim])?;
         copy_row(&mut rollout.ends.next_z, row, &skills, i, latent);
     }
     Ok(())
@@ -183,7 +183,7 @@ impl Rows {
 
     fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
         RolloutStep {
-            obs: &self.obs,
+            obs: (&self.obs).into(),
             z: &self.z,
             actions: &self.actions,
             log_probs: &self.log_probs,
@@ -242,10 +242,12 @@ fn collect_tick(world: &mut World) {
     if let Err(error) = rollout.push_step(rows.as_step(&final_values)) {
         world.resource_mut::<Faults>().report(error.to_string());
     }
-    let (obs_dim, latent) = (rollout.obs_dim, rollout.latent);
+    let (obs_dim, latent) = (rollout.obs_kind.numbers(), rollout.latent);
     for (i, &row) in cut.agents.iter().enumerate() {
         let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
-        rollout.push_cut(row, &cut.obs[i * obs_dim..(i + 1) * obs_dim], z);
+        if let Err(error) = rollout.push_cut(row, &cut.obs[i * obs_dim..(i + 1) * obs_dim], z) {
+            world.resource_mut::<Faults>().report(error.to_string());
+        }
     }
     world.insert_resource(collecting);
 }

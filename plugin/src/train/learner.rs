@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use playbot_learner::{
-    DeviceKind, FileError, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SacMetrics, SkillModel,
-    SkillSource, UpdateMetrics,
+    DeviceKind, FileError, LearnError, ObsSlice, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SacMetrics,
+    SkillModel, SkillSource, UpdateMetrics,
 };
 
 use super::{algorithm::Algorithm, config::Experiment, trainer::TrainError};
@@ -55,7 +55,7 @@ impl Learner {
             return Err(TrainError::NotTrained(algorithm));
         }
         let (seed, score) = (experiment.seed, experiment.score.clone());
-        let spec = PolicySpec { obs_dim: game.observation().len(), latent: 0, action_space: game.actions() };
+        let spec = PolicySpec { obs: game.observation().len().into(), latent: 0, action_space: game.actions() };
         let skills = if algorithm.needs_skills() { Some(fitting(game, algorithm, skills)?) } else { None };
         let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
         if algorithm.is_sac() {
@@ -110,7 +110,7 @@ impl Learner {
     /// # Errors
     ///
     /// [`LearnError::InitialKl`] if the policy should still be a copy of the decoder and is not.
-    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
+    pub fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         match self {
             Self::Ppo(learner) => learner.initial_kl(z, obs, n),
             Self::Sac(learner) => learner.initial_kl(z, obs, n),
@@ -153,7 +153,7 @@ impl Learner {
 fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize) {
     const GIB: f64 = (1u64 << 30) as f64;
     let transitions = (experiment.sac.buffer as u64).min(experiment.steps);
-    let numbers = 2 * (spec.obs_dim + latent) + spec.action_space.dim() + 2;
+    let numbers = 2 * (spec.obs.numbers() + latent) + spec.action_space.dim() + 2;
     let size = transitions as f64 * (4 * numbers) as f64 / GIB;
     if size > 1.0 {
         tracing::warn!(

@@ -194,7 +194,7 @@ impl Trainer {
             rollouts.push(rollout);
             finished.extend(ended);
         }
-        let rollout = Rollout::join(&rollouts)?;
+        let rollout = Rollout::join(rollouts)?;
         let collect_s = start.elapsed().as_secs_f64();
         let initial_kl = self.initial_kl(&rollout)?;
         let learner = self.learner.update(&rollout)?;
@@ -212,7 +212,8 @@ impl Trainer {
             return Ok(None);
         }
         let rows = INITIAL_KL_ROWS.min(rollout.steps * rollout.envs);
-        let (z, obs) = (&rollout.z[..rows * rollout.latent], &rollout.obs[..rows * rollout.obs_dim]);
+        let z = &rollout.z[..rows * rollout.latent];
+        let obs = rollout.obs.rows(0..rows, rollout.obs_kind.numbers());
         self.learner.initial_kl(z, obs, rows)
     }
 
