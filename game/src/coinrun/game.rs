@@ -3,11 +3,12 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use bevy_playbot::{prelude::*, vision::Picture};
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
     demonstrator_bot::DemonstratorBot,
+    picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
     rules::ACTIONS,
     view,
@@ -73,6 +74,14 @@ impl Game for CoinRun {
     fn build(&self, app: &mut App, mode: &str) {
         let mode = mode.parse().expect("callers check the mode against `modes`");
         app.add_plugins(CoinRunPlugin { mode, physics: self.physics });
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(CoinRunPicturePlugin);
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
