@@ -17,6 +17,12 @@ pub enum WindowError {
          `Xvfb :99`; without a display there is `playbot eval`"
     )]
     NoDisplay(String),
+    /// A library of the window system is missing.
+    #[error(
+        "no window can be opened, since a library is missing ({0}): on Debian, install libx11-6, libx11-xcb1, libxcursor1, \
+         libxi6 and libxkbcommon-x11-0; without them there is `playbot eval`"
+    )]
+    NoLibrary(String),
     /// Nothing can draw.
     #[error(
         "nothing here can draw a window ({0}): install a Vulkan driver, such as Debian's mesa-vulkan-drivers, which \
@@ -51,6 +57,8 @@ impl WindowError {
         if words.contains("XOpenDisplayFailed") {
             let display = std::env::var("DISPLAY").unwrap_or_default();
             Self::NoDisplay(format!("no X server answers at DISPLAY={display}"))
+        } else if words.contains(".so") {
+            Self::NoLibrary(words)
         } else if words.contains("event loop") {
             Self::NoDisplay(words)
         } else if words.contains("find a GPU") {
@@ -92,10 +100,7 @@ mod tests {
         assert_eq!(catch(|| panic!("no\n  luck")), Err::<(), _>("no luck".to_owned()));
         for (words, kind) in [
             ("Failed to build event loop: XNotSupported(XOpenDisplayFailed)", "no X server answers at DISPLAY="),
-            (
-                "Failed to build event loop: no libX11.so",
-                "no window can be opened (Failed to build event loop: no libX11.so)",
-            ),
+            ("Failed to build event loop: no libX11.so", "install libx11-6"),
             ("Unable to find a GPU! Make sure", "mesa-vulkan-drivers"),
             ("No supported formats for surface", "nothing here can draw a window (No supported formats"),
             ("index out of bounds", "the window is gone (index out of bounds)"),
