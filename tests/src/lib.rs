@@ -1,5 +1,8 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
+pub mod memory;
+pub mod scene;
+
 use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 
