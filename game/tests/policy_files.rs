@@ -12,7 +12,7 @@ use playbot_games::coinrun::CoinRun;
 use serde_json::Value;
 
 fn learner(obs_dim: usize) -> PpoLearner {
-    let spec = PolicySpec { obs_dim, latent: 0, action_space: ActionSpace::Discrete(15) };
+    let spec = PolicySpec { obs: obs_dim.into(), latent: 0, action_space: ActionSpace::Discrete(15) };
     let config = PpoConfig { hidden: vec![32, 32], norm_obs: true, ..PpoConfig::default() };
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid")
 }

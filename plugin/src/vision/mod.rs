@@ -11,6 +11,7 @@
 //! [`Observation::image`](crate::observation::Observation::image) of it.
 
 mod frame;
+mod note;
 mod options;
 mod sight;
 mod stage;
@@ -18,6 +19,7 @@ mod tile_layer;
 mod velocity;
 
 pub use frame::Frame;
+pub use note::UnknownSight;
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
 pub use sight::{ObservationKind, Picture, Sight};
 pub use stage::Stage;
