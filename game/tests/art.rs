@@ -18,7 +18,10 @@ fn every_png_is_as_its_source_says() {
         let info = reader.next_frame(&mut bytes).expect("a PNG");
         assert_eq!((info.width as usize, info.height as usize), (picture.width, picture.height), "{name}");
         assert_eq!(info.color_type, png::ColorType::Rgba, "{name}");
-        assert!(bytes == picture.texels.as_flattened(), "{name}: draw it with `cargo run --release --example draw_coinrun`");
+        assert!(
+            bytes == picture.texels.as_flattened(),
+            "{name}: draw it with `cargo run --release --example draw_coinrun`"
+        );
     }
     let files = std::fs::read_dir(&folder).expect("a folder").filter_map(Result::ok);
     let pngs = files.filter(|file| file.path().extension().is_some_and(|ending| ending == "png")).count();

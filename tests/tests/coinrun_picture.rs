@@ -122,7 +122,8 @@ fn a_player_stands_walks_jumps_and_turns() {
     press(world, agent, NOTHING, 4);
     assert_eq!(seen(world), (Pose::Stand, false));
     let feet = |world: &World| {
-        let (body, at) = (world.get::<PlayerBody>(agent).expect("a player").0, world.get::<Transform>(agent).expect("dressed"));
+        let (body, at) =
+            (world.get::<PlayerBody>(agent).expect("a player").0, world.get::<Transform>(agent).expect("dressed"));
         let size = sprite(world, agent).custom_size.expect("set");
         assert_eq!((size.x, at.translation.x), (1.0, body.x));
         assert!((size.y - 1.7415 * 1.1574).abs() < 1e-4, "taller than the body");
