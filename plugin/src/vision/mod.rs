@@ -10,16 +10,16 @@
 //! A sensor fills [`Frame`] in [`VisionSystems::Look`]; [`VisionSystems::Compose`] checks its tick and makes
 //! [`Observation::image`](crate::observation::Observation::image) of it.
 
+mod card;
 mod frame;
-mod note;
 mod options;
 mod sight;
 mod stage;
 mod tile_layer;
 mod velocity;
 
+pub use card::UnknownSight;
 pub use frame::Frame;
-pub use note::UnknownSight;
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
 pub use sight::{ObservationKind, Picture, Sight};
 pub use stage::Stage;
