@@ -1,5 +1,9 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
+mod painted;
+
+pub use painted::PaintedCorridor;
+
 use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 
