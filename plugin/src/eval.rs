@@ -51,6 +51,33 @@ pub enum EvalError {
     Fault(#[from] Fault),
 }
 
+impl Player {
+    /// Gives a World what the player needs once: networks and the source of skills.
+    pub fn install(&self, world: &mut World) {
+        if let Self::Policy { policy, prior, draw } = self {
+            world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
+            if let Some(prior) = prior {
+                world.insert_resource(prior.clone());
+            }
+        }
+    }
+
+    /// Prepares an agent for the player, and returns the control under which the player then decides for it.
+    pub fn seat(&self, game: &dyn Game, world: &mut World, agent: Entity) -> Control {
+        match self {
+            Self::Policy { .. } => Control::Policy,
+            Self::Blind(bot) => {
+                world.entity_mut(agent).insert(bot.clone());
+                Control::Bot
+            }
+            Self::Demonstrator => {
+                game.arm_demonstrator(world, agent, 0.0);
+                Control::Bot
+            }
+        }
+    }
+}
+
 /// How to measure.
 #[derive(Clone, Debug)]
 pub struct EvalPlan {
@@ -150,30 +177,11 @@ fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) ->
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
         world.entity_mut(agent).insert(LevelQueue::list(levels));
-        hand_over(game, &mut world, agent, player);
+        let control = player.seat(game, &mut world, agent);
+        world.entity_mut(agent).insert(control);
     }
-    if let Player::Policy { policy, prior, draw } = player {
-        world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
-        if let Some(prior) = prior {
-            world.insert_resource(prior.clone());
-        }
-    }
+    player.install(&mut world);
     Ok(world)
-}
-
-fn hand_over(game: &dyn Game, world: &mut World, agent: Entity, player: &Player) {
-    match player {
-        Player::Policy { .. } => {
-            world.entity_mut(agent).insert(Control::Policy);
-        }
-        Player::Blind(bot) => {
-            world.entity_mut(agent).insert((Control::Bot, bot.clone()));
-        }
-        Player::Demonstrator => {
-            game.arm_demonstrator(world, agent, 0.0);
-            world.entity_mut(agent).insert(Control::Bot);
-        }
-    }
 }
 
 /// Ticks until every agent has played its list.

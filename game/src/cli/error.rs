@@ -99,6 +99,9 @@ pub enum CliError {
     Misfit(#[from] PolicyMisfit),
     #[error(transparent)]
     Export(#[from] ExportError),
+    #[cfg(feature = "window")]
+    #[error(transparent)]
+    Window(#[from] crate::window::WindowError),
 }
 
 impl CliError {
@@ -124,6 +127,14 @@ impl CliError {
             Self::Verify(VerifyError::Fault(_)) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),
+            #[cfg(feature = "window")]
+            Self::Window(error) => {
+                if error.is_usage() {
+                    3
+                } else {
+                    2
+                }
+            }
             Self::Verify(_) => 3,
             Self::BrokenPipe
             | Self::Io(_)

@@ -11,10 +11,12 @@ mod interrupt;
 mod learn_skills;
 mod level;
 mod methods;
+mod play;
 mod policy;
 mod progress;
 mod quickstart;
 mod record;
+mod recording;
 mod runs;
 mod study;
 mod study_run;
@@ -44,6 +46,7 @@ Examples:
   playbot                                          learn, train and test on CoinRun in a few minutes
   playbot level coinrun --mode hard --seed 7       show a level
   playbot record coinrun --levels easy:0..9 --out my.demo
+  playbot play coinrun --seed 7 --record my.demo   play it yourself
   playbot demo verify demos/coinrun
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
@@ -61,6 +64,8 @@ enum Verb {
     Quickstart(quickstart::Args),
     /// Record the game's demonstrator.
     Record(record::Args),
+    /// Play in a window, record, and hand over to a policy and back.
+    Play(play::Args),
     /// Look at, check and repair recordings.
     Demo(demo::Args),
     /// Learn the skill model from recordings.
@@ -117,6 +122,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
     match verb {
         Verb::Quickstart(args) => quickstart::run(args),
         Verb::Record(args) => record::run(args),
+        Verb::Play(args) => play::run(args),
         Verb::Demo(args) => demo::run(args),
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),

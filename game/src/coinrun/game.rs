@@ -24,6 +24,11 @@ pub struct CoinRun {
 /// The action "right and jump", which a player without eyes does best to hold.
 const RIGHT_JUMP: u32 = 8;
 
+/// The action with these directions, each -1, 0 or 1.
+fn directed(sideways: i8, upwards: i8) -> u32 {
+    (3 * (sideways + 1) + (upwards + 1)).unsigned_abs().into()
+}
+
 static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: view::names() }));
 
 /// Makes an arena with an idle agent, and returns the agent.
@@ -65,6 +70,14 @@ impl Game for CoinRun {
         let names = ["left+down", "left", "left+jump", "down", "none", "jump", "right+down", "right", "right+jump"];
         let unused = ["D", "A", "W", "S", "Q", "E"].map(|key| format!("none ({key})"));
         names.map(str::to_owned).into_iter().chain(unused).collect()
+    }
+
+    fn input_map(&self) -> Option<InputMap> {
+        let sideways = KeyAxis::new([KeyCode::ArrowLeft, KeyCode::KeyA], [KeyCode::ArrowRight, KeyCode::KeyD]);
+        let upwards =
+            KeyAxis::new([KeyCode::ArrowDown, KeyCode::KeyS], [KeyCode::ArrowUp, KeyCode::KeyW, KeyCode::Space]);
+        let help = "arrow keys or A, D and S run and drop, Up, W or Space jumps";
+        Some(InputMap::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
     }
 
     fn observation(&self) -> ObservationSpace {
