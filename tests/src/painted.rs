@@ -39,10 +39,8 @@ impl FromWorld for Paints {
 /// Gives new agents a stage of their own with all that is seen on it.
 fn dress(new: Query<(Entity, &Agent), (With<Cell>, Without<Sprite>)>, paints: Res<Paints>, mut commands: Commands) {
     for (entity, agent) in &new {
-        let sprite = |paint: usize| Sprite {
-            custom_size: Some(Vec2::ONE),
-            ..Sprite::from_image(paints.0[paint].clone())
-        };
+        let sprite =
+            |paint: usize| Sprite { custom_size: Some(Vec2::ONE), ..Sprite::from_image(paints.0[paint].clone()) };
         let stage = commands.spawn((Stage, Transform::from_xyz(0.0, 100.0 * agent.index as f32, 0.0))).id();
         commands.spawn((sprite(1), Transform::from_xyz(6.0, 0.0, 0.0), ChildOf(stage)));
         commands.spawn((sprite(2), Transform::default(), ChildOf(stage)));

@@ -11,7 +11,9 @@ use bevy_playbot::{
     },
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
     game::{build_seeing_world, build_world},
-    learner::{DeviceKind, ObsKind, Observations, Policy, PolicyFile, PolicySpec, PpoLearner, SkillModel, SkillTrainer},
+    learner::{
+        DeviceKind, ObsKind, Observations, Policy, PolicyFile, PolicySpec, PpoLearner, SkillModel, SkillTrainer,
+    },
     policy_file::{PolicyMisfit, check_policy, export_policy, policy_file, policy_sight},
     prelude::*,
     train::{
@@ -295,7 +297,11 @@ fn a_policy_says_which_eyes_it_needs() {
     let vectors = PpoLearner::new(experiment().ppo, vectors, 1, DeviceKind::Flex).expect("valid").policy();
     let colour = Sight { image: ImageOptions { grayscale: false, ..sight.image }, ..sight };
     for (policy, sight, words) in [
-        (untrained(&sight), Sight::default(), ["images of 4 channels", "gives 2 observation values", "a sensor that makes"]),
+        (
+            untrained(&sight),
+            Sight::default(),
+            ["images of 4 channels", "gives 2 observation values", "a sensor that makes"],
+        ),
         (vectors, sight, ["made for 2 observation values", "gives images of 4 channels", "`VectorSensor`"]),
         (untrained(&colour), sight, ["images of 12 channels", "gives images of 4 channels", "`ImageOptions`"]),
     ] {
