@@ -40,6 +40,17 @@ pub enum Player {
     Demonstrator,
 }
 
+/// Nothing could be measured.
+#[derive(Debug, Error)]
+pub enum EvalError {
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
 impl Player {
     /// Gives a World what the player needs once: networks and the source of skills.
     pub fn install(&self, world: &mut World) {
@@ -65,17 +76,6 @@ impl Player {
             }
         }
     }
-}
-
-/// Nothing could be measured.
-#[derive(Debug, Error)]
-pub enum EvalError {
-    /// The pictures cannot be made.
-    #[error(transparent)]
-    Vision(#[from] VisionError),
-    /// The game broke its contract.
-    #[error(transparent)]
-    Fault(#[from] Fault),
 }
 
 /// How to measure.

@@ -116,7 +116,7 @@ pub enum PolicyMisfit {
 ///
 /// The file does not say so.
 pub fn policy_sight(file: &PolicyFile) -> Result<Sight, UnknownSight> {
-    Sight::from_note(file.card.sight.as_ref(), &file.policy.observation())
+    Sight::from_card(file.card.picture.as_ref(), &file.policy.observation())
 }
 
 /// Checks that a policy was made for this game, these rules, this observation and these actions. Pictures must be
@@ -215,7 +215,7 @@ pub fn policy_file(
         game: game.name().to_owned(),
         game_version: game.version(),
         observations: if sight.is_image() { Vec::new() } else { game.observation().names },
-        sight: sight.note(),
+        picture: sight.card(),
         actions: game.action_names(),
         algorithm,
         training,

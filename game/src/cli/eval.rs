@@ -142,7 +142,7 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     }
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
-        let sight = Sight::from_note(model.sight(), &model.observation())?;
+        let sight = Sight::from_card(model.picture(), &model.observation())?;
         players.push((named("bc", path, args.skills.len()), cloning(&model, experiment, draw), sight));
     }
     for path in &args.policy {

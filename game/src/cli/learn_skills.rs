@@ -187,7 +187,7 @@ pub fn learn(
         after_epoch(trainer.epochs_done(), &metrics)?;
     }
     bar.finish_and_clear();
-    Ok(Some(trainer.into_model().with_sight(experiment.sight().note())))
+    Ok(Some(trainer.into_model().with_picture(experiment.sight().card())))
 }
 
 /// A trainer at its start, or where the checkpoint left it.

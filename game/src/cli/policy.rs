@@ -114,7 +114,7 @@ fn from_skills(path: &Path, from: &ExperimentArgs) -> Result<Exported, CliError>
     let model = SkillModel::load(path, DeviceKind::default())?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let about = ("bc".to_owned(), format!("demonstrations in {}", experiment.demos.display()), code);
-    let sight = Sight::from_note(model.sight(), &model.observation())?;
+    let sight = Sight::from_card(model.picture(), &model.observation())?;
     let file = policy_file(game, &sight, model.policy(), Some(cloning_skills(&model, &experiment)), about);
     Ok((game, experiment, file))
 }

@@ -171,7 +171,7 @@ fn fitting<'a>(
     skills: Option<&'a SkillModel>,
 ) -> Result<&'a SkillModel, TrainError> {
     let skills = skills.ok_or(TrainError::NoSkills(experiment.algorithm))?;
-    let (model, sight) = (Sight::from_note(skills.sight(), &skills.observation())?, experiment.sight());
+    let (model, sight) = (Sight::from_card(skills.picture(), &skills.observation())?, experiment.sight());
     if model.is_image() != sight.is_image() || (sight.is_image() && model != sight) {
         return Err(TrainError::SkillSight { model, experiment: sight });
     }
