@@ -35,6 +35,15 @@ impl CameraSensorPlugin {
         adapter::check()?;
         Ok(Self { headless: true })
     }
+
+    /// For an app with or without a window, whichever it is: only one without a renderer gets one.
+    ///
+    /// # Errors
+    ///
+    /// [`VisionError::NoAdapter`].
+    pub fn for_app(app: &App) -> Result<Self, VisionError> {
+        if app.get_sub_app(RenderApp).is_some() { Ok(Self::default()) } else { Self::headless() }
+    }
 }
 
 impl Plugin for CameraSensorPlugin {
