@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
+use playbot_learner::{ObsKind, Observations};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -72,6 +73,22 @@ impl Observation {
     pub fn set(&mut self, values: impl IntoIterator<Item = f32>) {
         self.vector.clear();
         self.vector.extend(values);
+    }
+
+    /// Adds the vector, or the picture, to a batch of its kind.
+    pub(crate) fn push_to(&self, batch: &mut Observations) {
+        match batch {
+            Observations::Vector(values) => values.extend_from_slice(&self.vector),
+            Observations::Image(pixels) => pixels.extend_from_slice(&self.image),
+        }
+    }
+}
+
+/// Empties a batch for observations of a kind, and keeps its memory where it can.
+pub(crate) fn start_batch(batch: &mut Observations, kind: &ObsKind) {
+    match (&mut *batch, kind) {
+        (Observations::Vector(_), ObsKind::Vector(_)) | (Observations::Image(_), ObsKind::Image(_)) => batch.clear(),
+        _ => *batch = Observations::empty(kind),
     }
 }
 

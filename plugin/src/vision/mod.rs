@@ -12,6 +12,7 @@
 //! two episodes, are not looked after.
 
 mod blank;
+mod card;
 mod compose;
 mod frame;
 mod options;
@@ -23,6 +24,7 @@ mod stage;
 mod tile_layer;
 mod velocity;
 
+pub use card::UnknownSight;
 pub use frame::Frame;
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
 pub use plugin::VisionPlugin;
