@@ -1,6 +1,8 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
+pub mod memory;
 mod painted;
+pub mod scene;
 
 pub use painted::PaintedCorridor;
 

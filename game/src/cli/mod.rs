@@ -12,6 +12,7 @@ mod learn_skills;
 mod level;
 mod methods;
 mod play;
+mod player;
 mod policy;
 mod progress;
 mod quickstart;
@@ -22,6 +23,7 @@ mod study;
 mod study_run;
 mod trace;
 mod train;
+mod view;
 
 use std::process::ExitCode;
 
@@ -54,6 +56,7 @@ Examples:
   playbot policy export --run runs/first --out coinrun.policy
   playbot config show --set ppo.lr=0.0003          an experiment with all its values
   playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
+  playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
@@ -86,6 +89,8 @@ enum Verb {
     Level(level::Args),
     /// Play given actions and print the state after each.
     Trace(trace::Args),
+    /// Write what a bot sees as a picture, or an episode as a moving one.
+    View(view::Args),
     /// Measure speed.
     Bench(bench::Args),
 }
@@ -133,12 +138,14 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Runs(args) => runs::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),
+        Verb::View(args) => view::run(args),
         Verb::Bench(args) => bench::run(args),
     }
 }
 
 fn init_tracing(verbose: u8) {
-    let level = ["warn", "info", "debug"][usize::from(verbose.min(2))];
+    // A window manager without settings and a renderer in software are nothing to warn of.
+    let level = ["warn,winit=error,bevy_render::renderer=error", "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();

@@ -53,6 +53,12 @@ pub enum VisionError {
         /// Name of the game.
         game: &'static str,
     },
+    /// There is nothing to draw with.
+    #[error(
+        "no graphics adapter was found; install a Vulkan driver (Debian's `mesa-vulkan-drivers` needs no GPU), or use \
+         `observation: Raster`"
+    )]
+    NoAdapter,
     /// The program was built without cameras.
     #[error("this program was built without cameras; build it with `--features camera`, or use `observation: Raster`")]
     NoCamera,
