@@ -37,13 +37,7 @@ impl Film {
         let [width, height] = self.size();
         let mut screen = Screen::new(width, height, BACKGROUND);
         self.draw(&mut screen, shot);
-        let mut bytes = Vec::new();
-        let written = encoder(&mut bytes, &screen).write_header().and_then(|mut writer| {
-            writer.write_image_data(screen.bytes())?;
-            writer.finish()
-        });
-        written.map_err(too_large)?;
-        Ok((bytes, [width, height]))
+        Ok((to_png(&screen)?, [width, height]))
     }
 
     /// All shots one after the other, again and again, each with its caption. `drawn` hears each that is done.
@@ -110,6 +104,21 @@ impl Film {
             screen.planes(planes, width, height, self.scale, (x, 0));
         }
     }
+}
+
+/// The bytes of a PNG file.
+///
+/// # Errors
+///
+/// The picture is too large for a PNG.
+pub fn to_png(screen: &Screen) -> Result<Vec<u8>, CliError> {
+    let mut bytes = Vec::new();
+    let written = encoder(&mut bytes, screen).write_header().and_then(|mut writer| {
+        writer.write_image_data(screen.bytes())?;
+        writer.finish()
+    });
+    written.map_err(too_large)?;
+    Ok(bytes)
 }
 
 fn encoder<'a>(bytes: &'a mut Vec<u8>, screen: &Screen) -> Encoder<'static, &'a mut Vec<u8>> {

@@ -1,10 +1,10 @@
 //! `playbot view`.
 
 mod caption;
-mod film;
+pub mod film;
 mod font;
 mod options;
-mod screen;
+pub mod screen;
 mod stage;
 
 use std::path::{Path, PathBuf};
