@@ -8,7 +8,7 @@ use playbot_learner::{
 };
 
 use super::{algorithm::Algorithm, config::Experiment, trainer::TrainError};
-use crate::game::Game;
+use crate::{game::Game, vision::Sight};
 
 /// A learner of either family.
 #[derive(Debug)]
@@ -55,8 +55,8 @@ impl Learner {
             return Err(TrainError::NotTrained(algorithm));
         }
         let (seed, score) = (experiment.seed, experiment.score.clone());
-        let spec = PolicySpec { obs: game.observation().len().into(), latent: 0, action_space: game.actions() };
-        let skills = if algorithm.needs_skills() { Some(fitting(game, algorithm, skills)?) } else { None };
+        let spec = PolicySpec { obs: experiment.sight().obs_kind(game), latent: 0, action_space: game.actions() };
+        let skills = if algorithm.needs_skills() { Some(fitting(game, experiment, skills)?) } else { None };
         let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
         if algorithm.is_sac() {
             warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
@@ -167,17 +167,21 @@ fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize
 /// The skill model, if it is there and was learned for this game.
 fn fitting<'a>(
     game: &dyn Game,
-    algorithm: Algorithm,
+    experiment: &Experiment,
     skills: Option<&'a SkillModel>,
 ) -> Result<&'a SkillModel, TrainError> {
-    let skills = skills.ok_or(TrainError::NoSkills(algorithm))?;
-    let (obs_dim, action_space) = (game.observation().len(), game.actions());
-    if (skills.obs_dim(), skills.action_space()) != (obs_dim, action_space) {
+    let skills = skills.ok_or(TrainError::NoSkills(experiment.algorithm))?;
+    let (model, sight) = (Sight::from_card(skills.picture(), &skills.observation())?, experiment.sight());
+    if model.is_image() != sight.is_image() || (sight.is_image() && model != sight) {
+        return Err(TrainError::SkillSight { model, experiment: sight });
+    }
+    let (observation, action_space) = (sight.obs_kind(game), game.actions());
+    if (skills.observation(), skills.action_space()) != (observation, action_space) {
         return Err(TrainError::ForeignSkills {
             game: game.name().to_owned(),
-            model_obs: skills.obs_dim(),
+            model_obs: skills.observation(),
             model_actions: skills.action_space(),
-            game_obs: obs_dim,
+            game_obs: observation,
             game_actions: action_space,
         });
     }

@@ -40,11 +40,13 @@ pub struct PolicyCard {
     pub code: String,
 }
 
-/// How the images that a policy observes are made. Their size is that of [`Policy::observation`], and the network that
-/// reads them is [`Policy::cnn`].
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+/// How the images that a policy or a skill model observes are made: images of one shape can still show other things.
+/// Their size is that of [`Policy::observation`], and the network that reads them is [`Policy::cnn`].
+#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 #[serde(deny_unknown_fields)]
 pub struct PictureCard {
+    /// Name of the sensor that made them.
+    pub sensor: String,
     /// How many successive pictures make an image, oldest first.
     pub stack: usize,
     /// One channel of brightness instead of red, green and blue.
@@ -60,7 +62,7 @@ impl PictureCard {
     }
 
     /// `Ok` if a policy of `observation` can have this on its card.
-    fn check(&self, observation: ObsKind) -> Result<(), LearnError> {
+    pub(crate) fn check(&self, observation: ObsKind) -> Result<(), LearnError> {
         match observation {
             ObsKind::Image(image) if image.channels == self.channels() => Ok(()),
             _ => Err(LearnError::Config(format!(

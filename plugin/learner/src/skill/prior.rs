@@ -41,6 +41,11 @@ impl Prior {
         Self { net: None, latent, tanh }
     }
 
+    /// What it observes; nothing if it ignores the state.
+    pub fn observation(&self) -> Option<ObsKind> {
+        self.net.as_ref().map(|(_, kind, _)| *kind)
+    }
+
     /// Width of z.
     pub fn latent(&self) -> usize {
         self.latent
