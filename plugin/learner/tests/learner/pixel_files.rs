@@ -12,10 +12,12 @@ use safetensors::tensor::Dtype;
 use serde_json::json;
 use std::path::Path;
 
-const CARD: PictureCard = PictureCard { stack: 1, grayscale: true, paint_velocity: false };
+fn picture() -> PictureCard {
+    PictureCard { sensor: "eye".to_owned(), stack: 1, grayscale: true, paint_velocity: false }
+}
 
 fn file(learner: &PpoLearner) -> PolicyFile {
-    let card = PolicyCard { picture: Some(CARD), ..PolicyCard::default() };
+    let card = PolicyCard { picture: Some(picture()), ..PolicyCard::default() };
     PolicyFile { card, policy: learner.policy(), skills: learner.skills() }
 }
 
@@ -39,7 +41,7 @@ fn a_policy_comes_back_from_its_file_as_it_was() {
         save(&file(&learner), &path).expect("written");
         let back = PolicyFile::load(&path, DeviceKind::Flex).expect("read");
         assert_eq!((back.policy.observation(), back.policy.cnn()), (SHAPE.into(), Some(config().cnn)));
-        assert_eq!(back.card.picture, Some(CARD));
+        assert_eq!(back.card.picture, Some(picture()));
         let (pixels, z) = (pixels(8), vec![-0.5; 8 * back.policy.latent()]);
         let played = |file: &PolicyFile| file.policy.forward(&z, &pixels, 8).expect("finite");
         assert_eq!(played(&back), played(&file(&learner)));
@@ -63,9 +65,9 @@ fn a_card_that_tells_of_other_pictures_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("policy");
     let learner = ppo(config(), 1);
-    for picture in [PictureCard { grayscale: false, ..CARD }, PictureCard { stack: 2, ..CARD }] {
+    for card in [PictureCard { grayscale: false, ..picture() }, PictureCard { stack: 2, ..picture() }] {
         let mut wrong = file(&learner);
-        wrong.card.picture = Some(picture);
+        wrong.card.picture = Some(card);
         let error = save(&wrong, &path).expect_err("other channels").to_string();
         assert!(error.contains("but the policy observes images of 1 channels"), "{error}");
     }
