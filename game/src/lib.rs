@@ -3,7 +3,10 @@
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
+//! - `window`, with the feature of that name: a person plays.
 
 pub mod cli;
 pub mod coinrun;
 pub mod registry;
+#[cfg(feature = "window")]
+pub mod window;

@@ -7,12 +7,13 @@ use bevy_playbot::{
     learner::{ActionSpace, DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner},
     policy_file::{PolicyFile, PolicyMisfit, check_policy, export_policy, install_policy, policy_file},
     prelude::*,
+    vision::Sight,
 };
 use playbot_games::coinrun::CoinRun;
 use serde_json::Value;
 
 fn learner(obs_dim: usize) -> PpoLearner {
-    let spec = PolicySpec { obs_dim, latent: 0, action_space: ActionSpace::Discrete(15) };
+    let spec = PolicySpec { obs: obs_dim.into(), latent: 0, action_space: ActionSpace::Discrete(15) };
     let config = PpoConfig { hidden: vec![32, 32], norm_obs: true, ..PpoConfig::default() };
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid")
 }
@@ -21,7 +22,7 @@ fn learner(obs_dim: usize) -> PpoLearner {
 fn exported(folder: &Path) -> std::path::PathBuf {
     let game = CoinRun::default();
     let about = ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
-    let file = policy_file(&game, learner(563).policy(), None, about);
+    let file = policy_file(&game, &Sight::default(), learner(563).policy(), None, about);
     let path = folder.join("bot.policy");
     export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, &path).expect("writable");
     path
@@ -112,13 +113,13 @@ fn torn_and_foreign_files_are_explained() {
 fn a_policy_of_another_game_names_the_difference() {
     let game = CoinRun::default();
     let about = || ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
-    let mut file = policy_file(&game, learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &Sight::default(), learner(563).policy(), None, about());
     file.card.observations[7] = "heat".to_owned();
     let error = check_policy(&game, &file).expect_err("another observation");
     assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
     file.card.observations.pop();
     assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
-    let mut file = policy_file(&game, learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &Sight::default(), learner(563).policy(), None, about());
     file.card.actions.swap(1, 7);
     let error = check_policy(&game, &file).expect_err("other actions");
     assert!(matches!(&error, PolicyMisfit::ActionName { at: 1, expected, .. } if expected == "right"), "{error}");

@@ -15,6 +15,7 @@ use bevy_playbot::{
     eval::{EvalPlan, Player, evaluate, summarize},
     game::build_world,
     prelude::*,
+    vision::Sight,
 };
 
 /// Height above ground, metres, and speed, metres per second upwards.
@@ -113,7 +114,15 @@ impl Game for Lander {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let split: LevelSplit = "moon:0..20".parse()?;
-    let plan = EvalPlan { split: split.clone(), episodes_per_level: 2, seed: 1, arenas: 4, worlds: 2, threads: 2 };
+    let plan = EvalPlan {
+        split: split.clone(),
+        sight: Sight::default(),
+        episodes_per_level: 2,
+        seed: 1,
+        arenas: 4,
+        worlds: 2,
+        threads: 2,
+    };
     for (name, player) in [("pilot", Player::Demonstrator), ("random", Player::Blind(BlindBot::Uniform))] {
         let summary = summarize(name, &split, &evaluate(&Lander, &player, &plan, |_| {})?);
         println!("{name}: {:.0} % landed softly", 100.0 * summary.success);

@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 use playbot_learner::Policy;
 use serde::Serialize;
+use thiserror::Error;
 
 use crate::{
     agent::Agent,
@@ -10,13 +11,14 @@ use crate::{
     control::Control,
     episode::{EpisodeEnd, EpisodeEnded},
     fault::Fault,
-    game::{Game, build_world},
+    game::{Game, build_seeing_world},
     headless::tick_world,
     level::LevelQueue,
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,
     split::LevelSplit,
     train::worlds::on_threads,
+    vision::{Sight, VisionError},
 };
 
 /// Who is measured.
@@ -38,11 +40,51 @@ pub enum Player {
     Demonstrator,
 }
 
+/// Nothing could be measured.
+#[derive(Debug, Error)]
+pub enum EvalError {
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
+impl Player {
+    /// Gives a World what the player needs once: networks and the source of skills.
+    pub fn install(&self, world: &mut World) {
+        if let Self::Policy { policy, prior, draw } = self {
+            world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
+            if let Some(prior) = prior {
+                world.insert_resource(prior.clone());
+            }
+        }
+    }
+
+    /// Prepares an agent for the player, and returns the control under which the player then decides for it.
+    pub fn seat(&self, game: &dyn Game, world: &mut World, agent: Entity) -> Control {
+        match self {
+            Self::Policy { .. } => Control::Policy,
+            Self::Blind(bot) => {
+                world.entity_mut(agent).insert(bot.clone());
+                Control::Bot
+            }
+            Self::Demonstrator => {
+                game.arm_demonstrator(world, agent, 0.0);
+                Control::Bot
+            }
+        }
+    }
+}
+
 /// How to measure.
 #[derive(Clone, Debug)]
 pub struct EvalPlan {
     /// Levels.
     pub split: LevelSplit,
+    /// What a learned policy sees. Bots are left with vectors, which are cheaper.
+    pub sight: Sight,
     /// Episodes on each level.
     pub episodes_per_level: u32,
     /// Seed of the players' random streams.
@@ -104,14 +146,15 @@ fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
 ///
 /// # Errors
 ///
-/// The game broke its contract.
+/// The game broke its contract, or cannot be seen this way.
 pub fn evaluate(
     game: &dyn Game,
     player: &Player,
     plan: &EvalPlan,
     progress: impl Fn(u64) + Sync,
-) -> Result<Vec<EpisodeResult>, Fault> {
-    let mut worlds: Vec<_> = (0..plan.worlds).map(|world| stage(game, player, plan, world)).collect();
+) -> Result<Vec<EpisodeResult>, EvalError> {
+    let worlds: Result<Vec<_>, _> = (0..plan.worlds).map(|world| stage(game, player, plan, world)).collect();
+    let mut worlds = worlds?;
     let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, &progress));
     let mut results = Vec::new();
     for part in parts {
@@ -122,41 +165,23 @@ pub fn evaluate(
 }
 
 /// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
-fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) -> World {
+fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) -> Result<World, VisionError> {
     let per_world = (plan.arenas / plan.worlds).max(1);
     let total = (per_world * plan.worlds) as usize;
     let first = world_index * per_world;
-    let (mut world, agents) = build_world(game, &plan.split.mode, plan.seed, first, per_world);
+    let sight = if matches!(player, Player::Policy { .. }) { plan.sight } else { Sight::default() };
+    let (mut world, agents) = build_seeing_world(game, &plan.split.mode, &sight, plan.seed, first, per_world)?;
     world.init_resource::<Results>();
     world.add_observer(note_result);
     let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
         world.entity_mut(agent).insert(LevelQueue::list(levels));
-        hand_over(game, &mut world, agent, player);
+        let control = player.seat(game, &mut world, agent);
+        world.entity_mut(agent).insert(control);
     }
-    if let Player::Policy { policy, prior, draw } = player {
-        world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
-        if let Some(prior) = prior {
-            world.insert_resource(prior.clone());
-        }
-    }
-    world
-}
-
-fn hand_over(game: &dyn Game, world: &mut World, agent: Entity, player: &Player) {
-    match player {
-        Player::Policy { .. } => {
-            world.entity_mut(agent).insert(Control::Policy);
-        }
-        Player::Blind(bot) => {
-            world.entity_mut(agent).insert((Control::Bot, bot.clone()));
-        }
-        Player::Demonstrator => {
-            game.arm_demonstrator(world, agent, 0.0);
-            world.entity_mut(agent).insert(Control::Bot);
-        }
-    }
+    player.install(&mut world);
+    Ok(world)
 }
 
 /// Ticks until every agent has played its list.

@@ -6,6 +6,7 @@ use thiserror::Error;
 use crate::{
     action::ActionSpace,
     bot::BlindBot,
+    input_map::InputMap,
     observation::ObservationSpace,
     vision::{Picture, Sight, VisionError},
 };
@@ -32,6 +33,11 @@ pub trait Game: Send + Sync {
     /// Names of the discrete choices, or of the dimensions of continuous actions, for people; may be empty.
     fn action_names(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// The keys with which a person plays; `None` if nobody can.
+    fn input_map(&self) -> Option<InputMap> {
+        None
     }
 
     /// Observation of every agent.
@@ -140,13 +146,29 @@ pub fn build_seeing_world(
 ) -> Result<(World, Vec<Entity>), VisionError> {
     let mut app = crate::headless::headless_app();
     crate::headless::set_tick_rate(&mut app, game.tick_hz());
-    app.insert_resource(crate::policy::PlaybotSeed(seed));
-    game.build(&mut app, mode);
-    sight.build(game, &mut app)?;
+    furnish_app(game, &mut app, mode, sight, seed)?;
     let mut world = crate::headless::into_world(app);
-    let agents: Vec<_> = (first..first + count).map(|index| game.spawn_agent(&mut world, index)).collect();
-    for &agent in &agents {
-        sight.equip(game, &mut world, agent);
-    }
+    let agents = spawn_agents(game, &mut world, sight, first, count);
     Ok((world, agents))
+}
+
+/// Adds a game and the sensors of its agents to an app that has the [`PlaybotPlugin`](crate::plugin::PlaybotPlugin),
+/// with a window or without.
+///
+/// # Errors
+///
+/// The pictures cannot be made: see [`VisionError`].
+pub fn furnish_app(game: &dyn Game, app: &mut App, mode: &str, sight: &Sight, seed: u64) -> Result<(), VisionError> {
+    app.insert_resource(crate::policy::PlaybotSeed(seed));
+    game.build(app, mode);
+    sight.build(game, app)
+}
+
+/// Adds agents `first..first + count` with their sensors, all idle, and returns them in the order of their numbers.
+pub fn spawn_agents(game: &dyn Game, world: &mut World, sight: &Sight, first: u32, count: u32) -> Vec<Entity> {
+    let agents: Vec<_> = (first..first + count).map(|index| game.spawn_agent(world, index)).collect();
+    for &agent in &agents {
+        sight.equip(game, world, agent);
+    }
+    agents
 }

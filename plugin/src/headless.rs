@@ -32,12 +32,22 @@ pub fn headless_app() -> App {
     app
 }
 
-/// Sets the length of a fixed tick, in ticks per second of game time.
+/// Sets the length of a fixed tick, in ticks per second of game time, and lets each update run one.
 pub fn set_tick_rate(app: &mut App, hz: f64) {
-    let step = Duration::from_secs_f64(1.0 / hz);
-    app.insert_resource(Time::<Fixed>::from_duration(step));
+    let step = set_fixed_step(app, hz);
     app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(step.saturating_mul(2));
+}
+
+/// Sets the length of a fixed tick for an app that runs by the clock, and returns it.
+///
+/// No frame runs more than one tick: on a machine that is too slow to draw them all, the game slows down, and every tick
+/// is still seen and played.
+pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
+    let step = Duration::from_secs_f64(1.0 / hz);
+    app.insert_resource(Time::<Fixed>::from_duration(step));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(step);
+    step
 }
 
 /// Finishes an app's plugins and takes its World, so that it can move to another thread.

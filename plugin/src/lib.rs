@@ -90,6 +90,8 @@ pub mod eval;
 pub mod fault;
 pub mod game;
 pub mod headless;
+pub mod input_map;
+pub mod keyboard;
 pub mod level;
 pub mod observation;
 pub mod plugin;

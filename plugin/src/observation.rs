@@ -3,10 +3,16 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
+use playbot_learner::{ObsKind, Observations};
 use serde::{Deserialize, Serialize};
 
-use crate::fault::Faults;
-use crate::{agent::Agent, episode::Episode};
+use crate::{
+    agent::Agent,
+    control::Control,
+    episode::Episode,
+    fault::Faults,
+    vision::{ImageSensor, is_observed},
+};
 
 /// Names and number of the values of a vector observation, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -68,6 +74,22 @@ impl Observation {
         self.vector.clear();
         self.vector.extend(values);
     }
+
+    /// Adds the vector, or the picture, to a batch of its kind.
+    pub(crate) fn push_to(&self, batch: &mut Observations) {
+        match batch {
+            Observations::Vector(values) => values.extend_from_slice(&self.vector),
+            Observations::Image(pixels) => pixels.extend_from_slice(&self.image),
+        }
+    }
+}
+
+/// Empties a batch for observations of a kind, and keeps its memory where it can.
+pub(crate) fn start_batch(batch: &mut Observations, kind: &ObsKind) {
+    match (&mut *batch, kind) {
+        (Observations::Vector(_), ObsKind::Vector(_)) | (Observations::Image(_), ObsKind::Image(_)) => batch.clear(),
+        _ => *batch = Observations::empty(kind),
+    }
 }
 
 /// Reports observations of the wrong length or with values that are not numbers, with agent, tick and name.
@@ -92,6 +114,23 @@ pub(crate) fn check_observations(
                 at(),
                 sensor.space.names[bad],
                 observation.vector[bad]
+            ));
+        }
+    }
+}
+
+/// Reports images of the wrong length, with agent and tick.
+pub(crate) fn check_images(
+    agents: Query<(&Agent, &ImageSensor, &Observation, &Control, &Episode)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, sensor, observation, control, episode) in &agents {
+        let (expected, got) = (sensor.0.shape().numbers(), observation.image.len());
+        if is_observed(control, episode) && got != expected {
+            faults.report(format!(
+                "agent {}, level {}, tick {}: the observation's image has {got} bytes, its sensor makes {expected}; add \
+                 the sensor and its plugin, and leave the image to them",
+                agent.index, episode.level, episode.tick
             ));
         }
     }

@@ -1,7 +1,7 @@
 //! Agents that are driven by a learned policy.
 
 use bevy::prelude::*;
-use playbot_learner::{Policy, Streams};
+use playbot_learner::{ObsKind, Observations, Policy, Streams};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -11,8 +11,9 @@ use crate::{
     control::Control,
     episode::Episode,
     fault::Faults,
-    observation::Observation,
+    observation::{Observation, start_batch},
     skill_prior::ActiveSkill,
+    vision::ImageSensor,
 };
 
 /// Seed from which all streams of random numbers of this World come.
@@ -90,11 +91,16 @@ pub struct Decision {
 }
 
 /// Reused memory of [`run_policy`]: the rows of one batch.
-#[derive(Default)]
 pub(crate) struct Batch {
     entities: Vec<Entity>,
-    observations: Vec<f32>,
+    observations: Observations,
     skills: Vec<f32>,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { entities: Vec::new(), observations: Observations::Vector(Vec::new()), skills: Vec::new() }
+    }
 }
 
 /// Decides for all agents under [`Control::Policy`] in one batched forward pass.
@@ -105,7 +111,7 @@ pub(crate) fn run_policy(
         &Agent,
         &Control,
         &Episode,
-        &Observation,
+        (&Observation, Option<&ImageSensor>),
         &ActiveSkill,
         &mut AgentStreams,
         &mut Action,
@@ -115,26 +121,27 @@ pub(crate) fn run_policy(
     mut batch: Local<Batch>,
 ) {
     let Batch { entities, observations, skills } = &mut *batch;
+    let kind = active.policy.observation();
     entities.clear();
-    observations.clear();
+    start_batch(observations, &kind);
     skills.clear();
     for &entity in order.entities() {
-        let Ok((agent, control, episode, observation, skill, ..)) = agents.get(entity) else { continue };
+        let Ok((agent, control, episode, (observation, sensor), skill, ..)) = agents.get(entity) else { continue };
         if *control != Control::Policy || !episode.is_running() {
             continue;
         }
-        if let Some(why) = misfit(&active.policy, agent, observation, skill) {
+        if let Some(why) = misfit(&active.policy, agent, observation, sensor, skill) {
             faults.report(why);
             return;
         }
         entities.push(entity);
-        observations.extend_from_slice(&observation.vector);
+        observation.push_to(observations);
         skills.extend_from_slice(&skill.z);
     }
     if entities.is_empty() {
         return;
     }
-    let output = match active.policy.forward(skills, observations, entities.len()) {
+    let output = match active.policy.forward(skills, &*observations, entities.len()) {
         Ok(output) => output,
         Err(error) => return faults.report(format!("the policy cannot decide: {error}")),
     };
@@ -154,22 +161,59 @@ pub(crate) fn run_policy(
 }
 
 /// Why the policy cannot decide for this agent.
-fn misfit(policy: &Policy, agent: &Agent, observation: &Observation, skill: &ActiveSkill) -> Option<String> {
-    let spaces = (policy.obs_dim(), policy.latent(), policy.action_space());
+fn misfit(
+    policy: &Policy,
+    agent: &Agent,
+    observation: &Observation,
+    sensor: Option<&ImageSensor>,
+    skill: &ActiveSkill,
+) -> Option<String> {
+    let (wanted, seen) = (policy.observation(), seen_as(&policy.observation(), observation, sensor));
+    let spaces = (policy.latent(), policy.action_space());
     // A policy without skills does not mind that a prior draws some.
-    let skills_fit = spaces.1 == 0 || spaces.1 == skill.z.len();
-    if skills_fit && (spaces.0, spaces.2) == (observation.vector.len(), agent.actions) {
+    let skills_fit = spaces.0 == 0 || spaces.0 == skill.z.len();
+    if skills_fit && (wanted, spaces.1) == (seen, agent.actions) {
         return None;
     }
+    let way_out = match (wanted, seen) {
+        (ObsKind::Image(_), ObsKind::Vector(_)) => {
+            "give the agent a sensor that makes such pictures, or load a policy that reads vectors"
+        }
+        (ObsKind::Vector(_), ObsKind::Image(_)) => {
+            "give the agent a `VectorSensor`, or load a policy that reads such pictures"
+        }
+        (ObsKind::Image(wanted), ObsKind::Image(seen)) if wanted != seen => {
+            "set the sensor's `ImageOptions` to what the policy reads, or load a policy for these pictures"
+        }
+        _ => "load a policy that was trained for this game",
+    };
     Some(format!(
-        "agent {}: the policy was made for {} observation values, {} skill values and {:?}, but the game gives {}, {} \
-         and {:?}; load a policy that was trained for this game",
+        "agent {}: the policy was made for {}, {} skill values and {:?}, but the game gives {}, {} and {:?}; {way_out}",
         agent.index,
+        in_words(&wanted),
         spaces.0,
         spaces.1,
-        spaces.2,
-        observation.vector.len(),
+        in_words(&seen),
         skill.z.len(),
         agent.actions
     ))
+}
+
+/// What a reader of observations like `wanted` gets from an agent, which may have sensors of both kinds.
+pub(crate) fn seen_as(wanted: &ObsKind, observation: &Observation, sensor: Option<&ImageSensor>) -> ObsKind {
+    let image = sensor.map(|sensor| sensor.0.shape()).filter(|shape| shape.numbers() == observation.image.len());
+    let vector = ObsKind::Vector(observation.vector.len());
+    match (wanted, image) {
+        (ObsKind::Image(_), Some(shape)) => ObsKind::Image(shape),
+        (ObsKind::Vector(_), Some(shape)) if observation.vector.is_empty() => ObsKind::Image(shape),
+        _ => vector,
+    }
+}
+
+/// An observation in a message: `26 observation values`, or the size of an image.
+pub fn in_words(kind: &ObsKind) -> String {
+    match kind {
+        ObsKind::Vector(values) => format!("{values} observation values"),
+        ObsKind::Image(_) => kind.to_string(),
+    }
 }

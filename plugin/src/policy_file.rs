@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use playbot_learner::{FileError, Policy};
+use playbot_learner::{FileError, Observations, Policy};
 pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};
 use thiserror::Error;
 
@@ -15,6 +15,7 @@ use crate::{
     skill_prior::SkillPrior,
     split::LevelSplit,
     train::collect::Collector,
+    vision::{Sight, UnknownSight, VisionError},
 };
 
 /// Arenas and ticks of the short play from which a file's examples are taken.
@@ -54,6 +55,17 @@ pub enum PolicyMisfit {
         reads: usize,
         /// Values that are named.
         named: usize,
+    },
+    /// The file does not say what its policy sees.
+    #[error(transparent)]
+    Sight(#[from] UnknownSight),
+    /// The policy reads pictures, and the game cannot be drawn.
+    #[error("the policy reads {sight}, but {error}")]
+    Vision {
+        /// What the policy reads.
+        sight: Sight,
+        /// Why the game cannot show it.
+        error: VisionError,
     },
     /// The observation has changed.
     #[error(
@@ -98,7 +110,17 @@ pub enum PolicyMisfit {
     },
 }
 
-/// Checks that a policy was made for this game, these rules, this observation and these actions.
+/// What a policy sees: the sensor that its agents need.
+///
+/// # Errors
+///
+/// The file does not say so.
+pub fn policy_sight(file: &PolicyFile) -> Result<Sight, UnknownSight> {
+    Sight::from_card(file.card.picture.as_ref(), &file.policy.observation())
+}
+
+/// Checks that a policy was made for this game, these rules, this observation and these actions. Pictures must be
+/// possible; whether this program has the sensor is for [`Sight::check`] to say.
 ///
 /// # Errors
 ///
@@ -111,22 +133,11 @@ pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisf
     if card.game_version != game.version() {
         return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version() });
     }
-    let names = game.observation().names;
-    let reads = file.policy.obs_dim();
-    if reads != card.observations.len() {
-        return Err(PolicyMisfit::Card { reads, named: card.observations.len() });
-    }
-    let longest = names.len().max(card.observations.len());
-    if let Some(at) = (0..longest).find(|&at| names.get(at) != card.observations.get(at)) {
-        let name_at = |names: &[String]| names.get(at).cloned().unwrap_or_default();
-        return Err(PolicyMisfit::Observation {
-            game: name,
-            made_for: card.observations.len(),
-            now: names.len(),
-            at,
-            expected: name_at(&card.observations),
-            found: name_at(&names),
-        });
+    let sight = policy_sight(file)?;
+    if !sight.is_image() {
+        check_names(game, file)?;
+    } else if game.picture().is_none() {
+        return Err(PolicyMisfit::Vision { sight, error: VisionError::NoPicture { game: game.name() } });
     }
     if file.policy.action_space() != game.actions() {
         return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions() });
@@ -140,8 +151,31 @@ pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisf
     }
 }
 
+/// Compares the names of the values that the policy reads with those of the game.
+fn check_names(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+    let (card, names) = (&file.card, game.observation().names);
+    let reads = file.policy.obs_dim();
+    if reads != card.observations.len() {
+        return Err(PolicyMisfit::Card { reads, named: card.observations.len() });
+    }
+    let longest = names.len().max(card.observations.len());
+    if let Some(at) = (0..longest).find(|&at| names.get(at) != card.observations.get(at)) {
+        let name_at = |names: &[String]| names.get(at).cloned().unwrap_or_default();
+        return Err(PolicyMisfit::Observation {
+            game: game.name().to_owned(),
+            made_for: card.observations.len(),
+            now: names.len(),
+            at,
+            expected: name_at(&card.observations),
+            found: name_at(&names),
+        });
+    }
+    Ok(())
+}
+
 /// Lets a policy, with its skills, drive every agent of this World that is under
-/// [`Control::Policy`](crate::control::Control::Policy).
+/// [`Control::Policy`](crate::control::Control::Policy). An agent of a policy that reads pictures carries the sensor that
+/// [`policy_sight`] names.
 pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
     world.insert_resource(ActivePolicy { policy: file.policy.clone(), draw });
     match &file.skills {
@@ -158,14 +192,21 @@ pub enum ExportError {
     /// The game broke its contract while the examples were played.
     #[error(transparent)]
     Fault(#[from] Fault),
+    /// The file does not say what its policy sees.
+    #[error(transparent)]
+    Sight(#[from] UnknownSight),
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
     /// The file could not be written.
     #[error(transparent)]
     File(#[from] FileError),
 }
 
-/// A policy for this game, with the card filled in from it.
+/// A policy for this game that sees it so, with the card filled in from both.
 pub fn policy_file(
     game: &dyn Game,
+    sight: &Sight,
     policy: Policy,
     skills: Option<SkillSource>,
     (algorithm, training, code): (String, String, String),
@@ -173,7 +214,8 @@ pub fn policy_file(
     let card = PolicyCard {
         game: game.name().to_owned(),
         game_version: game.version(),
-        observations: game.observation().names,
+        observations: if sight.is_image() { Vec::new() } else { game.observation().names },
+        picture: sight.card(),
         actions: game.action_names(),
         algorithm,
         training,
@@ -196,13 +238,13 @@ pub fn export_policy(
 ) -> Result<(), ExportError> {
     let prior = file.skills.as_ref().map(SkillPrior::from);
     let latent = file.policy.latent();
-    let (rollout, _) =
-        Collector::new(game, levels, seed, 0, EXAMPLE_ARENAS, prior).collect(&file.policy, latent, EXAMPLE_TICKS)?;
-    let (mut obs, mut z) = (Vec::new(), Vec::new());
+    let mut collector = Collector::new(game, levels, &policy_sight(file)?, seed, 0, EXAMPLE_ARENAS, prior)?;
+    let (rollout, _) = collector.collect(&file.policy, latent, EXAMPLE_TICKS)?;
+    let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
     let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
     let n = rows.len();
     for row in rows {
-        obs.extend_from_slice(&rollout.obs[row * rollout.obs_dim..(row + 1) * rollout.obs_dim]);
+        obs.push(rollout.obs.row(row, rollout.obs_kind.numbers())).map_err(|error| Fault(error.to_string()))?;
         z.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
     }
     Ok(file.save(path, &obs, &z, n)?)

@@ -1,7 +1,7 @@
 //! Skills: what the policy is asked to do for the next few ticks.
 
 use bevy::prelude::*;
-use playbot_learner::{Prior, SkillDraw, SkillSource};
+use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};
 
 use crate::{
     agent::{Agent, AgentOrder},
@@ -9,7 +9,8 @@ use crate::{
     episode::Episode,
     fault::Faults,
     observation::Observation,
-    policy::AgentStreams,
+    policy::{AgentStreams, in_words, seen_as},
+    vision::ImageSensor,
 };
 
 /// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every `horizon` fixed ticks
@@ -43,14 +44,21 @@ pub struct ActiveSkill {
 pub(crate) fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,
-    mut agents: Query<(&Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams), With<Agent>>,
+    mut agents: Query<(&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams)>,
+    sensors: Query<&ImageSensor>,
     mut faults: ResMut<Faults>,
 ) {
-    let (mut batch, mut drawing) = (Vec::new(), Vec::new());
+    // A prior that ignores what is seen takes anything.
+    let kind = prior.prior.observation().unwrap_or(ObsKind::Vector(0));
+    let (mut batch, mut drawing) = (Observations::empty(&kind), Vec::new());
     for &entity in order.entities() {
-        let Ok((control, episode, observation, skill, _)) = agents.get(entity) else { continue };
+        let Ok((agent, control, episode, observation, skill, _)) = agents.get(entity) else { continue };
         if *control == Control::Policy && episode.is_running() && skill.ticks_left == 0 {
-            batch.extend_from_slice(&observation.vector);
+            if let Some(why) = misfit(&prior.prior, agent, observation, sensors.get(entity).ok()) {
+                faults.report(why);
+                return;
+            }
+            observation.push_to(&mut batch);
             drawing.push(entity);
         }
     }
@@ -72,6 +80,19 @@ pub(crate) fn draw_skills(
         skill.z.extend_from_slice(&skills[row * latent..(row + 1) * latent]);
         skill.ticks_left = prior.horizon;
     }
+}
+
+/// Why the prior cannot draw for this agent.
+fn misfit(prior: &Prior, agent: &Agent, observation: &Observation, sensor: Option<&ImageSensor>) -> Option<String> {
+    let wanted = prior.observation()?;
+    let seen = seen_as(&wanted, observation, sensor);
+    let (number, wanted_words, seen_words) = (agent.index, in_words(&wanted), in_words(&seen));
+    (wanted != seen).then(|| {
+        format!(
+            "agent {number}: the skill prior was made for {wanted_words}, but the game gives {seen_words}; load the \
+             skills that belong to this game and to what the agent sees"
+        )
+    })
 }
 
 /// One tick of every held skill is over.

@@ -5,13 +5,14 @@ use std::{path::Path, sync::Arc};
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
-        dataset::load_dataset,
+        dataset::Demonstrations,
         file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
         recorder::{demo_actions, flush_unfinished},
         verify::{ReplayStage, verify_file},
     },
     game::build_world,
     prelude::*,
+    vision::Sight,
 };
 use playbot_tests::{Corridor, Drift};
 
@@ -86,7 +87,10 @@ fn kept_observations_equal_those_of_a_replay() {
     std::fs::create_dir_all(&full).expect("writable");
     record(&bare.join("walk.demo"), header(), 10);
     record(&full.join("walk.demo"), DemoHeader { observation_names: Corridor.observation().names, ..header() }, 10);
-    let load = |path: &Path| load_dataset(&Corridor, path, None, |_| {}).expect("readable");
+    let load = |path: &Path| {
+        let demos = Demonstrations::read(&Corridor, &Sight::default(), path, None).expect("readable");
+        demos.dataset(&Corridor, 2, |_| {}).expect("replays")
+    };
     assert_eq!(load(&bare), load(&full));
 }
 
@@ -95,7 +99,9 @@ fn held_out_levels_are_not_learned_from() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("walk.demo");
     record(&path, header(), 10);
-    let load = |held_out: &str| load_dataset(&Corridor, &path, Some(&held_out.parse().expect("a split")), |_| {});
+    let load = |held_out: &str| {
+        Demonstrations::read(&Corridor, &Sight::default(), &path, Some(&held_out.parse().expect("a split")))
+    };
     let error = load("plain:7..15").expect_err("level 7 is recorded").to_string();
     for words in ["walk.demo", "level 7", "plain:7..15", "`test`"] {
         assert!(error.contains(words), "{error}");

@@ -5,7 +5,7 @@ use std::path::Path;
 use bevy_playbot::{
     bot::BlindBot,
     demo::{
-        dataset::load_dataset,
+        dataset::Demonstrations,
         file::{DemoHeader, DemoWriter},
         recorder::demo_actions,
     },
@@ -19,6 +19,7 @@ use bevy_playbot::{
         run_dir::{RunDir, RunError, RunInfo},
         trainer::TrainError,
     },
+    vision::Sight,
 };
 use playbot_games::coinrun::CoinRun;
 use playbot_tests::Corridor;
@@ -65,7 +66,8 @@ fn skills(folder: &Path) -> SkillModel {
     while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
         world.tick().expect("sound");
     }
-    let dataset = load_dataset(&Corridor, &path, None, |_| {}).expect("readable");
+    let demos = Demonstrations::read(&Corridor, &Sight::default(), &path, None).expect("readable");
+    let dataset = demos.dataset(&Corridor, 2, |_| {}).expect("replays");
     let config = experiment().skills;
     let epochs = config.epochs;
     let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");

@@ -1,9 +1,12 @@
 //! `playbot demo ls|show|verify|repair`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use bevy_playbot::demo::{
-    file::{DemoEpisode, DemoReader, DemoSummary, EpisodeActions, find_demos, repair},
+    file::{Decider, DemoEpisode, DemoReader, DemoSummary, EpisodeActions, find_demos, repair},
     verify::verify_file,
 };
 use serde_json::json;
@@ -95,7 +98,7 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
             print_line(json!(summary))?;
         } else {
             print_line(format!(
-                "{}: {} {}, {} episodes, {} steps, {:.1} % success, {} levels, {} KiB, by {}",
+                "{}: {} {}, {} episodes, {} steps, {:.1} % success, {} levels, {} KiB, by {}, decided by {}",
                 file.display(),
                 summary.header.game,
                 summary.header.mode,
@@ -105,10 +108,21 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
                 summary.levels,
                 summary.bytes / 1024,
                 summary.header.demonstrator,
+                deciders(&summary.steps_by_decider),
             ))?;
         }
     }
     Ok(outcome)
+}
+
+/// Who decided which share of the ticks.
+pub fn deciders(steps_by_decider: &BTreeMap<Decider, usize>) -> String {
+    let total: usize = steps_by_decider.values().sum();
+    if total == 0 {
+        return "nobody".to_owned();
+    }
+    let share = |(decider, &steps)| format!("{decider} {:.0} %", 100.0 * steps as f64 / total as f64);
+    steps_by_decider.iter().map(share).collect::<Vec<_>>().join(", ")
 }
 
 fn show(file: &Path, wanted: Option<usize>, as_json: bool) -> Result<Outcome, CliError> {
@@ -137,15 +151,16 @@ fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<()
     if as_json {
         return print_line(json!({
             "episode": index, "level": episode.level_seed, "steps": episode.len(),
-            "return": episode.episode_return(), "end": episode.end,
+            "return": episode.episode_return(), "end": episode.end, "steps_by_decider": episode.steps_by_decider(),
         }));
     }
     print_line(format!(
-        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:?}",
+        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:?}  by {}",
         episode.level_seed,
         episode.len(),
         episode.episode_return(),
-        episode.end
+        episode.end,
+        deciders(&episode.steps_by_decider())
     ))
 }
 

@@ -4,6 +4,7 @@ use std::{io, path::PathBuf};
 
 use bevy_playbot::{
     demo::{file::DemoFileError, verify::VerifyError},
+    eval::EvalError,
     fault::Fault,
     game::UnknownName,
     learner::{FileError, LearnError},
@@ -14,6 +15,7 @@ use bevy_playbot::{
         arena_state::RestoreError, config::ExperimentError, config_file::ConfigError, run_dir::RunError,
         study::StudyError, trainer::TrainError,
     },
+    vision::{UnknownSight, VisionError},
 };
 use thiserror::Error;
 
@@ -88,9 +90,18 @@ pub enum CliError {
     #[error(transparent)]
     Fault(#[from] Fault),
     #[error(transparent)]
+    Eval(#[from] EvalError),
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    #[error(transparent)]
+    Sight(#[from] UnknownSight),
+    #[error(transparent)]
     Misfit(#[from] PolicyMisfit),
     #[error(transparent)]
     Export(#[from] ExportError),
+    #[cfg(feature = "window")]
+    #[error(transparent)]
+    Window(#[from] crate::window::WindowError),
 }
 
 impl CliError {
@@ -104,7 +115,11 @@ impl CliError {
             | Self::Experiment(_)
             | Self::Study(_)
             | Self::Demo(_)
-            | Self::Misfit(_) => 3,
+            | Self::Misfit(_)
+            | Self::Vision(_)
+            | Self::Sight(_)
+            | Self::Eval(EvalError::Vision(_))
+            | Self::Export(ExportError::Vision(_) | ExportError::Sight(_)) => 3,
             Self::File(error) | Self::Export(ExportError::File(error)) => file_code(error),
             Self::Run(error) | Self::Runs(RunsError::Run(error)) => run_code(error),
             Self::NotSaved { error, .. } => run_code(error),
@@ -112,10 +127,19 @@ impl CliError {
             Self::Verify(VerifyError::Fault(_)) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),
+            #[cfg(feature = "window")]
+            Self::Window(error) => {
+                if error.is_usage() {
+                    3
+                } else {
+                    2
+                }
+            }
             Self::Verify(_) => 3,
             Self::BrokenPipe
             | Self::Io(_)
             | Self::Fault(_)
+            | Self::Eval(EvalError::Fault(_))
             | Self::Export(ExportError::Fault(_))
             | Self::Runs(RunsError::Io { .. })
             | Self::Diverged { .. } => 2,

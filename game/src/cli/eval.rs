@@ -3,15 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
-    eval::Player,
+    eval::{EvalPlan, Player},
     game::{Game, check_mode},
-    learner::{DeviceKind, PolicyFile, SkillModel, SkillSource},
-    policy::ActionDraw,
-    policy_file::check_policy,
+    learner::{DeviceKind, Policy, PolicyFile, SkillModel, SkillSource},
+    policy::{ActionDraw, in_words},
+    policy_file::{check_policy, policy_sight},
     report::to_text_table,
     skill_prior::SkillPrior,
     split::LevelSplit,
     train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
+    vision::{ObservationKind, Sight},
 };
 
 use super::{
@@ -27,6 +28,7 @@ use crate::registry;
   playbot eval --run runs/first
   playbot eval --bot right-jump --bot random --levels hard:0..63 --json
   playbot eval --skills skills.safetensors
+  playbot eval --run runs/pixels --observation camera
   playbot eval --run runs/first --bot search --levels hard:64..127 --levels easy:500..599")]
 pub struct Args {
     /// Folder of a run; may be given several times.
@@ -44,6 +46,9 @@ pub struct Args {
     /// Bot of the game, such as random, right-jump or search; may be given several times.
     #[arg(long)]
     bot: Vec<String>,
+    /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
+    #[arg(long)]
+    observation: Option<ObservationKind>,
     /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named.
     #[arg(long)]
     levels: Vec<LevelSplit>,
@@ -84,8 +89,8 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let mut rows = Vec::new();
     for split in &splits {
         check_mode(game, &split.mode)?;
-        for (name, player) in &players {
-            let plan = methods::plan(&experiment, split, episodes, args.threads);
+        for (name, player, sight) in &players {
+            let plan = EvalPlan { sight: *sight, ..methods::plan(&experiment, split, episodes, args.threads) };
             let measured = methods::measure(game, name, player, &plan)?;
             if args.json {
                 methods::print_json(&measured.summary)?;
@@ -100,6 +105,13 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 }
 
 fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
+    let of_sight = |set: &&String| ["observation", "image"].iter().any(|key| set.trim_start().starts_with(key));
+    if let Some(set) = args.from.set.iter().find(of_sight) {
+        return Err(CliError::Usage(format!(
+            "`{set}`: a policy sees what it was trained with; look at the same pictures through other eyes with \
+             --observation camera or --observation raster"
+        )));
+    }
     let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
     match (&args.from.experiment, args.run.first()) {
         (None, Some(run)) => {
@@ -111,7 +123,10 @@ fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
     }
 }
 
-fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<(String, Player)>, CliError> {
+/// Name, player and what it sees.
+type Contender = (String, Player, Sight);
+
+fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<Contender>, CliError> {
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut players = Vec::new();
     for path in &args.run {
@@ -122,28 +137,46 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
         players.push((
             named(info.algorithm.name(), path, args.run.len()),
             Player::Policy { policy: learner.policy(), prior, draw },
+            own.sight(),
         ));
     }
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
-        players.push((named("bc", path, args.skills.len()), cloning(&model, experiment, draw)));
+        let sight = Sight::from_card(model.picture(), &model.observation())?;
+        players.push((named("bc", path, args.skills.len()), cloning(&model, experiment, draw), sight));
     }
     for path in &args.policy {
         let file = PolicyFile::load(path, args.device)?;
         check_policy(game, &file)?;
         let prior = file.skills.as_ref().map(SkillPrior::from);
-        let name = named(&file.card.algorithm, path, args.policy.len());
-        players.push((name, Player::Policy { policy: file.policy, prior, draw }));
+        let (name, sight) = (named(&file.card.algorithm, path, args.policy.len()), policy_sight(&file)?);
+        players.push((name, Player::Policy { policy: file.policy, prior, draw }, sight));
     }
     for name in &args.bot {
-        players.push((name.clone(), methods::bot(game, name)?));
+        players.push((name.clone(), methods::bot(game, name)?, Sight::default()));
     }
-    for (name, player) in &players {
+    for (name, player, sight) in &mut players {
         if let Player::Policy { policy, .. } = player {
-            check_fit(game, name, policy.obs_dim(), policy.action_space())?;
+            look_through(sight, args.observation, name)?;
+            check_fit(game, name, sight, policy)?;
         }
     }
     Ok(players)
+}
+
+/// Puts other eyes in place of those that a policy was trained with, as far as they see the same.
+fn look_through(sight: &mut Sight, eyes: Option<ObservationKind>, name: &str) -> Result<(), CliError> {
+    let Some(kind) = eyes else { return Ok(()) };
+    let other = Sight { kind, ..*sight };
+    if other.is_image() != sight.is_image() {
+        let offered = if sight.is_image() { "vectors" } else { "pictures" };
+        return Err(CliError::Usage(format!(
+            "the policy {name} reads {sight}, and --observation {kind} gives {offered}: leave --observation out, or \
+             measure it by itself"
+        )));
+    }
+    *sight = other;
+    Ok(())
 }
 
 /// A run is measured in its own game, and on levels it was trained on only if somebody names them.
@@ -182,19 +215,22 @@ pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSourc
     SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
 }
 
-fn check_fit(
-    game: &dyn Game,
-    name: &str,
-    obs_dim: usize,
-    actions: bevy_playbot::action::ActionSpace,
-) -> Result<(), CliError> {
-    let (game_obs, game_actions) = (game.observation().len(), game.actions());
-    if (obs_dim, actions) == (game_obs, game_actions) {
+/// Checks that a policy reads what the game shows it, and acts as the game does.
+///
+/// # Errors
+///
+/// What differs, in words.
+pub fn check_fit(game: &dyn Game, name: &str, sight: &Sight, policy: &Policy) -> Result<(), CliError> {
+    sight.check(game)?;
+    let (seen, acts) = (sight.obs_kind(game), game.actions());
+    if (policy.observation(), policy.action_space()) == (seen, acts) {
         return Ok(());
     }
+    let (reads, made_for) = (in_words(&policy.observation()), policy.action_space());
     Err(CliError::Usage(format!(
-        "the policy {name} was made for {obs_dim} observation values and {actions:?}, but `{}` has {game_obs} and \
-         {game_actions:?}: use one that was trained for this game and this version",
-        game.name()
+        "the policy {name} was made for {reads} and {made_for:?}, but `{}` has {} and {acts:?}: use one that was \
+         trained for this game and this version",
+        game.name(),
+        in_words(&seen)
     )))
 }

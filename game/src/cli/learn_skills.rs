@@ -6,11 +6,10 @@ use std::{
 };
 
 use bevy_playbot::{
-    demo::dataset::load_dataset,
+    demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
     game::Game,
     learner::{Dataset, DeviceKind, SkillMetrics, SkillModel, SkillTrainer},
-    split::LevelSplit,
-    train::Experiment,
+    train::{Experiment, worlds::default_threads},
 };
 use serde_json::json;
 
@@ -25,6 +24,7 @@ use crate::registry;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot learn-skills --out skills.safetensors
+  playbot learn-skills --set observation=Raster --max-steps 30000 --out eyes.safetensors
   playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors
   playbot learn-skills --out skills.safetensors --resume")]
 pub struct Args {
@@ -33,6 +33,9 @@ pub struct Args {
     /// File or folder of recordings, instead of the experiment's.
     #[arg(long)]
     demos: Option<PathBuf>,
+    /// Learn from at most so many recorded steps, instead of the experiment's `demo_steps`.
+    #[arg(long)]
+    max_steps: Option<u64>,
     /// Passes over the recordings, instead of the experiment's.
     #[arg(long)]
     epochs: Option<usize>,
@@ -45,6 +48,9 @@ pub struct Args {
     /// Go on where Ctrl-C or a crash stopped, from FILE.checkpoint.
     #[arg(long)]
     resume: bool,
+    /// Threads that replay recordings; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads())]
+    threads: usize,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
     device: DeviceKind,
@@ -54,11 +60,11 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
-    let experiment = args.from.load([option("skills.epochs", &args.epochs)])?;
+    let experiment = args.from.load([option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
     let checkpoint = prepare(&args)?;
     let game = registry::game(&experiment.game)?;
     let demos = args.demos.clone().unwrap_or_else(|| experiment::resolve(&experiment.demos));
-    let dataset = read_demos(game, &demos, &experiment.test)?;
+    let dataset = read_demos(game, &experiment, &demos, args.threads)?;
     if args.force {
         // Not earlier: what there is stays if there is nothing to learn from.
         remove(&checkpoint)?;
@@ -122,21 +128,29 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
     })
 }
 
-/// Reads recordings, replaying them through the game's sensor where they keep no observations.
+/// Reads recordings, replaying them through the sensor where they keep no observations. Says first how much memory
+/// pictures will take.
 ///
 /// # Errors
 ///
-/// A recording cannot be read, belongs to another game, or shows a held-out level.
-pub fn read_demos(game: &dyn Game, path: &Path, held_out: &LevelSplit) -> Result<Dataset, CliError> {
-    let bar = progress::bar("replay recordings", 0, "steps");
-    let dataset = load_dataset(game, path, Some(held_out), |steps| {
-        bar.set_length(steps);
-        bar.set_position(steps);
-    });
+/// A recording cannot be read, belongs to another game, shows a held-out level or does not replay, or the pictures would
+/// need more than [`MAX_PICTURE_BYTES`].
+pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
+    let sight = experiment.sight();
+    let mut demos = Demonstrations::read(game, &sight, path, Some(&experiment.test))?;
+    if let Some(steps) = experiment.demo_steps {
+        demos = demos.at_most(steps);
+    }
+    let (steps, episodes, gib) = (demos.steps(), demos.episodes(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
+    eprint!("{steps} steps in {episodes} episodes from {}", path.display());
+    match demos.picture_bytes() {
+        0 => eprintln!(),
+        bytes => eprintln!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+    }
+    let bar = progress::bar("replay recordings", steps, "steps");
+    let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
     bar.finish_and_clear();
-    let dataset = dataset?;
-    eprintln!("{} steps in {} episodes from {}", dataset.steps(), dataset.episodes(), path.display());
-    Ok(dataset)
+    Ok(dataset?)
 }
 
 /// Learns the model, with a progress bar and, where there is room for one, a checkpoint after each epoch, from which a
@@ -173,7 +187,7 @@ pub fn learn(
         after_epoch(trainer.epochs_done(), &metrics)?;
     }
     bar.finish_and_clear();
-    Ok(Some(trainer.into_model()))
+    Ok(Some(trainer.into_model().with_picture(experiment.sight().card())))
 }
 
 /// A trainer at its start, or where the checkpoint left it.

@@ -35,10 +35,11 @@ pub fn bot_names(game: &dyn Game) -> Vec<&'static str> {
     game.blind_bots().into_iter().map(|(name, _)| name).chain(game.demonstrator()).collect()
 }
 
-/// The plan of an experiment for one split.
+/// The plan of an experiment for one split, for a player that sees as the experiment says.
 pub fn plan(experiment: &Experiment, split: &LevelSplit, episodes_per_level: u32, threads: usize) -> EvalPlan {
     EvalPlan {
         split: split.clone(),
+        sight: experiment.sight(),
         episodes_per_level,
         seed: experiment.seed,
         arenas: experiment.arenas,

@@ -11,15 +11,19 @@ mod interrupt;
 mod learn_skills;
 mod level;
 mod methods;
+mod play;
+mod player;
 mod policy;
 mod progress;
 mod quickstart;
 mod record;
+mod recording;
 mod runs;
 mod study;
 mod study_run;
 mod trace;
 mod train;
+mod view;
 
 use std::process::ExitCode;
 
@@ -44,6 +48,7 @@ Examples:
   playbot                                          learn, train and test on CoinRun in a few minutes
   playbot level coinrun --mode hard --seed 7       show a level
   playbot record coinrun --levels easy:0..9 --out my.demo
+  playbot play coinrun --seed 7 --record my.demo   play it yourself
   playbot demo verify demos/coinrun
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
@@ -51,6 +56,7 @@ Examples:
   playbot policy export --run runs/first --out coinrun.policy
   playbot config show --set ppo.lr=0.0003          an experiment with all its values
   playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
+  playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
@@ -61,6 +67,8 @@ enum Verb {
     Quickstart(quickstart::Args),
     /// Record the game's demonstrator.
     Record(record::Args),
+    /// Play in a window, record, and hand over to a policy and back.
+    Play(play::Args),
     /// Look at, check and repair recordings.
     Demo(demo::Args),
     /// Learn the skill model from recordings.
@@ -81,6 +89,8 @@ enum Verb {
     Level(level::Args),
     /// Play given actions and print the state after each.
     Trace(trace::Args),
+    /// Write what a bot sees as a picture, or an episode as a moving one.
+    View(view::Args),
     /// Measure speed.
     Bench(bench::Args),
 }
@@ -117,6 +127,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
     match verb {
         Verb::Quickstart(args) => quickstart::run(args),
         Verb::Record(args) => record::run(args),
+        Verb::Play(args) => play::run(args),
         Verb::Demo(args) => demo::run(args),
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),
@@ -127,12 +138,14 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Runs(args) => runs::run(args),
         Verb::Level(args) => level::run(args),
         Verb::Trace(args) => trace::run(args),
+        Verb::View(args) => view::run(args),
         Verb::Bench(args) => bench::run(args),
     }
 }
 
 fn init_tracing(verbose: u8) {
-    let level = ["warn", "info", "debug"][usize::from(verbose.min(2))];
+    // A window manager without settings and a renderer in software are nothing to warn of.
+    let level = ["warn,winit=error,bevy_render::renderer=error", "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     game::Game,
     learner::{DeviceKind, PolicyFile, SkillModel},
-    policy_file::{check_policy, export_policy, policy_file},
+    policy_file::{check_policy, export_policy, policy_file, policy_sight},
     train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
+    vision::Sight,
 };
 use serde_json::json;
 
@@ -101,7 +102,7 @@ fn from_run(path: &Path, which: Which) -> Result<Exported, CliError> {
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed
     );
     let about = (info.algorithm.name().to_owned(), training, code(&info.version, &info.revision));
-    let mut file = policy_file(game, learner.policy(), learner.skills(), about);
+    let mut file = policy_file(game, &experiment.sight(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
     file.card.game_version = info.game_version;
     Ok((game, experiment, file))
@@ -113,7 +114,8 @@ fn from_skills(path: &Path, from: &ExperimentArgs) -> Result<Exported, CliError>
     let model = SkillModel::load(path, DeviceKind::default())?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let about = ("bc".to_owned(), format!("demonstrations in {}", experiment.demos.display()), code);
-    let file = policy_file(game, model.policy(), Some(cloning_skills(&model, &experiment)), about);
+    let sight = Sight::from_card(model.picture(), &model.observation())?;
+    let file = policy_file(game, &sight, model.policy(), Some(cloning_skills(&model, &experiment)), about);
     Ok((game, experiment, file))
 }
 
@@ -136,7 +138,10 @@ fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliEr
     print_line(format!("algorithm     {}", card.algorithm))?;
     print_line(format!("trained on    {}", card.training))?;
     print_line(format!("code          {}", card.code))?;
-    print_line(format!("observation   {} values: {}", policy.obs_dim(), listed(&card.observations)))?;
+    print_line(match policy_sight(&file)? {
+        sight if sight.is_image() => format!("observation   {sight}"),
+        _ => format!("observation   {} values: {}", policy.obs_dim(), listed(&card.observations)),
+    })?;
     print_line(format!("actions       {:?}: {}", policy.action_space(), listed(&card.actions)))?;
     print_line(match skills {
         Some(skills) => format!("skills        {} numbers, held for {} ticks", policy.latent(), skills.horizon),

@@ -14,6 +14,7 @@ use bevy_playbot::{
 use super::{
     error::{CliError, Outcome},
     interrupt, progress,
+    recording::Existing,
 };
 use crate::registry;
 
@@ -43,12 +44,8 @@ pub struct Args {
     /// Keep the observation vectors too (larger; not needed, since replaying brings them back).
     #[arg(long)]
     observations: bool,
-    /// Add to a recording that exists.
-    #[arg(long, conflicts_with = "force")]
-    append: bool,
-    /// Overwrite a recording that exists.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    existing: Existing,
 }
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
@@ -86,17 +83,7 @@ fn open_writer(game: &dyn Game, args: &Args) -> Result<DemoWriter, CliError> {
     if args.observations {
         header.observation_names = game.observation().names;
     }
-    if let Some(folder) = args.out.parent() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
-    }
-    if args.append {
-        return Ok(DemoWriter::append(&args.out, &header)?);
-    }
-    if args.force {
-        return Ok(DemoWriter::replace(&args.out, header)?);
-    }
-    Ok(DemoWriter::create(&args.out, header)?)
+    args.existing.open(&args.out, header)
 }
 
 /// One round of the levels, or as many rounds as the steps can need: every level takes at least one step.

@@ -21,6 +21,7 @@ use bevy_playbot::{
         run_dir::{RunDir, RunInfo, write_atomically},
         study::StudyRun,
     },
+    vision::Sight,
 };
 use serde_json::json;
 
@@ -50,8 +51,8 @@ pub struct Runner {
     demos: Option<(Recordings, Dataset)>,
 }
 
-/// Game, path, and the levels that must not be among them.
-type Recordings = (String, PathBuf, LevelSplit);
+/// Game, path, the levels that must not be among them, what is seen, and how many steps at most.
+type Recordings = (String, PathBuf, LevelSplit, Sight, Option<u64>);
 
 /// What came of a run, or `None` after Ctrl-C.
 pub type Ended = Option<(StudyResult, SuccessCurve)>;
@@ -204,11 +205,12 @@ impl Runner {
     }
 
     fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
-        let key = (experiment.game.clone(), experiment::resolve(&experiment.demos), experiment.test.clone());
+        let Experiment { game: name, demos, test, demo_steps, .. } = experiment;
+        let key = (name.clone(), experiment::resolve(demos), test.clone(), experiment.sight(), *demo_steps);
         match &self.demos {
             Some((known, dataset)) if *known == key => Ok(dataset.clone()),
             _ => {
-                let dataset = learn_skills::read_demos(game, &key.1, &key.2)?;
+                let dataset = learn_skills::read_demos(game, experiment, &key.1, self.threads)?;
                 self.demos = Some((key, dataset.clone()));
                 Ok(dataset)
             }

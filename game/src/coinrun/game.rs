@@ -3,11 +3,12 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use bevy_playbot::{prelude::*, vision::Picture};
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
     demonstrator_bot::DemonstratorBot,
+    picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
     rules::ACTIONS,
     view,
@@ -22,6 +23,11 @@ pub struct CoinRun {
 
 /// The action "right and jump", which a player without eyes does best to hold.
 const RIGHT_JUMP: u32 = 8;
+
+/// The action with these directions, each -1, 0 or 1.
+fn directed(sideways: i8, upwards: i8) -> u32 {
+    (3 * (sideways + 1) + (upwards + 1)).unsigned_abs().into()
+}
 
 static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: view::names() }));
 
@@ -66,6 +72,14 @@ impl Game for CoinRun {
         names.map(str::to_owned).into_iter().chain(unused).collect()
     }
 
+    fn input_map(&self) -> Option<InputMap> {
+        let sideways = KeyAxis::new([KeyCode::ArrowLeft, KeyCode::KeyA], [KeyCode::ArrowRight, KeyCode::KeyD]);
+        let upwards =
+            KeyAxis::new([KeyCode::ArrowDown, KeyCode::KeyS], [KeyCode::ArrowUp, KeyCode::KeyW, KeyCode::Space]);
+        let help = "arrow keys or A, D and S run and drop, Up, W or Space jumps";
+        Some(InputMap::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
+    }
+
     fn observation(&self) -> ObservationSpace {
         (**SPACE).clone()
     }
@@ -73,6 +87,14 @@ impl Game for CoinRun {
     fn build(&self, app: &mut App, mode: &str) {
         let mode = mode.parse().expect("callers check the mode against `modes`");
         app.add_plugins(CoinRunPlugin { mode, physics: self.physics });
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(CoinRunPicturePlugin);
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {

@@ -20,6 +20,7 @@ mod play;
 pub mod plugin;
 pub mod rules;
 pub mod sim;
+pub mod text;
 pub mod tile;
 pub mod view;
 

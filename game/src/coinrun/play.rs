@@ -111,9 +111,9 @@ fn finish(outcome: Option<Outcome>, episode: &mut Episode, reward: &mut Reward) 
     }
 }
 
-/// Fills the observation of every agent that plays.
+/// Fills the vector of every agent that plays and reads one.
 pub(super) fn observe(
-    mut players: Query<(&Episode, &PlaysIn, &PlayerBody, &PlayerMemory, &mut Observation)>,
+    mut players: Query<(&Episode, &PlaysIn, &PlayerBody, &PlayerMemory, &mut Observation), With<VectorSensor>>,
     arenas: Arenas,
     mut gathered: Local<Gathered>,
 ) {

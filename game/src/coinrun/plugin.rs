@@ -1,7 +1,7 @@
 //! CoinRun as a Bevy plugin.
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use bevy_playbot::{prelude::*, vision::VisionSystems};
 
 use super::{Mode, arena, components::CoinRunMode, demonstrator_bot, physics::CoinRunPhysicsPlugin, play};
 
@@ -29,7 +29,7 @@ impl Plugin for CoinRunPlugin {
         app.insert_resource(CoinRunMode(self.mode))
             .add_observer(arena::start_episode)
             .add_observer(demonstrator_bot::start_episode)
-            .add_systems(ObserveSchedule, play::observe)
+            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Dress))
             .add_systems(
                 FixedPreUpdate,
                 (

@@ -191,6 +191,11 @@ impl TileGrid {
         }
     }
 
+    /// All tiles, bottom row first, each from left to right.
+    pub fn iter(&self) -> impl Iterator<Item = Tile> {
+        self.tiles.iter().copied()
+    }
+
     /// The grid as 64 strings of 64 letters. The first string is the bottom row.
     pub fn rows(&self) -> Vec<String> {
         self.tiles.chunks(SIZE as usize).map(|row| row.iter().map(|tile| tile.to_char()).collect()).collect()

@@ -76,7 +76,7 @@ fn rollout(learner: &PpoLearner, latent: usize, rng: &mut ChaCha8Rng) -> Result<
     }
     Ok(Rollout {
         steps: STEPS,
-        obs,
+        obs: obs.into(),
         z,
         actions: Actions::Discrete(actions),
         log_probs,

@@ -85,7 +85,7 @@ fn ppo(rounds: usize) -> Result<(), LearnError> {
     let actions = (0..rows).map(|_| (unit(&mut rng) * choices as f64) as u32).collect();
     let mut column = || Tensor::<1>::from_data(TensorData::new(normals(rows, &mut rng), [rows]), &device);
     let batch = Minibatch {
-        inputs: Tensor::from_data(TensorData::new(inputs, [rows, obs_dim]), &device),
+        inputs: Tensor::<2>::from_data(TensorData::new(inputs, [rows, obs_dim]), &device).into(),
         ppo: PpoBatch {
             actions: ActionRows::new(&Actions::Discrete(actions), &device),
             old_log_probs: column() * 0.01 - (choices as f32).ln(),

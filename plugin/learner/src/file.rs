@@ -64,10 +64,16 @@ impl TensorFile {
         self.tensors.insert(name.to_owned(), Stored { shape: vec![values.len()], dtype: Dtype::U32, bytes });
     }
 
+    /// Adds bytes.
+    pub(crate) fn put_bytes(&mut self, name: &str, shape: &[usize], values: &[u8]) {
+        let stored = Stored { shape: shape.to_vec(), dtype: Dtype::U8, bytes: values.to_vec() };
+        self.tensors.insert(name.to_owned(), stored);
+    }
+
     /// Adds a vector of flags, as bytes 0 and 1.
     pub(crate) fn put_flags(&mut self, name: &str, values: &[bool]) {
-        let bytes = values.iter().map(|&flag| u8::from(flag)).collect();
-        self.tensors.insert(name.to_owned(), Stored { shape: vec![values.len()], dtype: Dtype::U8, bytes });
+        let bytes: Vec<u8> = values.iter().map(|&flag| u8::from(flag)).collect();
+        self.put_bytes(name, &[values.len()], &bytes);
     }
 
     /// Adds all parameters of `network`.
@@ -137,26 +143,31 @@ impl TensorFile {
 
     /// Takes out a single-precision tensor of the given shape.
     pub(crate) fn take(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f32>, FileError> {
-        let bytes = self.take_bytes(name, Some(shape), Dtype::F32)?;
+        let bytes = self.take_any(name, Some(shape), Dtype::F32)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
     /// Takes out a double-precision vector, of length `len` if given.
     pub(crate) fn take_f64(&mut self, name: &str, len: Option<usize>) -> Result<Vec<f64>, FileError> {
         let shape = len.map(|len| vec![len]);
-        let bytes = self.take_bytes(name, shape.as_deref(), Dtype::F64)?;
+        let bytes = self.take_any(name, shape.as_deref(), Dtype::F64)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
     /// Takes out a vector of `len` whole numbers.
     pub(crate) fn take_u32(&mut self, name: &str, len: usize) -> Result<Vec<u32>, FileError> {
-        let bytes = self.take_bytes(name, Some(&[len]), Dtype::U32)?;
+        let bytes = self.take_any(name, Some(&[len]), Dtype::U32)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out bytes of the given shape.
+    pub(crate) fn take_bytes(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u8>, FileError> {
+        self.take_any(name, Some(shape), Dtype::U8)
     }
 
     /// Takes out a vector of `len` flags.
     pub(crate) fn take_flags(&mut self, name: &str, len: usize) -> Result<Vec<bool>, FileError> {
-        let bytes = self.take_bytes(name, Some(&[len]), Dtype::U8)?;
+        let bytes = self.take_bytes(name, &[len])?;
         Ok(bytes.into_iter().map(|byte| byte != 0).collect())
     }
 
@@ -248,7 +259,7 @@ impl TensorFile {
         FileError::Learner { path: self.path.clone(), source }
     }
 
-    fn take_bytes(&mut self, name: &str, shape: Option<&[usize]>, dtype: Dtype) -> Result<Vec<u8>, FileError> {
+    fn take_any(&mut self, name: &str, shape: Option<&[usize]>, dtype: Dtype) -> Result<Vec<u8>, FileError> {
         if let Some(shape) = shape {
             self.expect(name, shape)?;
         }

@@ -12,8 +12,8 @@
 //! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps what was
 //!   played and learns from it again and again.
 //!
-//! Observations are vectors or images ([`ObsKind`]). Rows are flat `f32` slices in host memory (bytes for pixels),
-//! row-major. All randomness comes from generators that the caller owns or
+//! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Rows are flat `f32` slices in host
+//! memory (bytes for pixels), row-major ([`ObsSlice`]). All randomness comes from generators that the caller owns or
 //! from the named [`rng::Streams`] of one seed: the same seed gives the same numbers, whatever the number of threads.
 //!
 //! # Example
@@ -22,7 +22,7 @@
 //! use playbot_learner::rng::Streams;
 //! use playbot_learner::{ActionSpace, DeviceKind, PolicySpec, PpoConfig, PpoLearner};
 //!
-//! let spec = PolicySpec { obs_dim: 2, latent: 0, action_space: ActionSpace::Discrete(3) };
+//! let spec = PolicySpec { obs: 2.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
 //! let learner = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?;
 //! let policy = learner.policy();
 //! let output = policy.forward(&[], &[0.1, 0.2, 0.3, 0.4], 2)?;
@@ -39,6 +39,7 @@ mod layout;
 pub mod nn;
 pub mod norm;
 mod observation;
+mod observations;
 pub mod policy;
 pub mod ppo;
 pub mod rng;
@@ -53,8 +54,9 @@ pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
 pub use file::write_atomically;
 pub use norm::RewardReset;
-pub use observation::{ImageShape, ObsKind, Observations};
-pub use policy::{Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
+pub use observation::{ImageShape, ObsKind};
+pub use observations::{ObsSlice, Observations};
+pub use policy::{PictureCard, Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
 pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};
 pub use rng::{RngState, Streams};
 pub use rollout::{EndStates, Rollout, RolloutStep};

@@ -1,4 +1,4 @@
-//! What an agent observes: vectors of numbers, or images.
+//! What an agent observes: a vector of numbers, or an image.
 
 use crate::LearnError;
 use serde::{Deserialize, Serialize};
@@ -42,6 +42,17 @@ impl ObsKind {
         }
     }
 
+    /// `Ok` if `other`, what `who` observes, is the same.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] names both.
+    pub(crate) fn same_as(&self, other: &Self, who: &str) -> Result<(), LearnError> {
+        if self == other {
+            return Ok(());
+        }
+        Err(LearnError::Config(format!("observations must be {self}, but those of {who} are {other}")))
+    }
+
     /// The width of a vector.
     ///
     /// # Errors
@@ -74,66 +85,6 @@ impl fmt::Display for ObsKind {
                 write!(f, "images of {channels} channels, {height} rows and {width} columns")
             }
         }
-    }
-}
-
-/// Many observations of one kind in host memory, one after the other.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Observations {
-    /// Numbers.
-    Vector(Vec<f32>),
-    /// Pixels.
-    Image(Vec<u8>),
-}
-
-impl Observations {
-    /// None yet, with room for `rows` of the given kind.
-    pub(crate) fn with_capacity(kind: &ObsKind, rows: usize) -> Self {
-        let numbers = rows * kind.numbers();
-        match kind {
-            ObsKind::Vector(_) => Self::Vector(Vec::with_capacity(numbers)),
-            ObsKind::Image(_) => Self::Image(Vec::with_capacity(numbers)),
-        }
-    }
-
-    /// Numbers in all observations together.
-    pub fn numbers(&self) -> usize {
-        match self {
-            Self::Vector(values) => values.len(),
-            Self::Image(pixels) => pixels.len(),
-        }
-    }
-
-    /// `Ok` if these are `rows` observations of `kind`, all finite; `what` names them.
-    pub(crate) fn check(&self, what: &str, kind: &ObsKind, rows: usize) -> Result<(), LearnError> {
-        LearnError::check(what, rows * kind.numbers(), self.numbers())?;
-        match (self, kind) {
-            (Self::Vector(values), ObsKind::Vector(width)) => LearnError::check_finite(what, *width, values),
-            (Self::Image(_), ObsKind::Image(_)) => Ok(()),
-            _ => Err(LearnError::Config(format!("{what} are not {kind}"))),
-        }
-    }
-
-    /// Adds number `row` of `other`, which is of the same kind with `width` numbers each.
-    pub(crate) fn push_row(&mut self, other: &Self, row: usize, width: usize) {
-        let range = row * width..(row + 1) * width;
-        match (self, other) {
-            (Self::Vector(to), Self::Vector(from)) => to.extend_from_slice(&from[range]),
-            (Self::Image(to), Self::Image(from)) => to.extend_from_slice(&from[range]),
-            _ => unreachable!("the episodes of a dataset are checked to be of one kind"),
-        }
-    }
-}
-
-impl From<Vec<f32>> for Observations {
-    fn from(values: Vec<f32>) -> Self {
-        Self::Vector(values)
-    }
-}
-
-impl From<Vec<u8>> for Observations {
-    fn from(pixels: Vec<u8>) -> Self {
-        Self::Image(pixels)
     }
 }
 

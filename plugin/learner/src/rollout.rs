@@ -1,6 +1,6 @@
 //! What was played since the last update.
 
-use crate::{ActionSpace, Actions, LearnError, PolicySpec};
+use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations, Policy, PolicySpec};
 
 /// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,12 +9,12 @@ pub struct Rollout {
     pub steps: usize,
     /// B.
     pub envs: usize,
-    /// Width of an observation.
-    pub obs_dim: usize,
+    /// What an observation is.
+    pub obs_kind: ObsKind,
     /// Width of a skill; may be 0.
     pub latent: usize,
-    /// Raw observations, `T * B * obs_dim`.
-    pub obs: Vec<f32>,
+    /// Raw observations, `T * B`; pixels as bytes.
+    pub obs: Observations,
     /// The skill active at each step, `T * B * latent`.
     pub z: Vec<f32>,
     /// The actions taken, `T * B`.
@@ -38,34 +38,41 @@ pub struct Rollout {
 }
 
 /// States that no row of a rollout shows: where episodes were cut off, and where the rollout stopped.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct EndStates {
     /// Rows that cut an episode off without terminating it, ascending.
     pub cut_rows: Vec<usize>,
-    /// Last observation of each of those episodes, `cut_rows * obs_dim`.
-    pub cut_obs: Vec<f32>,
+    /// Last observation of each of those episodes.
+    pub cut_obs: Observations,
     /// The skill under which that observation is judged, `cut_rows * latent`.
     pub cut_z: Vec<f32>,
-    /// Observation after the last row of each environment, `B * obs_dim`; zeros where that row ended an episode.
-    pub next_obs: Vec<f32>,
+    /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
+    pub next_obs: Observations,
     /// The skill active there, `B * latent`.
     pub next_z: Vec<f32>,
 }
 
 impl EndStates {
+    /// No states yet.
+    pub fn new(kind: &ObsKind) -> Self {
+        let none = || Observations::empty(kind);
+        Self { cut_rows: Vec::new(), cut_obs: none(), cut_z: Vec::new(), next_obs: none(), next_z: Vec::new() }
+    }
+
     fn clear(&mut self) {
         self.cut_rows.clear();
-        for values in [&mut self.cut_obs, &mut self.cut_z, &mut self.next_obs, &mut self.next_z] {
-            values.clear();
-        }
+        self.cut_obs.clear();
+        self.cut_z.clear();
+        self.next_obs.clear();
+        self.next_z.clear();
     }
 }
 
 /// One tick of all environments of a [`Rollout`].
 #[derive(Clone, Copy, Debug)]
 pub struct RolloutStep<'a> {
-    /// `B * obs_dim`.
-    pub obs: &'a [f32],
+    /// `B` observations.
+    pub obs: ObsSlice<'a>,
     /// `B * latent`.
     pub z: &'a [f32],
     /// `B`.
@@ -86,13 +93,14 @@ pub struct RolloutStep<'a> {
 
 impl Rollout {
     /// No steps yet.
-    pub fn new(envs: usize, obs_dim: usize, latent: usize, space: &ActionSpace) -> Self {
+    pub fn new(envs: usize, obs: impl Into<ObsKind>, latent: usize, space: &ActionSpace) -> Self {
+        let obs_kind = obs.into();
         Self {
             steps: 0,
             envs,
-            obs_dim,
+            obs_kind,
             latent,
-            obs: Vec::new(),
+            obs: Observations::empty(&obs_kind),
             z: Vec::new(),
             actions: Actions::empty(space),
             log_probs: Vec::new(),
@@ -102,7 +110,7 @@ impl Rollout {
             truncated: Vec::new(),
             final_values: Vec::new(),
             next_values: Vec::new(),
-            ends: EndStates::default(),
+            ends: EndStates::new(&obs_kind),
         }
     }
 
@@ -114,9 +122,9 @@ impl Rollout {
     /// Forgets all steps and keeps the memory.
     pub fn clear(&mut self) {
         self.steps = 0;
+        self.obs.clear();
         self.actions.clear();
         for values in [
-            &mut self.obs,
             &mut self.z,
             &mut self.log_probs,
             &mut self.values,
@@ -134,21 +142,26 @@ impl Rollout {
     /// Keeps the last observation of an episode of environment `env` that the newest step has cut off, with the skill
     /// under which it is judged. Environments come in ascending order within a step.
     ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observation is of another kind.
+    ///
     /// # Panics
     /// If no step was pushed yet.
-    pub fn push_cut(&mut self, env: usize, obs: &[f32], z: &[f32]) {
+    pub fn push_cut<'a>(&mut self, env: usize, obs: impl Into<ObsSlice<'a>>, z: &[f32]) -> Result<(), LearnError> {
+        self.ends.cut_obs.push(obs)?;
         self.ends.cut_rows.push((self.steps - 1) * self.envs + env);
-        self.ends.cut_obs.extend_from_slice(obs);
         self.ends.cut_z.extend_from_slice(z);
+        Ok(())
     }
 
     /// Adds one tick.
     ///
     /// # Errors
-    /// [`LearnError::Action`] if the actions are of another kind. Lengths are checked when the rollout is used.
+    /// [`LearnError::Action`] or [`LearnError::Config`] if actions or observations are of another kind. Lengths are checked
+    /// when the rollout is used.
     pub fn push_step(&mut self, step: RolloutStep<'_>) -> Result<(), LearnError> {
         self.actions.extend_rows(step.actions, 0, step.actions.len())?;
-        self.obs.extend_from_slice(step.obs);
+        self.obs.push(step.obs)?;
         self.z.extend_from_slice(step.z);
         self.log_probs.extend_from_slice(step.log_probs);
         self.values.extend_from_slice(step.values);
@@ -160,37 +173,43 @@ impl Rollout {
         Ok(())
     }
 
-    /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ...
+    /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ... A
+    /// single one stays as it is.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for no parts; [`LearnError::Shape`] or [`LearnError::Action`] if they do not fit together.
-    pub fn join(parts: &[Self]) -> Result<Self, LearnError> {
+    /// [`LearnError::Config`] for no parts; [`LearnError::Shape`], [`LearnError::Config`] or [`LearnError::Action`] if they
+    /// do not fit together.
+    pub fn join(mut parts: Vec<Self>) -> Result<Self, LearnError> {
+        for part in &parts {
+            part.check()?;
+        }
+        if parts.len() == 1 {
+            return Ok(parts.remove(0));
+        }
         let Some(first) = parts.first() else {
             return Err(LearnError::Config("no rollouts to join".to_owned()));
         };
-        let mut all = Self {
-            actions: first.actions.clone(),
-            ..Self::new(0, first.obs_dim, first.latent, &ActionSpace::Discrete(0))
-        };
+        let (kind, width) = (first.obs_kind, first.obs_kind.numbers());
+        let mut all =
+            Self { actions: first.actions.clone(), ..Self::new(0, kind, first.latent, &ActionSpace::Discrete(0)) };
         all.actions.clear();
+        all.obs = Observations::with_capacity(&kind, parts.iter().map(Self::rows).sum());
         all.steps = first.steps;
-        for part in parts {
-            part.check()?;
+        for part in &parts {
             LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
-            LearnError::check("obs_dim of a joined rollout", first.obs_dim, part.obs_dim)?;
+            kind.same_as(&part.obs_kind, "a joined rollout")?;
             LearnError::check("latent of a joined rollout", first.latent, part.latent)?;
             all.envs += part.envs;
             all.next_values.extend_from_slice(&part.next_values);
-            all.ends.next_obs.extend_from_slice(&part.ends.next_obs);
+            all.ends.next_obs.push(&part.ends.next_obs)?;
             all.ends.next_z.extend_from_slice(&part.ends.next_z);
         }
         for t in 0..first.steps {
-            for part in parts {
+            for part in &parts {
                 let rows = t * part.envs..(t + 1) * part.envs;
-                let wide = |width: usize| rows.start * width..rows.end * width;
                 all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
-                all.obs.extend_from_slice(&part.obs[wide(part.obs_dim)]);
-                all.z.extend_from_slice(&part.z[wide(part.latent)]);
+                all.obs.push(part.obs.rows(rows.clone(), width))?;
+                all.z.extend_from_slice(&part.z[rows.start * part.latent..rows.end * part.latent]);
                 all.log_probs.extend_from_slice(&part.log_probs[rows.clone()]);
                 all.values.extend_from_slice(&part.values[rows.clone()]);
                 all.rewards.extend_from_slice(&part.rewards[rows.clone()]);
@@ -199,12 +218,12 @@ impl Rollout {
                 all.final_values.extend_from_slice(&part.final_values[rows]);
             }
         }
-        all.join_cuts(parts);
+        all.join_cuts(&parts)?;
         Ok(all)
     }
 
     /// The cut episodes of all parts, in ascending order of their joined rows.
-    fn join_cuts(&mut self, parts: &[Self]) {
+    fn join_cuts(&mut self, parts: &[Self]) -> Result<(), LearnError> {
         let mut cuts = Vec::new();
         let mut offset = 0;
         for part in parts {
@@ -216,11 +235,44 @@ impl Rollout {
         }
         cuts.sort_by_key(|(row, ..)| *row);
         for (row, part, i) in cuts {
-            let (obs_dim, latent) = (self.obs_dim, self.latent);
             self.ends.cut_rows.push(row);
-            self.ends.cut_obs.extend_from_slice(&part.ends.cut_obs[i * obs_dim..(i + 1) * obs_dim]);
-            self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * latent..(i + 1) * latent]);
+            self.ends.cut_obs.push(part.ends.cut_obs.row(i, self.obs_kind.numbers()))?;
+            self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * self.latent..(i + 1) * self.latent]);
         }
+        Ok(())
+    }
+
+    /// Fills [`Self::final_values`] and [`Self::next_values`] with what `policy` says of the [`Self::ends`], all in one
+    /// batch: the alternative to asking it tick by tick. Values that are never read become 0.
+    ///
+    /// # Errors
+    /// As [`Self::check`]; [`LearnError::Shape`] or [`LearnError::Config`] if the states do not fit the policy.
+    pub fn bootstrap(&mut self, policy: &Policy) -> Result<(), LearnError> {
+        let rows = self.rows();
+        self.final_values = vec![0.0; rows];
+        self.next_values = vec![0.0; self.envs];
+        self.check()?;
+        let (width, latent) = (self.obs_kind.numbers(), self.latent);
+        let done = self.done();
+        let going_on = |&env: &usize| rows == 0 || !done[rows - self.envs + env];
+        let running: Vec<usize> = (0..self.envs).filter(going_on).collect();
+        let ends = &self.ends;
+        ends.next_obs.as_slice().check_size("rollout ends next_obs", &self.obs_kind, self.envs)?;
+        LearnError::check("rollout ends next_z", self.envs * latent, ends.next_z.len())?;
+        let (mut obs, mut z) = (ends.cut_obs.clone(), ends.cut_z.clone());
+        for &env in &running {
+            obs.push(ends.next_obs.row(env, width))?;
+            z.extend_from_slice(&ends.next_z[env * latent..(env + 1) * latent]);
+        }
+        let cuts = ends.cut_rows.len();
+        let values = policy.values(&z, &obs, cuts + running.len())?;
+        for (&row, &value) in ends.cut_rows.iter().zip(&values) {
+            self.final_values[row] = value;
+        }
+        for (&env, &value) in running.iter().zip(&values[cuts..]) {
+            self.next_values[env] = value;
+        }
+        Ok(())
     }
 
     /// `Ok` if all lengths fit T and B, and [`EndStates::cut_rows`] ascend and are rows of this rollout.
@@ -229,8 +281,9 @@ impl Rollout {
     /// [`LearnError::Shape`] names the first length that does not; [`LearnError::Config`] names a row.
     pub fn check(&self) -> Result<(), LearnError> {
         let (rows, cuts) = (self.rows(), self.ends.cut_rows.len());
+        self.obs.as_slice().check_size("rollout obs", &self.obs_kind, rows)?;
+        self.ends.cut_obs.as_slice().check_size("rollout ends cut_obs", &self.obs_kind, cuts)?;
         for (name, expected, found) in [
-            ("rollout obs", rows * self.obs_dim, self.obs.len()),
             ("rollout z", rows * self.latent, self.z.len()),
             ("rollout actions", rows, self.actions.len()),
             ("rollout log_probs", rows, self.log_probs.len()),
@@ -240,7 +293,6 @@ impl Rollout {
             ("rollout truncated", rows, self.truncated.len()),
             ("rollout final_values", rows, self.final_values.len()),
             ("rollout next_values", self.envs, self.next_values.len()),
-            ("rollout ends cut_obs", cuts * self.obs_dim, self.ends.cut_obs.len()),
             ("rollout ends cut_z", cuts * self.latent, self.ends.cut_z.len()),
         ] {
             LearnError::check(name, expected, found)?;
@@ -265,19 +317,24 @@ impl Rollout {
     pub(crate) fn check_for(&self, spec: &PolicySpec, latent: usize) -> Result<(), LearnError> {
         self.check()?;
         spec.action_space.check(&self.actions)?;
-        LearnError::check("obs_dim of the rollout", spec.obs_dim, self.obs_dim)?;
+        spec.obs.same_as(&self.obs_kind, "the rollout")?;
         LearnError::check("latent of the rollout", latent, self.latent)?;
         if self.rows() == 0 {
             return Err(LearnError::Config("the rollout is empty".to_owned()));
         }
+        let ends = &self.ends;
+        for (name, obs) in [
+            ("rollout obs", &self.obs),
+            ("rollout ends cut_obs", &ends.cut_obs),
+            ("rollout ends next_obs", &ends.next_obs),
+        ] {
+            obs.as_slice().check_finite(name, self.obs_kind.numbers())?;
+        }
         for (name, width, values) in [
-            ("rollout obs", self.obs_dim, &self.obs),
             ("rollout z", self.latent, &self.z),
             ("rollout rewards", 1, &self.rewards),
-            ("rollout ends cut_obs", self.obs_dim, &self.ends.cut_obs),
-            ("rollout ends cut_z", self.latent, &self.ends.cut_z),
-            ("rollout ends next_obs", self.obs_dim, &self.ends.next_obs),
-            ("rollout ends next_z", self.latent, &self.ends.next_z),
+            ("rollout ends cut_z", self.latent, &ends.cut_z),
+            ("rollout ends next_z", self.latent, &ends.next_z),
         ] {
             LearnError::check_finite(name, width, values)?;
         }
@@ -301,7 +358,7 @@ mod tests {
             let actions = Actions::Discrete(vec![t as u32; envs]);
             let flags = vec![false; envs];
             let step = RolloutStep {
-                obs: &row,
+                obs: (&row).into(),
                 z: &[],
                 actions: &actions,
                 log_probs: &row,
@@ -313,21 +370,21 @@ mod tests {
             };
             rollout.push_step(step).expect("discrete");
         }
-        rollout.push_cut(envs - 1, &[base], &[]);
+        rollout.push_cut(envs - 1, &[base], &[]).expect("vectors");
         rollout.next_values = vec![base; envs];
-        rollout.ends.next_obs = vec![base; envs];
+        rollout.ends.next_obs = vec![base; envs].into();
         rollout
     }
 
     #[test]
     fn joined_rollouts_lie_side_by_side() {
-        let joined = Rollout::join(&[part(2, 0.0), part(1, 100.0)]).expect("they fit");
+        let joined = Rollout::join(vec![part(2, 0.0), part(1, 100.0)]).expect("they fit");
         assert_eq!((joined.steps, joined.envs), (2, 3));
         assert_eq!(joined.rewards, [0.0, 1.0, 100.0, 10.0, 11.0, 110.0]);
         assert_eq!(joined.next_values, [0.0, 0.0, 100.0]);
-        assert_eq!((&joined.ends.cut_rows[..], &joined.ends.cut_obs[..]), (&[4, 5][..], &[0.0, 100.0][..]));
-        assert_eq!(joined.ends.next_obs, joined.next_values);
         assert!(joined.check().is_ok());
+        assert_eq!(joined.ends.next_obs, joined.next_values.into());
+        assert_eq!((joined.ends.cut_rows, joined.ends.cut_obs), (vec![4, 5], vec![0.0, 100.0].into()));
     }
 
     #[test]
@@ -342,13 +399,13 @@ mod tests {
         let after = |change: fn(&mut EndStates)| {
             let mut rollout = part(2, 0.0);
             change(&mut rollout.ends);
-            Rollout::join(&[part(1, 5.0), rollout]).expect_err("does not fit").to_string()
+            Rollout::join(vec![part(1, 5.0), rollout]).expect_err("does not fit").to_string()
         };
         assert!(after(|ends| ends.cut_obs.clear()).contains("cut_obs"));
         assert!(after(|ends| ends.cut_z.push(1.0)).contains("cut_z"));
         assert!(after(|ends| ends.cut_rows[0] = 4).contains("row 4"));
-        assert!(after(|ends| (ends.cut_rows, ends.cut_obs) = (vec![3, 1], vec![0.0; 2])).contains("ascend"));
-        let without = Rollout { ends: EndStates::default(), ..part(2, 0.0) };
-        assert!(Rollout::join(&[without.clone(), without]).is_ok(), "PPO needs none");
+        assert!(after(|ends| (ends.cut_rows, ends.cut_obs) = (vec![3, 1], vec![0.0; 2].into())).contains("ascend"));
+        let without = Rollout { ends: EndStates::new(&ObsKind::Vector(1)), ..part(2, 0.0) };
+        assert!(Rollout::join(vec![without.clone(), without]).is_ok(), "PPO needs none");
     }
 }

@@ -2,15 +2,17 @@
 
 use crate::nn::Activation;
 use crate::policy::NetShape;
-use crate::{ActionSpace, LearnError};
+use crate::{ActionSpace, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
 /// What a policy reads and does.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 #[serde(deny_unknown_fields)]
 pub struct PolicySpec {
-    /// Width of an observation.
-    pub obs_dim: usize,
+    /// What it observes.
+    // Checkpoints of vectors were written before there were images.
+    #[serde(alias = "obs_dim")]
+    pub obs: ObsKind,
     /// Width of the skill before it; 0 for a policy that reads none.
     pub latent: usize,
     /// What it acts in.
@@ -23,15 +25,16 @@ impl PolicySpec {
     /// # Errors
     /// [`LearnError::Config`] if there is not.
     pub(crate) fn validate(&self) -> Result<(), LearnError> {
-        if self.obs_dim == 0 || self.action_space.dim() == 0 {
+        if self.obs.numbers() == 0 || self.action_space.dim() == 0 {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
         Ok(())
     }
 
-    /// Sizes of a network with these hidden layers that reads this.
-    pub(crate) fn net_shape(&self, hidden: &[usize], activation: Activation) -> NetShape {
-        NetShape { obs_dim: self.obs_dim, latent: self.latent, hidden: hidden.to_vec(), activation }
+    /// Sizes of a network with these hidden layers that reads the skill and `obs_dim` numbers: the observation, or the
+    /// features of an image.
+    pub(crate) fn net_shape(&self, obs_dim: usize, hidden: &[usize], activation: Activation) -> NetShape {
+        NetShape { obs_dim, latent: self.latent, hidden: hidden.to_vec(), activation }
     }
 }
 

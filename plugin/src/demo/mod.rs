@@ -2,6 +2,7 @@
 
 pub mod dataset;
 pub mod file;
+mod onlooker;
 pub mod recorder;
 pub mod replay;
 pub mod verify;

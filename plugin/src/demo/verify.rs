@@ -10,6 +10,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::{
+    dataset::MAX_PICTURE_BYTES,
     file::{DemoEpisode, DemoFileError, DemoReader},
     replay::{Divergence, Replay},
 };
@@ -22,6 +23,7 @@ use crate::{
     level::LevelQueue,
     policy::AgentStreams,
     split::LevelSplit,
+    vision::{Sight, VisionError},
 };
 
 /// What a check by replay found.
@@ -75,9 +77,30 @@ pub enum VerifyError {
         /// The held-out levels.
         split: LevelSplit,
     },
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The pictures need more memory than anybody would expect.
+    #[error(
+        "{steps} steps of {sight} need {:.1} GiB of memory, more than the {:.0} GiB that are allowed: learn from fewer \
+         steps with `demo_steps`, or take smaller pictures, grey ones or a smaller stack (`image`)",
+        gib(*.bytes), gib(MAX_PICTURE_BYTES)
+    )]
+    TooLarge {
+        /// Steps of the recordings.
+        steps: u64,
+        /// What is seen.
+        sight: Sight,
+        /// Memory of the pictures.
+        bytes: u64,
+    },
     /// The recordings do not make a data set.
     #[error(transparent)]
     Data(#[from] playbot_learner::LearnError),
+}
+
+fn gib(bytes: u64) -> f64 {
+    bytes as f64 / (1u64 << 30) as f64
 }
 
 /// Replays every episode of a file; `progress` hears the number of episodes done.

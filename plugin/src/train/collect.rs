@@ -1,7 +1,7 @@
 //! One World that plays with the current policy and keeps what the learner needs.
 
 use bevy::prelude::*;
-use playbot_learner::{Actions, LearnError, Policy, Rollout, RolloutStep};
+use playbot_learner::{Actions, LearnError, ObsKind, Observations, Policy, Rollout, RolloutStep};
 
 use crate::{
     action::Action,
@@ -10,7 +10,7 @@ use crate::{
     demo::recorder,
     episode::{Episode, EpisodeEnd, EpisodeEnded},
     fault::{Fault, Faults},
-    game::{Game, build_world},
+    game::{Game, build_seeing_world},
     headless::tick_world,
     level::LevelQueue,
     observation::Observation,
@@ -20,6 +20,7 @@ use crate::{
     split::LevelSplit,
     systems::{ObserveSchedule, PlaybotSystems},
     train::arena_state::ActionLog,
+    vision::{Sight, VisionError},
 };
 
 /// A World of arenas that fills rollouts.
@@ -32,7 +33,7 @@ pub struct Collector {
 #[derive(Resource)]
 struct Collecting {
     rollout: Rollout,
-    obs_dim: usize,
+    kind: ObsKind,
 }
 
 /// Episodes that ended during the rollout, in the order of ticks and agents.
@@ -45,19 +46,24 @@ fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {
 
 impl Collector {
     /// Agents `first..first + count` on the levels of a split, with skills if there is a prior.
+    ///
+    /// # Errors
+    ///
+    /// The game cannot be seen this way.
     pub fn new(
         game: &dyn Game,
         split: &LevelSplit,
+        sight: &Sight,
         seed: u64,
         first: u32,
         count: u32,
         prior: Option<SkillPrior>,
-    ) -> Self {
-        let (mut world, agents) = build_world(game, &split.mode, seed, first, count);
-        let obs_dim = game.observation().len();
+    ) -> Result<Self, VisionError> {
+        let (mut world, agents) = build_seeing_world(game, &split.mode, sight, seed, first, count)?;
+        let kind = sight.obs_kind(game);
         world.init_resource::<Finished>();
         world.add_observer(note_finished);
-        world.insert_resource(Collecting { rollout: Rollout::new(0, obs_dim, 0, &game.actions()), obs_dim });
+        world.insert_resource(Collecting { rollout: Rollout::new(0, kind, 0, &game.actions()), kind });
         if let Some(prior) = prior {
             world.insert_resource(prior);
         }
@@ -72,7 +78,7 @@ impl Collector {
                 ActionLog::default(),
             ));
         }
-        Self { world, agents }
+        Ok(Self { world, agents })
     }
 
     /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for none.
@@ -90,8 +96,8 @@ impl Collector {
     ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
         let world = &mut self.world;
         world.insert_resource(ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample });
-        let obs_dim = world.resource::<Collecting>().obs_dim;
-        let empty = Rollout::new(self.agents.len(), obs_dim, latent, &policy.action_space());
+        let kind = world.resource::<Collecting>().kind;
+        let empty = Rollout::new(self.agents.len(), kind, latent, &policy.action_space());
         world.resource_mut::<Collecting>().rollout = empty.clone();
         for _ in 0..steps {
             tick_world(world)?;
@@ -126,37 +132,34 @@ fn peek(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(),
     let running: Vec<_> = (0..entities.len())
         .filter(|&row| world.get::<Episode>(entities[row]).is_some_and(Episode::is_running))
         .collect();
-    let (mut skills, mut observations) = (Vec::new(), Vec::new());
+    let kind = rollout.obs_kind;
+    let (mut skills, mut observations) = (Vec::new(), Observations::empty(&kind));
     for &row in &running {
         push_state(world, entities[row], &mut skills, &mut observations);
     }
     let values = policy.values(&skills, &observations, running.len())?;
-    let (obs_dim, latent) = (rollout.obs_dim, rollout.latent);
+    let latent = rollout.latent;
     rollout.next_values = vec![0.0; entities.len()];
-    rollout.ends.next_obs = vec![0.0; entities.len() * obs_dim];
+    rollout.ends.next_obs = Observations::zeros(&kind, entities.len());
     rollout.ends.next_z = vec![0.0; entities.len() * latent];
     for (i, (&row, value)) in running.iter().zip(values).enumerate() {
         rollout.next_values[row] = value;
-        copy_row(&mut rollout.ends.next_obs, row, &observations, i, obs_dim);
-        copy_row(&mut rollout.ends.next_z, row, &skills, i, latent);
+        rollout.ends.next_obs.set_row(row, observations.row(i, kind.numbers()))?;
+        rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
     }
     Ok(())
 }
 
-fn copy_row(to: &mut [f32], to_row: usize, from: &[f32], from_row: usize, width: usize) {
-    to[to_row * width..(to_row + 1) * width].copy_from_slice(&from[from_row * width..(from_row + 1) * width]);
-}
-
-fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Vec<f32>) {
+fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
     if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
         skills.extend_from_slice(&skill.z);
-        observations.extend_from_slice(&observation.vector);
+        observation.push_to(observations);
     }
 }
 
 /// One tick of all agents, before it becomes part of the rollout.
 struct Rows {
-    obs: Vec<f32>,
+    obs: Observations,
     z: Vec<f32>,
     actions: Actions,
     log_probs: Vec<f32>,
@@ -167,10 +170,10 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(policy: &Policy) -> Self {
+    fn new(policy: &Policy, kind: &ObsKind, agents: usize) -> Self {
         let empty = Vec::new;
         Self {
-            obs: empty(),
+            obs: Observations::with_capacity(kind, agents),
             z: empty(),
             actions: Actions::empty(&policy.action_space()),
             log_probs: empty(),
@@ -183,7 +186,7 @@ impl Rows {
 
     fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
         RolloutStep {
-            obs: &self.obs,
+            obs: self.obs.as_slice(),
             z: &self.z,
             actions: &self.actions,
             log_probs: &self.log_probs,
@@ -213,20 +216,21 @@ fn collect_tick(world: &mut World) {
         return;
     };
     let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
-    let cut = cut_episodes(world, &entities, &policy).unwrap_or_else(|error| {
+    let kind = collecting.kind;
+    let cut = cut_episodes(world, &entities, &policy, &kind).unwrap_or_else(|error| {
         world.resource_mut::<Faults>().report(error.to_string());
-        CutEpisodes::default()
+        CutEpisodes::new(Vec::new(), &kind)
     });
     let mut final_values = vec![0.0; entities.len()];
     for (&row, &value) in cut.agents.iter().zip(&cut.values) {
         final_values[row] = value;
     }
-    let mut rows = Rows::new(&policy);
+    let mut rows = Rows::new(&policy, &kind, entities.len());
     for &entity in &entities {
         let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
             continue;
         };
-        rows.obs.extend_from_slice(&observation.vector);
+        observation.push_to(&mut rows.obs);
         rows.z.extend_from_slice(&skill.z);
         if let Err(error) = rows.actions.push(&action.0) {
             return world.resource_mut::<Faults>().report(error.to_string());
@@ -238,50 +242,64 @@ fn collect_tick(world: &mut World) {
         rows.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
         log.note(episode, &action.0);
     }
-    let rollout = &mut collecting.rollout;
-    if let Err(error) = rollout.push_step(rows.as_step(&final_values)) {
+    if let Err(error) = push_tick(&mut collecting.rollout, &rows, &final_values, &cut) {
         world.resource_mut::<Faults>().report(error.to_string());
-    }
-    let (obs_dim, latent) = (rollout.obs_dim, rollout.latent);
-    for (i, &row) in cut.agents.iter().enumerate() {
-        let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
-        rollout.push_cut(row, &cut.obs[i * obs_dim..(i + 1) * obs_dim], z);
     }
     world.insert_resource(collecting);
 }
 
+fn push_tick(rollout: &mut Rollout, rows: &Rows, final_values: &[f32], cut: &CutEpisodes) -> Result<(), LearnError> {
+    rollout.push_step(rows.as_step(final_values))?;
+    let (width, latent) = (rollout.obs_kind.numbers(), rollout.latent);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
+        rollout.push_cut(row, cut.obs.row(i, width), z)?;
+    }
+    Ok(())
+}
+
 /// The last states of the episodes that ran out of time in one tick.
-#[derive(Default)]
 struct CutEpisodes {
     agents: Vec<usize>,
-    obs: Vec<f32>,
+    obs: Observations,
     z: Vec<f32>,
     values: Vec<f32>,
+}
+
+impl CutEpisodes {
+    fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
+        Self { agents, obs: Observations::empty(kind), z: Vec::new(), values: Vec::new() }
+    }
 }
 
 /// The last state of each episode that ran out of time in this tick, with its value.
 ///
 /// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
 /// episode.
-fn cut_episodes(world: &mut World, entities: &[Entity], policy: &Policy) -> Result<CutEpisodes, LearnError> {
+fn cut_episodes(
+    world: &mut World,
+    entities: &[Entity],
+    policy: &Policy,
+    kind: &ObsKind,
+) -> Result<CutEpisodes, LearnError> {
     let agents: Vec<_> = (0..entities.len())
         .filter(|&row| {
             world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
         })
         .collect();
-    let mut cut = CutEpisodes { agents, ..CutEpisodes::default() };
+    let mut cut = CutEpisodes::new(agents, kind);
     if cut.agents.is_empty() {
         return Ok(cut);
     }
     let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
     world.run_schedule(ObserveSchedule);
-    for &row in &cut.agents {
-        let from = cut.obs.len();
+    for (i, &row) in cut.agents.iter().enumerate() {
         let skill_from = cut.z.len();
         push_state(world, entities[row], &mut cut.z, &mut cut.obs);
         let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
         if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
-            let mean = prior.prior.sample(&cut.obs[from..], 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
+            let last = cut.obs.row(i, kind.numbers());
+            let mean = prior.prior.sample(last, 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
             cut.z.truncate(skill_from);
             cut.z.extend(mean);
         }

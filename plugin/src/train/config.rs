@@ -9,7 +9,10 @@ use thiserror::Error;
 pub use super::algorithm::Algorithm;
 use super::checkpoint::CheckpointConfig;
 pub use crate::vision::ObservationKind;
-use crate::{split::LevelSplit, vision::ImageOptions};
+use crate::{
+    split::LevelSplit,
+    vision::{ImageOptions, Sight},
+};
 
 /// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
 /// defaults.
@@ -37,6 +40,10 @@ pub struct Experiment {
     pub test: LevelSplit,
     /// File or folder of demonstrations.
     pub demos: PathBuf,
+    /// Learn skills from at most so many recorded steps: whole episodes, spread evenly over the recordings. From all of
+    /// them if none is named.
+    #[serde(default)]
+    pub demo_steps: Option<u64>,
     /// Seed of everything random.
     #[serde(default = "one")]
     pub seed: u64,
@@ -178,6 +185,9 @@ impl Experiment {
         if self.steps == 0 {
             return refuse("steps", 0, "train for at least one step");
         }
+        if self.demo_steps == Some(0) {
+            return refuse("demo_steps", 0, "skills are learned from at least one step; `None` takes all");
+        }
         if self.eval.episodes_per_level == 0 {
             return refuse("eval.episodes_per_level", 0, "a verdict needs at least one episode");
         }
@@ -191,6 +201,7 @@ impl Experiment {
             return refuse("study.threshold", self.study.threshold, "a success rate lies in 0..1");
         }
         let settings = |error: playbot_learner::LearnError| ExperimentError::Settings(error.to_string());
+        self.image.check().map_err(|error| ExperimentError::Settings(format!("image: {error}")))?;
         self.skills.validate().map_err(settings)?;
         self.score.validate().map_err(settings)?;
         self.sac.validate().map_err(settings)?;
@@ -214,6 +225,11 @@ impl Experiment {
             return refuse("ppo.minibatches", minibatches, why);
         }
         Ok(())
+    }
+
+    /// What agents see.
+    pub fn sight(&self) -> Sight {
+        Sight { kind: self.observation, image: self.image }
     }
 
     /// The experiment of a single run: without what only a study reads.

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use playbot_learner::{
-    DeviceKind, FileError, LearnError, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SacMetrics, SkillModel,
-    SkillSource, UpdateMetrics,
+    DeviceKind, FileError, LearnError, ObsSlice, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SacMetrics,
+    SkillModel, SkillSource, UpdateMetrics,
 };
 
 use super::{algorithm::Algorithm, config::Experiment, trainer::TrainError};
-use crate::game::Game;
+use crate::{game::Game, vision::Sight};
 
 /// A learner of either family.
 #[derive(Debug)]
@@ -55,8 +55,8 @@ impl Learner {
             return Err(TrainError::NotTrained(algorithm));
         }
         let (seed, score) = (experiment.seed, experiment.score.clone());
-        let spec = PolicySpec { obs_dim: game.observation().len(), latent: 0, action_space: game.actions() };
-        let skills = if algorithm.needs_skills() { Some(fitting(game, algorithm, skills)?) } else { None };
+        let spec = PolicySpec { obs: experiment.sight().obs_kind(game), latent: 0, action_space: game.actions() };
+        let skills = if algorithm.needs_skills() { Some(fitting(game, experiment, skills)?) } else { None };
         let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
         if algorithm.is_sac() {
             warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
@@ -110,7 +110,7 @@ impl Learner {
     /// # Errors
     ///
     /// [`LearnError::InitialKl`] if the policy should still be a copy of the decoder and is not.
-    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
+    pub fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         match self {
             Self::Ppo(learner) => learner.initial_kl(z, obs, n),
             Self::Sac(learner) => learner.initial_kl(z, obs, n),
@@ -153,7 +153,7 @@ impl Learner {
 fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize) {
     const GIB: f64 = (1u64 << 30) as f64;
     let transitions = (experiment.sac.buffer as u64).min(experiment.steps);
-    let numbers = 2 * (spec.obs_dim + latent) + spec.action_space.dim() + 2;
+    let numbers = 2 * (spec.obs.numbers() + latent) + spec.action_space.dim() + 2;
     let size = transitions as f64 * (4 * numbers) as f64 / GIB;
     if size > 1.0 {
         tracing::warn!(
@@ -167,17 +167,21 @@ fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize
 /// The skill model, if it is there and was learned for this game.
 fn fitting<'a>(
     game: &dyn Game,
-    algorithm: Algorithm,
+    experiment: &Experiment,
     skills: Option<&'a SkillModel>,
 ) -> Result<&'a SkillModel, TrainError> {
-    let skills = skills.ok_or(TrainError::NoSkills(algorithm))?;
-    let (obs_dim, action_space) = (game.observation().len(), game.actions());
-    if (skills.obs_dim(), skills.action_space()) != (obs_dim, action_space) {
+    let skills = skills.ok_or(TrainError::NoSkills(experiment.algorithm))?;
+    let (model, sight) = (Sight::from_card(skills.picture(), &skills.observation())?, experiment.sight());
+    if model.is_image() != sight.is_image() || (sight.is_image() && model != sight) {
+        return Err(TrainError::SkillSight { model, experiment: sight });
+    }
+    let (observation, action_space) = (sight.obs_kind(game), game.actions());
+    if (skills.observation(), skills.action_space()) != (observation, action_space) {
         return Err(TrainError::ForeignSkills {
             game: game.name().to_owned(),
-            model_obs: skills.obs_dim(),
+            model_obs: skills.observation(),
             model_actions: skills.action_space(),
-            game_obs: obs_dim,
+            game_obs: observation,
             game_actions: action_space,
         });
     }

@@ -72,7 +72,13 @@ impl StudyRun {
     /// The path of the demonstrations is not Unicode.
     pub fn skill_file(&self) -> Result<String, ron::Error> {
         let run = &self.experiment;
-        let settings = ron::to_string(&(&run.game, run.observation, &run.demos, &run.skills))?;
+        let mut settings = ron::to_string(&(&run.game, run.observation, &run.demos, &run.skills))?;
+        if run.sight().is_image() {
+            settings += &ron::to_string(&run.image)?;
+        }
+        if let Some(steps) = run.demo_steps {
+            settings += &ron::to_string(&steps)?;
+        }
         Ok(format!("skills-{:08x}-seed{}.safetensors", crc32fast::hash(settings.as_bytes()), run.seed))
     }
 }

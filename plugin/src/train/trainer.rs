@@ -20,7 +20,9 @@ use crate::{
     episode::EpisodeEnded,
     fault::Fault,
     game::{Game, UnknownName, check_mode},
+    policy::in_words,
     skill_prior::SkillPrior,
+    vision::{Sight, UnknownSight, VisionError},
 };
 
 /// Episodes over which the current return, length and success rate are averaged.
@@ -38,6 +40,9 @@ pub enum TrainError {
     /// The game has no such mode.
     #[error(transparent)]
     Mode(#[from] UnknownName),
+    /// The game cannot be seen this way.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
     /// The algorithm needs a skill model.
     #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
     NoSkills(Algorithm),
@@ -46,21 +51,35 @@ pub enum TrainError {
     NotTrained(Algorithm),
     /// The skill model was learned for another game.
     #[error(
-        "the skill model was learned for {model_obs} observation values and {model_actions:?}, but `{game}` has \
-         {game_obs} and {game_actions:?}: learn one from demonstrations of this game"
+        "the skill model was learned for {} and {model_actions:?}, but `{game}` has {} and {game_actions:?}: learn one \
+         from demonstrations of this game", in_words(.model_obs), in_words(.game_obs)
     )]
     ForeignSkills {
         /// The game.
         game: String,
-        /// Observation values of the model.
-        model_obs: usize,
+        /// Observation of the model.
+        model_obs: playbot_learner::ObsKind,
         /// Actions of the model.
         model_actions: playbot_learner::ActionSpace,
-        /// Observation values of the game.
-        game_obs: usize,
+        /// Observation of the game.
+        game_obs: playbot_learner::ObsKind,
         /// Actions of the game.
         game_actions: playbot_learner::ActionSpace,
     },
+    /// The skill model was learned from other pictures, or from vectors.
+    #[error(
+        "the skill model was learned from {model}, but `observation` and `image` of the experiment say {experiment}: \
+         learn skills with this experiment, `playbot learn-skills`, or change it to what the model has seen"
+    )]
+    SkillSight {
+        /// What the model has seen.
+        model: Sight,
+        /// What agents see in the experiment.
+        experiment: Sight,
+    },
+    /// The file of the skill model says of its pictures what this version does not know.
+    #[error(transparent)]
+    UnknownSight(#[from] UnknownSight),
     /// The game broke its contract.
     #[error(transparent)]
     Fault(#[from] Fault),
@@ -172,10 +191,12 @@ impl Trainer {
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         let share = experiment.arenas / experiment.worlds;
-        let collectors = (0..experiment.worlds)
-            .map(|world| Collector::new(game, &experiment.train, experiment.seed, world * share, share, prior.clone()))
+        let (levels, sight, seed) = (&experiment.train, experiment.sight(), experiment.seed);
+        let collectors: Result<_, _> = (0..experiment.worlds)
+            .map(|world| Collector::new(game, levels, &sight, seed, world * share, share, prior.clone()))
             .collect();
-        Ok(Self { experiment: experiment.clone(), threads, learner, collectors, progress: Progress::default() })
+        let (experiment, collectors) = (experiment.clone(), collectors?);
+        Ok(Self { experiment, threads, learner, collectors, progress: Progress::default() })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -194,7 +215,7 @@ impl Trainer {
             rollouts.push(rollout);
             finished.extend(ended);
         }
-        let rollout = Rollout::join(&rollouts)?;
+        let rollout = Rollout::join(rollouts)?;
         let collect_s = start.elapsed().as_secs_f64();
         let initial_kl = self.initial_kl(&rollout)?;
         let learner = self.learner.update(&rollout)?;
@@ -212,7 +233,7 @@ impl Trainer {
             return Ok(None);
         }
         let rows = INITIAL_KL_ROWS.min(rollout.steps * rollout.envs);
-        let (z, obs) = (&rollout.z[..rows * rollout.latent], &rollout.obs[..rows * rollout.obs_dim]);
+        let (z, obs) = (&rollout.z[..rows * rollout.latent], rollout.obs.rows(0..rows, rollout.obs_kind.numbers()));
         self.learner.initial_kl(z, obs, rows)
     }
 
@@ -257,7 +278,7 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     experiment.check()?;
     check_mode(game, &experiment.train.mode)?;
     check_mode(game, &experiment.test.mode)?;
-    Ok(())
+    Ok(experiment.sight().check(game)?)
 }
 
 impl Progress {

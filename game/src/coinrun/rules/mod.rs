@@ -15,6 +15,7 @@ mod touch;
 pub use body::Body;
 pub use constants::*;
 pub use enemy::patrol;
+pub(in crate::coinrun) use player::directions;
 pub use player::{PlayerState, PlayerStep, begin_step, is_supported, move_player};
 pub use state_hash::hash_state;
 pub use touch::{Outcome, touch};

@@ -51,7 +51,7 @@ impl PlayerStep {
 ///
 /// Actions 0 to 8 are `3 * (horizontal + 1) + (vertical + 1)`; the others do nothing in CoinRun.
 #[inline]
-fn directions(action: u8) -> (i8, i8) {
+pub(in crate::coinrun) fn directions(action: u8) -> (i8, i8) {
     debug_assert!(action < ACTIONS);
     match action {
         0..9 => (action as i8 / 3 - 1, action as i8 % 3 - 1),

@@ -100,6 +100,18 @@ impl ImageNet {
         }
     }
 
+    /// Architecture and sizes.
+    pub fn kind(&self) -> CnnKind {
+        let feature = self.features();
+        match self {
+            Self::Impala(net) => {
+                let channels = net.stages.iter().map(|stage| stage.conv.weight.dims()[0]).collect();
+                CnnKind::Impala { channels, feature }
+            }
+            Self::Nature(_) => CnnKind::Nature { feature },
+        }
+    }
+
     /// Numbers that an image becomes.
     pub fn features(&self) -> usize {
         let [_, features] = self.fc().weight.dims();

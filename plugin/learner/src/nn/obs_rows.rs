@@ -33,8 +33,13 @@ impl ObsRows {
     /// # Panics
     /// If the number of pixels is not that of the shape.
     pub fn pixels(pixels: Vec<u8>, shape: [usize; 4], device: &Device) -> Self {
+        Self::Image(Self::scaled(pixels, shape, device))
+    }
+
+    /// The tensor of [`Self::pixels`].
+    pub(crate) fn scaled(pixels: Vec<u8>, shape: [usize; 4], device: &Device) -> Tensor<4> {
         let bytes: Tensor<4, Int> = Tensor::from_data(TensorData::new(pixels, shape), (device, DType::U8));
-        Self::Image(bytes.float() / 255.0)
+        bytes.float() / 255.0
     }
 
     /// Number of observations.

@@ -1,5 +1,6 @@
 //! The network that gives a distribution over actions.
 
+use super::NetInput;
 use crate::nn::{
     Activation, Dist, ImageNet, Linear, Mlp, ObsRows, ParamVisitor, Parameters, bounded_log_std, path, vector,
 };
@@ -109,6 +110,11 @@ impl Actor {
         Self { cnn: Some(cnn), ..self }
     }
 
+    /// Width of the observation behind a skill of width `latent`: the numbers of a vector, or the features of an image.
+    pub(crate) fn obs_dim(&self, latent: usize) -> usize {
+        self.net.inputs() - latent
+    }
+
     /// Whether its actions are the tanh of the normal numbers whose distribution [`Self::forward`] gives.
     pub fn is_squashed(&self) -> bool {
         matches!(self.log_std, LogStd::Squashed { .. })
@@ -125,6 +131,22 @@ impl Actor {
             (None, ObsRows::Image(_)) => Err(LearnError::Config("a network for vectors got images".to_owned())),
             (Some(_), ObsRows::Vector(_)) => Err(LearnError::Config("a network for images got vectors".to_owned())),
         }
+    }
+
+    /// The rows `[z, s]`, `[n, latent + obs_dim]`, that the layers of actor and critic read: images become features first.
+    ///
+    /// # Errors
+    /// As [`Self::observe`].
+    pub fn join(&self, input: &NetInput) -> Result<Tensor<2>, LearnError> {
+        let (z, pixels) = match input {
+            NetInput::Joined(x) => return self.observe(&ObsRows::Vector(x.clone())),
+            NetInput::Images { z, pixels } => (z, pixels),
+        };
+        let features = self.observe(&ObsRows::Image(pixels.clone()))?;
+        Ok(match z {
+            None => features,
+            Some(z) => Tensor::cat(vec![z.clone(), features], 1),
+        })
     }
 
     /// The distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is what [`Self::observe`] gives.

@@ -5,7 +5,8 @@ use crate::nn::{Mlp, ParamVisitor, Parameters};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
-/// V(s, z): the actor's input and hidden layers, one output.
+/// V(s, z): the actor's input and hidden layers, one output. Of images it reads the features that the actor's trunk makes,
+/// which both teach.
 #[derive(Clone, Debug)]
 pub struct Critic {
     /// Hidden layers and the head.

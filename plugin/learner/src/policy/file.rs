@@ -5,12 +5,14 @@ use super::shape::{PolicyShape, SkillsShape};
 use crate::file::TensorFile;
 use crate::norm::ObsStats;
 use crate::skill::{Prior, SkillDraw};
-use crate::{DeviceKind, FileError, LearnError};
+use crate::{DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 const KIND: &str = "policy";
 const VERSION: u32 = 1;
+/// The examples' observations.
+const OBSERVATIONS: &str = "examples.obs";
 
 /// How far an example may be from what it was, absolutely and relatively: other processors round otherwise.
 const TOLERANCE: f32 = 1e-3;
@@ -23,8 +25,11 @@ pub struct PolicyCard {
     pub game: String,
     /// Version of the game's rules.
     pub game_version: u32,
-    /// Names of the observation's values, in order.
+    /// Names of the observation's values, in order; none for images.
     pub observations: Vec<String>,
+    /// How the images that it observes are made; `None` for vectors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub picture: Option<PictureCard>,
     /// Names of the discrete choices or of the action vector's dimensions; may be empty.
     pub actions: Vec<String>,
     /// Name of the algorithm.
@@ -33,6 +38,40 @@ pub struct PolicyCard {
     pub training: String,
     /// Version and revision of the code that wrote the file.
     pub code: String,
+}
+
+/// How the images that a policy or a skill model observes are made: images of one shape can still show other things.
+/// Their size is that of [`Policy::observation`], and the network that reads them is [`Policy::cnn`].
+#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
+#[serde(deny_unknown_fields)]
+pub struct PictureCard {
+    /// Name of the sensor that made them.
+    pub sensor: String,
+    /// How many successive pictures make an image, oldest first.
+    pub stack: usize,
+    /// One channel of brightness instead of red, green and blue.
+    pub grayscale: bool,
+    /// Whether the agent's velocity is painted into them.
+    pub paint_velocity: bool,
+}
+
+impl PictureCard {
+    /// Channels of an image.
+    pub fn channels(&self) -> usize {
+        self.stack * if self.grayscale { 1 } else { 3 }
+    }
+
+    /// `Ok` if a policy of `observation` can have this on its card.
+    pub(crate) fn check(&self, observation: ObsKind) -> Result<(), LearnError> {
+        match observation {
+            ObsKind::Image(image) if image.channels == self.channels() => Ok(()),
+            _ => Err(LearnError::Config(format!(
+                "the card tells of {} pictures with {} channels together, but the policy observes {observation}",
+                self.stack,
+                self.channels()
+            ))),
+        }
+    }
 }
 
 /// Where a policy's skills come from, and the decoder it is tied to.
@@ -74,23 +113,26 @@ struct Header {
 }
 
 impl PolicyFile {
-    /// Writes the file, in one step. `obs` (`n * obs_dim`, raw) and `z` (`n * latent`) are the rows by which readers check
+    /// Writes the file, in one step. `obs` (`n`, raw) and `z` (`n * latent`) are the rows by which readers check
     /// themselves; a few that the policy meets in play are enough.
     ///
     /// # Errors
     /// [`FileError::Learner`] if the rows do not fit the policy, [`FileError::Io`] if the file cannot be written.
-    pub fn save(&self, path: &Path, obs: &[f32], z: &[f32], n: usize) -> Result<(), FileError> {
-        let policy = &self.policy;
+    pub fn save<'a>(&self, path: &Path, obs: impl Into<ObsSlice<'a>>, z: &[f32], n: usize) -> Result<(), FileError> {
+        let (policy, obs) = (&self.policy, obs.into());
         let learner = |source| FileError::Learner { path: path.to_owned(), source };
         if n == 0 {
             let text = "a policy file needs at least one row by which its readers check themselves";
             return Err(learner(LearnError::Config(text.to_owned())));
         }
+        if let Some(picture) = &self.card.picture {
+            picture.check(policy.observation()).map_err(learner)?;
+        }
         let header = Header {
             kind: KIND.to_owned(),
             version: VERSION,
             card: self.card.clone(),
-            policy: PolicyShape::of(policy).map_err(learner)?,
+            policy: PolicyShape::of(policy),
             skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
             examples: n,
         };
@@ -110,7 +152,11 @@ impl PolicyFile {
                 file.put_network("prior", net)?;
             }
         }
-        file.put("examples.obs", &[n, policy.obs_dim()], obs);
+        let shape = [n, policy.obs_dim()];
+        match obs {
+            ObsSlice::Vector(values) => file.put(OBSERVATIONS, &shape, values),
+            ObsSlice::Image(pixels) => file.put_bytes(OBSERVATIONS, &shape, pixels),
+        }
         file.put("examples.z", &[n, policy.latent], if policy.latent == 0 { &[] } else { z });
         for (name, width, values) in examples {
             file.put(&format!("examples.{name}"), &[n, width], &values);
@@ -145,8 +191,12 @@ impl PolicyFile {
         if header.examples == 0 {
             return Err(file.format("holds no examples by which it could be checked".to_owned()));
         }
+        let observation = shape.observation();
+        if let Some(picture) = &header.card.picture {
+            picture.check(observation).map_err(|e| file.learner(e))?;
+        }
         let plain = device.plain();
-        let (mut actor, mut critic) = shape.build(device);
+        let (mut actor, mut critic) = shape.build(device).map_err(|e| file.learner(e))?;
         file.take_network("actor", &mut actor, &plain)?;
         if let Some(critic) = &mut critic {
             file.take_network("critic", critic, &plain)?;
@@ -159,11 +209,11 @@ impl PolicyFile {
                 inv_std: file.take_f64("obs_norm.inv_std", Some(net.obs_dim))?,
             }),
         };
-        let widths = (net.obs_dim, net.latent);
+        let widths = (observation, net.latent);
         let policy = Policy::new(&actor, critic.as_ref(), stats, shape.action_space, widths, plain);
         let skills = match header.skills {
             None => None,
-            Some(skills) => Some(skills.take(&mut file, shape.action_space, device)?),
+            Some(skills) => Some(skills.take(&mut file, &shape, device)?),
         };
         let read = Self { card: header.card, policy, skills };
         read.prove(&mut file, header.examples)?;
@@ -173,9 +223,13 @@ impl PolicyFile {
 
     /// Compares what the policy says of the stored examples with what is stored.
     fn prove(&self, file: &mut TensorFile, n: usize) -> Result<(), FileError> {
-        let obs = file.take("examples.obs", &[n, self.policy.obs_dim()])?;
+        let shape = [n, self.policy.obs_dim()];
+        let obs = match self.policy.observation() {
+            ObsKind::Vector(_) => Observations::Vector(file.take(OBSERVATIONS, &shape)?),
+            ObsKind::Image(_) => Observations::Image(file.take_bytes(OBSERVATIONS, &shape)?),
+        };
         let z = file.take("examples.z", &[n, self.policy.latent])?;
-        let examples = self.examples(&obs, &z, n).map_err(|source| file.learner(source))?;
+        let examples = self.examples(obs.as_slice(), &z, n).map_err(|source| file.learner(source))?;
         for (what, width, found) in examples {
             let expected = file.take(&format!("examples.{what}"), &[n, width])?;
             let same = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= TOLERANCE * (1.0 + a.abs());
@@ -193,7 +247,12 @@ impl PolicyFile {
     }
 
     /// What the policy says of `n` rows: name, numbers per row, numbers.
-    fn examples(&self, obs: &[f32], z: &[f32], n: usize) -> Result<Vec<(&'static str, usize, Vec<f32>)>, LearnError> {
+    fn examples(
+        &self,
+        obs: ObsSlice<'_>,
+        z: &[f32],
+        n: usize,
+    ) -> Result<Vec<(&'static str, usize, Vec<f32>)>, LearnError> {
         let output = self.policy.forward(z, obs, n)?;
         let dim = self.policy.space.dim();
         let std_width = if output.log_std.is_empty() { 0 } else { dim };

@@ -1,6 +1,66 @@
-//! Joining skills and observations into network inputs, on the host.
+//! Joining skills and observations into what networks read.
 
+use crate::nn::{ObsRows, matrix};
 use crate::norm::ObsStats;
+use crate::{ObsKind, ObsSlice};
+use burn::tensor::{Device, Tensor};
+
+/// What actor and critic read of many states, on a device.
+#[derive(Clone, Debug)]
+pub enum NetInput {
+    /// Skills joined with vectors: `[z, s]`, `[n, latent + obs_dim]`.
+    Joined(Tensor<2>),
+    /// Images, which the actor's trunk makes features of before the skills join them.
+    Images {
+        /// Skills, `[n, latent]`, for networks that read any.
+        z: Option<Tensor<2>>,
+        /// Pixels in 0..1, `[n, channels, height, width]`.
+        pixels: Tensor<4>,
+    },
+}
+
+impl From<Tensor<2>> for NetInput {
+    fn from(joined: Tensor<2>) -> Self {
+        Self::Joined(joined)
+    }
+}
+
+/// Skills and raw observations of many states in host memory, and how a network reads them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HostStates<'a> {
+    /// `n * latent`.
+    pub(crate) z: &'a [f32],
+    /// How many of a skill's numbers the network reads: all or none.
+    pub(crate) latent: usize,
+    /// `n` observations of `kind`.
+    pub(crate) obs: ObsSlice<'a>,
+    pub(crate) kind: &'a ObsKind,
+    /// Normalises vectors, if given.
+    pub(crate) stats: Option<&'a ObsStats>,
+}
+
+impl HostStates<'_> {
+    /// The given rows on `device`. Of images only their own bytes go there.
+    pub(crate) fn input(&self, rows: impl ExactSizeIterator<Item = usize> + Clone, device: &Device) -> NetInput {
+        let (n, width) = (rows.len(), self.kind.numbers());
+        match (self.obs, self.kind) {
+            (ObsSlice::Image(pixels), ObsKind::Image(shape)) => {
+                let mut gathered = Vec::with_capacity(n * width);
+                rows.clone().for_each(|row| gathered.extend_from_slice(&pixels[row * width..(row + 1) * width]));
+                let skills = || matrix(joined_rows(&[], 0, self.z, self.latent, None, rows), n, self.latent, device);
+                NetInput::Images {
+                    z: (self.latent > 0).then(skills),
+                    pixels: ObsRows::scaled(gathered, [n, shape.channels, shape.height, shape.width], device),
+                }
+            }
+            (ObsSlice::Vector(values), _) => {
+                let joined = joined_rows(self.z, self.latent, values, width, self.stats, rows);
+                NetInput::Joined(matrix(joined, n, self.latent + width, device))
+            }
+            (ObsSlice::Image(_), ObsKind::Vector(_)) => unreachable!("observations are checked to be of their kind"),
+        }
+    }
+}
 
 /// Rows `[z, obs]` for the given row numbers: `latent` numbers of `z` (may be 0), then `obs_dim` of `obs`, which
 /// `stats` normalises if given.

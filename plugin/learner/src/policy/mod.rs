@@ -10,7 +10,10 @@ mod snapshot;
 
 pub use actor::{Actor, LogStd, NetShape, StdKind};
 pub use critic::Critic;
-pub use file::{PolicyCard, PolicyFile, SkillSource};
-pub(crate) use join::joined_rows;
+pub use file::{PictureCard, PolicyCard, PolicyFile, SkillSource};
+pub use join::NetInput;
+pub(crate) use join::{HostStates, joined_rows};
 pub use output::PolicyOutput;
 pub use snapshot::Policy;
+#[cfg(test)]
+pub(crate) use snapshot::VECTORS_AT_A_TIME;

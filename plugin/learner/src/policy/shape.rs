@@ -2,17 +2,20 @@
 
 use super::{Actor, Critic, LogStd, NetShape, Policy, SkillSource, StdKind};
 use crate::file::TensorFile;
-use crate::layout::{check_actor, check_mlp, joined_width};
-use crate::nn::Mlp;
+use crate::layout::{check_actor, check_cnn, check_mlp, joined_width};
+use crate::nn::{CnnKind, ImageNet, Mlp, path};
 use crate::rng::Streams;
 use crate::skill::{Prior, SkillDraw};
-use crate::{ActionSpace, DeviceKind, FileError, LearnError};
+use crate::{ActionSpace, DeviceKind, FileError, ImageShape, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PolicyShape {
     pub(super) action_space: ActionSpace,
+    /// Size of the images that it observes; `None` for vectors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    image: Option<ImageShape>,
     pub(super) actor: ActorShape,
     pub(super) critic: Option<NetShape>,
     pub(super) normalised: bool,
@@ -23,6 +26,9 @@ pub(super) struct PolicyShape {
 pub(super) struct ActorShape {
     pub(super) net: NetShape,
     std: StdShape,
+    /// The trunk that reads images; `None` for vectors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    cnn: Option<CnnKind>,
 }
 
 /// How an actor's standard deviation is made; without meaning for discrete actions.
@@ -47,32 +53,45 @@ pub(super) struct SkillsShape {
 
 impl PolicyShape {
     /// The shape of `policy`.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] if it reads images.
-    pub(super) fn of(policy: &Policy) -> Result<Self, LearnError> {
-        let obs_dim = policy.observation().vector("a policy file")?;
-        Ok(Self {
+    pub(super) fn of(policy: &Policy) -> Self {
+        let image = match policy.observation() {
+            ObsKind::Vector(_) => None,
+            ObsKind::Image(image) => Some(image),
+        };
+        let obs_dim = policy.actor.obs_dim(policy.latent);
+        Self {
             action_space: policy.space,
+            image,
             actor: ActorShape::of(&policy.actor, obs_dim),
             critic: policy.critic.as_ref().map(|critic| net_shape(&critic.net, obs_dim)),
             normalised: policy.stats.is_some(),
-        })
+        }
+    }
+
+    /// What the policy observes.
+    pub(super) fn observation(&self) -> ObsKind {
+        self.image.map_or(ObsKind::Vector(self.actor.net.obs_dim), ObsKind::Image)
     }
 
     /// `Ok` if `file` holds networks of this shape that go together.
     pub(super) fn check(&self, file: &TensorFile) -> Result<(), FileError> {
         let net = &self.actor.net;
-        self.actor.check(file, "actor", self.action_space)?;
+        self.actor.check(file, "actor", self.action_space, self.image)?;
+        if self.normalised && self.image.is_some() {
+            return Err(file.format("normalises images, whose pixels are divided by 255 instead".to_owned()));
+        }
         let Some(critic) = &self.critic else { return Ok(()) };
         same_widths(file, "critic", (critic.obs_dim, critic.latent), (net.obs_dim, net.latent))?;
         check_mlp(file, "critic", (joined_width(file, "critic", critic)?, &critic.hidden, 1))
     }
 
     /// Actor and critic of this shape, to be filled from a file.
-    pub(super) fn build(&self, device: DeviceKind) -> (Actor, Option<Critic>) {
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the convolutions.
+    pub(super) fn build(&self, device: DeviceKind) -> Result<(Actor, Option<Critic>), LearnError> {
         let critic = |net| Critic::new(net, &mut Streams::new(0).stream("", 0), &device.plain());
-        (self.actor.build(self.action_space, device), self.critic.as_ref().map(critic))
+        Ok((self.actor.build(self.action_space, self.image, device)?, self.critic.as_ref().map(critic)))
     }
 }
 
@@ -80,23 +99,17 @@ impl SkillsShape {
     /// The shape of `skills`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if they read images or are held for no time.
+    /// [`LearnError::Config`] if they are held for no time.
     pub(super) fn of(skills: &SkillSource) -> Result<Self, LearnError> {
         if skills.horizon == 0 {
             return Err(LearnError::Config(NO_HORIZON.to_owned()));
         }
-        let prior = match &skills.prior.net {
-            None => None,
-            Some((net, obs, _)) => Some(ActorShape::of(net, obs.vector("a policy file's prior")?)),
-        };
+        let decoder = &skills.decoder;
         Ok(Self {
             latent: skills.prior.latent(),
             tanh: skills.prior.tanh,
-            prior,
-            decoder: ActorShape::of(
-                &skills.decoder.actor,
-                skills.decoder.observation().vector("a policy file's decoder")?,
-            ),
+            prior: skills.prior.net.as_ref().map(|(net, ..)| ActorShape::of(net, net.obs_dim(0))),
+            decoder: ActorShape::of(&decoder.actor, decoder.actor.obs_dim(decoder.latent)),
             horizon: skills.horizon,
             draw: skills.draw,
         })
@@ -108,36 +121,36 @@ impl SkillsShape {
             return Err(file.format(NO_HORIZON.to_owned()));
         }
         let (net, latent) = (&policy.actor.net, self.latent);
-        self.decoder.check(file, "decoder", policy.action_space)?;
+        self.decoder.check(file, "decoder", policy.action_space, policy.image)?;
         let widths = |net: &NetShape| (net.obs_dim, net.latent);
-        same_widths(file, "decoder", widths(&self.decoder.net), (net.obs_dim, latent))?;
+        // Networks of images each have features of their own.
+        let obs_dim = |shape: &ActorShape| shape.cnn.as_ref().map_or(net.obs_dim, CnnKind::features);
+        same_widths(file, "decoder", widths(&self.decoder.net), (obs_dim(&self.decoder), latent))?;
         if latent == 0 || ![0, latent].contains(&net.latent) {
             return Err(file.format(format!("skills are {latent} wide, but the policy reads {}", net.latent)));
         }
         let Some(prior) = &self.prior else { return Ok(()) };
-        prior.check(file, "prior", ActionSpace::Continuous(latent))?;
-        same_widths(file, "prior", widths(&prior.net), (net.obs_dim, 0))
+        prior.check(file, "prior", ActionSpace::Continuous(latent), policy.image)?;
+        same_widths(file, "prior", widths(&prior.net), (obs_dim(prior), 0))
     }
 
     pub(super) fn take(
         self,
         file: &mut TensorFile,
-        space: ActionSpace,
+        policy: &PolicyShape,
         device: DeviceKind,
     ) -> Result<SkillSource, FileError> {
-        let plain = device.plain();
-        let mut decoder = self.decoder.build(space, device);
-        file.take_network("decoder", &mut decoder, &plain)?;
+        let (plain, space, observation) = (device.plain(), policy.action_space, policy.observation());
+        let decoder = self.decoder.take(file, "decoder", space, policy.image, device)?;
         let prior = match &self.prior {
             None => Prior::standard_normal(self.latent, self.tanh),
             Some(shape) => {
-                let mut net = shape.build(ActionSpace::Continuous(self.latent), device);
-                file.take_network("prior", &mut net, &plain)?;
-                Prior::learned(&net, shape.net.obs_dim, self.latent, self.tanh, plain.clone())
+                let space = ActionSpace::Continuous(self.latent);
+                let net = shape.take(file, "prior", space, policy.image, device)?;
+                Prior::learned(&net, observation, self.latent, self.tanh, plain.clone())
             }
         };
-        let widths = (self.decoder.net.obs_dim, self.decoder.net.latent);
-        let decoder = Policy::new(&decoder, None, None, space, widths, plain);
+        let decoder = Policy::new(&decoder, None, None, space, (observation, self.latent), plain);
         Ok(SkillSource { prior, decoder, horizon: self.horizon, draw: self.draw })
     }
 }
@@ -149,22 +162,57 @@ impl ActorShape {
             LogStd::State(_) => StdShape::State,
             LogStd::Squashed { range: (low, high), .. } => StdShape::Squashed(low, high),
         };
-        Self { net: net_shape(&actor.net, obs_dim), std }
+        Self { net: net_shape(&actor.net, obs_dim), std, cnn: actor.cnn.as_ref().map(ImageNet::kind) }
     }
 
-    /// `Ok` if `file` holds an actor of this shape, called `prefix`, that acts in `space`.
-    fn check(&self, file: &TensorFile, prefix: &str, space: ActionSpace) -> Result<(), FileError> {
+    /// `Ok` if `file` holds an actor of this shape, called `prefix`, that observes `image`s, or vectors, and acts in
+    /// `space`.
+    fn check(
+        &self,
+        file: &TensorFile,
+        prefix: &str,
+        space: ActionSpace,
+        image: Option<ImageShape>,
+    ) -> Result<(), FileError> {
+        match (&self.cnn, image) {
+            (None, None) => {}
+            (Some(cnn), Some(image)) => {
+                check_cnn(file, &path(prefix, "cnn"), cnn, image)?;
+                let widths = |obs_dim| (obs_dim, self.net.latent);
+                same_widths(file, prefix, widths(self.net.obs_dim), widths(cnn.features()))?;
+            }
+            (None, Some(_)) => return Err(file.format(format!("`{prefix}` reads vectors, but must read images"))),
+            (Some(_), None) => return Err(file.format(format!("`{prefix}` reads images, but must read vectors"))),
+        }
         check_actor(file, prefix, &self.net, space, !matches!(self.std, StdShape::Vector))
     }
 
     /// An actor of this shape, to be filled from a file.
-    fn build(&self, space: ActionSpace, device: DeviceKind) -> Actor {
+    fn build(&self, space: ActionSpace, image: Option<ImageShape>, device: DeviceKind) -> Result<Actor, LearnError> {
         let (rng, device) = (&mut Streams::new(0).stream("", 0), &device.plain());
-        match self.std {
+        let actor = match self.std {
             StdShape::Vector => Actor::new(&self.net, space, StdKind::Vector, rng, device),
             StdShape::State => Actor::new(&self.net, space, StdKind::State, rng, device),
             StdShape::Squashed(low, high) => Actor::squashed(&self.net, space, (low, high), rng, device),
-        }
+        };
+        Ok(match self.cnn.as_ref().zip(image) {
+            Some((cnn, image)) => actor.with_cnn(ImageNet::new(cnn, image, rng, device)?),
+            None => actor,
+        })
+    }
+
+    /// The actor of this shape called `prefix`, out of a file.
+    fn take(
+        &self,
+        file: &mut TensorFile,
+        prefix: &str,
+        space: ActionSpace,
+        image: Option<ImageShape>,
+        device: DeviceKind,
+    ) -> Result<Actor, FileError> {
+        let mut actor = self.build(space, image, device).map_err(|e| file.learner(e))?;
+        file.take_network(prefix, &mut actor, &device.plain())?;
+        Ok(actor)
     }
 }
 

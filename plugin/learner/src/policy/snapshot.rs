@@ -1,11 +1,16 @@
 //! A frozen policy that plays.
 
-use super::{Actor, Critic, PolicyOutput, joined_rows};
-use crate::nn::{ObsRows, frozen, host, matrix};
+use super::{Actor, Critic, HostStates, PolicyOutput};
+use crate::nn::{CnnKind, ImageNet, frozen, host};
 use crate::norm::ObsStats;
-use crate::{ActionSpace, LearnError, ObsKind, Observations};
+use crate::{ActionSpace, LearnError, ObsKind, ObsSlice};
 use burn::tensor::{Device, Tensor};
 use std::sync::Arc;
+
+/// Rows that the networks read at a time. What becomes of a row does not depend on the others.
+pub(crate) const VECTORS_AT_A_TIME: usize = 2048;
+/// Likewise; the insides of the convolutions are many times as large as an image.
+const IMAGES_AT_A_TIME: usize = 256;
 
 /// An inference snapshot of an actor and, if there is one, its critic.
 ///
@@ -23,8 +28,7 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// A snapshot of `actor` and `critic`, which must read a skill of the given width and the given observations. There
-    /// are no critics of images.
+    /// A snapshot of `actor` and `critic`, which must read a skill of the given width and the given observations.
     pub(crate) fn new(
         actor: &Actor,
         critic: Option<&Critic>,
@@ -64,103 +68,90 @@ impl Policy {
         self.observation.numbers()
     }
 
-    /// Distributions and values for `n` vectors.
+    /// The convolutions that read its images; `None` for vectors.
+    pub fn cnn(&self) -> Option<CnnKind> {
+        self.actor.cnn.as_ref().map(ImageNet::kind)
+    }
+
+    /// Distributions and values for `n` observations.
     ///
     /// `z` is `n * latent` (ignored if [`Self::latent`] is 0), `obs` is `n * obs_dim`.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::NotFinite`] if an output is NaN or infinite;
-    /// [`LearnError::Config`] if it observes images.
-    pub fn forward(&self, z: &[f32], obs: &[f32], n: usize) -> Result<PolicyOutput, LearnError> {
-        if n == 0 {
-            return Ok(self.nothing());
-        }
-        self.judge(self.inputs(z, obs, n)?, n)
-    }
-
-    /// [`Self::forward`] for `n` images, whose `pixels` are `n * obs_dim`, in the order channel, row, column.
-    ///
-    /// # Errors
-    /// As [`Self::forward`]; [`LearnError::Config`] if it observes vectors.
-    pub fn forward_images(&self, z: &[f32], pixels: &[u8], n: usize) -> Result<PolicyOutput, LearnError> {
-        if n == 0 {
-            return Ok(self.nothing());
-        }
-        let observations = Observations::Image(pixels.to_vec());
-        observations.check("images", &self.observation, n)?;
-        let images = ObsRows::new(observations, &self.observation, &self.device);
-        let mut features = self.actor.observe(&images)?;
-        if self.latent > 0 {
-            LearnError::check("skills", n * self.latent, z.len())?;
-            features = Tensor::cat(vec![matrix(z.to_vec(), n, self.latent, &self.device), features], 1);
-        }
-        if n == 1 {
-            features = features.repeat_dim(0, 2);
-        }
-        self.judge(features, n)
-    }
-
-    fn nothing(&self) -> PolicyOutput {
-        let (head, log_std, values) = Default::default();
-        self.output(head, log_std, values)
-    }
-
-    /// The first `n` rows of what actor and critic say about joined inputs.
-    fn judge(&self, x: Tensor<2>, n: usize) -> Result<PolicyOutput, LearnError> {
-        let dist = self.actor.forward(x.clone()).to_host()?;
+    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::Config`] for vectors where it observes images,
+    /// or the other way round; [`LearnError::NotFinite`] if an output is NaN or infinite.
+    pub fn forward<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<PolicyOutput, LearnError> {
+        let (mut head, mut log_std, mut values) = (Vec::new(), Vec::new(), Vec::new());
         let dim = self.space.dim();
-        let mut head = dist.head;
-        head.truncate(n * dim);
-        let mut log_std = dist.log_std.unwrap_or_default();
-        log_std.truncate(n * dim);
-        let values = match &self.critic {
-            Some(critic) => {
-                let mut values = host(critic.forward(x))?;
-                values.truncate(n);
-                values
+        self.see(z, obs.into(), n, |x, rows| {
+            let dist = self.actor.forward(x.clone()).to_host()?;
+            head.extend_from_slice(&dist.head[..rows * dim]);
+            if let Some(stds) = dist.log_std {
+                log_std.extend_from_slice(&stds[..rows * dim]);
             }
-            None => vec![0.0; n],
-        };
+            self.judge(x, rows, &mut values)
+        })?;
         for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
             // A log-probability may be -infinity without harm.
             if numbers.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
                 return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: None });
             }
         }
-        Ok(self.output(head, log_std, values))
-    }
-
-    fn output(&self, head: Vec<f32>, log_std: Vec<f32>, values: Vec<f32>) -> PolicyOutput {
-        PolicyOutput { space: self.space, squashed: self.actor.is_squashed(), head, log_std, values }
+        Ok(PolicyOutput { space: self.space, squashed: self.actor.is_squashed(), head, log_std, values })
     }
 
     /// Only the values of [`Self::forward`]; zeros if there is no critic.
     ///
     /// # Errors
     /// As [`Self::forward`].
-    pub fn values(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Vec<f32>, LearnError> {
-        let Some(critic) = self.critic.as_ref().filter(|_| n > 0) else {
+    pub fn values<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Vec<f32>, LearnError> {
+        if self.critic.is_none() {
             return Ok(vec![0.0; n]);
-        };
-        let mut values = host(critic.forward(self.inputs(z, obs, n)?))?;
-        values.truncate(n);
+        }
+        let mut values = Vec::with_capacity(n);
+        self.see(z, obs.into(), n, |x, rows| self.judge(x, rows, &mut values))?;
         Ok(values)
     }
 
-    /// The joined inputs, at least two rows: matrix libraries sum a single row in another order than the rows of a
-    /// matrix, and a lone agent shall act like one of many.
-    fn inputs(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Tensor<2>, LearnError> {
-        let obs_dim = self.observation.vector("`Policy::forward`")?;
-        LearnError::check("observations", n * obs_dim, obs.len())?;
-        if self.latent > 0 {
-            LearnError::check("skills", n * self.latent, z.len())?;
+    /// Adds the values of the first `rows` joined inputs.
+    fn judge(&self, x: Tensor<2>, rows: usize, values: &mut Vec<f32>) -> Result<(), LearnError> {
+        match &self.critic {
+            Some(critic) => values.extend_from_slice(&host(critic.forward(x))?[..rows]),
+            None => values.resize(values.len() + rows, 0.0),
         }
-        let stats = self.stats.as_deref();
-        let width = self.latent + obs_dim;
-        let mut rows = joined_rows(z, self.latent, obs, obs_dim, stats, 0..n);
-        if n == 1 {
-            rows.extend_from_within(..);
+        Ok(())
+    }
+
+    /// Shows the joined inputs of `n` states to `show`, some rows at a time, with the number of rows.
+    ///
+    /// They are at least two: matrix libraries sum a single row in another order than the rows of a matrix, and a lone
+    /// agent shall act like one of many.
+    fn see(
+        &self,
+        z: &[f32],
+        obs: ObsSlice<'_>,
+        n: usize,
+        mut show: impl FnMut(Tensor<2>, usize) -> Result<(), LearnError>,
+    ) -> Result<(), LearnError> {
+        if n == 0 {
+            return Ok(());
         }
-        Ok(matrix(rows, n.max(2), width, &self.device))
+        let (kind, latent) = (&self.observation, self.latent);
+        obs.check_size("observations", kind, n)?;
+        if latent > 0 {
+            LearnError::check("skills", n * latent, z.len())?;
+        }
+        let states = HostStates { z, latent, obs, kind, stats: self.stats.as_deref() };
+        let chunk = match kind {
+            ObsKind::Vector(_) => VECTORS_AT_A_TIME,
+            ObsKind::Image(_) => IMAGES_AT_A_TIME,
+        };
+        for start in (0..n).step_by(chunk) {
+            let rows = start..(start + chunk).min(n);
+            let len = rows.len();
+            let x = self.actor.join(&states.input(rows, &self.device))?;
+            show(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
+        }
+        Ok(())
     }
 }

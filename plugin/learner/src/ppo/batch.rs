@@ -1,12 +1,12 @@
 //! A rollout made ready for its update, and the minibatches taken from it.
 
 use super::{PpoBatch, normalize_advantages};
-use crate::nn::{ActionRows, matrix, vector};
+use crate::nn::{ActionRows, vector};
 use crate::norm::ObsStats;
-use crate::policy::joined_rows;
+use crate::policy::{HostStates, NetInput};
 use crate::score::{DecoderBatch, DecoderRows};
 use crate::{Actions, Rollout};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Device;
 
 /// Everything an update reads, one entry per row.
 #[derive(Debug)]
@@ -24,8 +24,8 @@ pub(super) struct Prepared<'a> {
 /// One minibatch on the device.
 #[derive(Clone, Debug)]
 pub struct Minibatch {
-    /// What actor and critic read, `[n, latent + obs_dim]`.
-    pub inputs: Tensor<2>,
+    /// What actor and critic read.
+    pub inputs: NetInput,
     /// Constants of the PPO loss.
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
@@ -36,21 +36,20 @@ impl Prepared<'_> {
     pub(super) fn minibatch(&self, rows: &[usize], device: &Device) -> Minibatch {
         let rollout = self.rollout;
         let pick = |values: &[f32]| -> Vec<f32> { rows.iter().map(|&r| values[r]).collect() };
-        let inputs = joined_rows(
-            &rollout.z,
-            self.latent,
-            &rollout.obs,
-            rollout.obs_dim,
-            self.stats.as_ref(),
-            rows.iter().copied(),
-        );
+        let states = HostStates {
+            z: &rollout.z,
+            latent: self.latent,
+            obs: rollout.obs.as_slice(),
+            kind: &rollout.obs_kind,
+            stats: self.stats.as_ref(),
+        };
         let mut advantages = pick(&self.advantages);
         if self.norm_adv {
             normalize_advantages(&mut advantages);
         }
         let actions: Actions = rollout.actions.gather(rows);
         Minibatch {
-            inputs: matrix(inputs, rows.len(), self.latent + rollout.obs_dim, device),
+            inputs: states.input(rows.iter().copied(), device),
             ppo: PpoBatch {
                 actions: ActionRows::new(&actions, device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

@@ -2,12 +2,12 @@
 
 use super::{PpoConfig, PpoLearner};
 use crate::file::TensorFile;
-use crate::layout::{check_actor, check_mlp, joined_width};
+use crate::layout::{check_actor, check_cnn, check_mlp, joined_width};
 use crate::nn::tracked;
 use crate::norm::{put_normalizers, take_normalizers};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::SkillDescription;
-use crate::{DeviceKind, FileError, PolicySpec};
+use crate::{DeviceKind, FileError, ObsKind, PolicySpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -68,9 +68,18 @@ impl PpoLearner {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
         let skill = FrozenSkill::described(header.score, header.skill, header.spec, &file, device)?;
-        let shape = header.spec.net_shape(&header.config.hidden, header.config.activation);
+        let copied = skill.as_ref().filter(|skill| skill.is_copied());
+        let features = match header.spec.obs {
+            ObsKind::Vector(width) => width,
+            ObsKind::Image(image) => {
+                let cnn = copied.map_or(&header.config.cnn, |skill| &skill.description.config.cnn);
+                check_cnn(&file, "actor.cnn", cnn, image)?;
+                cnn.features()
+            }
+        };
+        let shape = header.spec.net_shape(features, &header.config.hidden, header.config.activation);
         check_mlp(&file, "critic", (joined_width(&file, "critic", &shape)?, &shape.hidden, 1))?;
-        if !skill.as_ref().is_some_and(FrozenSkill::is_copied) {
+        if copied.is_none() {
             check_actor(&file, "actor", &shape, header.spec.action_space, false)?;
         }
         let mut learner =

@@ -1,6 +1,6 @@
 //! Settings of PPO.
 
-use crate::nn::Activation;
+use crate::nn::{Activation, CnnKind};
 use crate::norm::{RewardNormalizer, RewardReset};
 use crate::{LearnError, TimeLimit};
 use serde::{Deserialize, Serialize};
@@ -45,12 +45,15 @@ pub struct PpoConfig {
     pub reward_gamma: Option<f64>,
     /// When the end of an episode resets that return.
     pub reward_reset: RewardReset,
-    /// Whether actor and critic see normalised observations. Not together with a copied decoder, which reads raw ones.
+    /// Whether actor and critic see normalised observations. Not together with a copied decoder, which reads raw ones, and
+    /// not for images, whose pixels are divided by 255.
     pub norm_obs: bool,
     /// Hidden layers of actor and critic. A copied decoder brings its own.
     pub hidden: Vec<usize>,
     /// The function after each hidden layer.
     pub activation: Activation,
+    /// The convolutions over images, which actor and critic share. A copied decoder brings its own. Not used for vectors.
+    pub cnn: CnnKind,
     /// ε of Adam.
     pub adam_eps: f64,
 }
@@ -79,6 +82,7 @@ impl Default for PpoConfig {
             norm_obs: false,
             hidden: vec![200, 200],
             activation: Activation::Relu,
+            cnn: CnnKind::default(),
             adam_eps: 1e-5,
         }
     }
@@ -96,6 +100,7 @@ impl PpoConfig {
             ("minibatches", self.minibatches),
             ("epochs", self.epochs),
             ("hidden", self.hidden.iter().copied().min().unwrap_or(1)),
+            ("cnn", self.cnn.smallest()),
         ];
         if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
             return bad(format!("ppo {name} must be at least 1"));

@@ -55,7 +55,7 @@ mod tests {
     fn advantages(terminated: bool, truncated: bool, limit: TimeLimit) -> Vec<f32> {
         let rollout = Rollout {
             steps: 2,
-            obs: vec![0.0; 2],
+            obs: vec![0.0; 2].into(),
             actions: Actions::Discrete(vec![0; 2]),
             log_probs: vec![0.0; 2],
             values: vec![2.0, 4.0],

@@ -3,13 +3,14 @@
 use super::batch::Prepared;
 use super::update::{StepMetrics, gradient_step};
 use super::{PpoConfig, PpoNets, UpdateMetrics, explained_variance, gae};
-use crate::nn::{Adam, AdamConfig, tracked};
+use crate::nn::{Adam, AdamConfig, ImageNet, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
 use crate::policy::{Actor, Critic, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
 use crate::score::{DecoderRows, FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
-use crate::{DeviceKind, LearnError, PolicySpec, Rollout};
+use crate::{DeviceKind, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout};
+use burn::tensor::Device;
 
 /// Improves a policy from rollouts.
 ///
@@ -41,7 +42,7 @@ impl PpoLearner {
     /// SCORE-PPO: tied to `model`'s decoder as `score` says.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work, or a skill model of images, which PPO does not read.
+    /// [`LearnError::Config`] for settings that cannot work.
     pub fn with_skill(
         config: PpoConfig,
         score: ScoreConfig,
@@ -50,7 +51,7 @@ impl PpoLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         let skill = FrozenSkill::new(score, model);
-        Self::build(config, skill.spec()?, Some(skill), seed, device)
+        Self::build(config, skill.spec(), Some(skill), seed, device)
     }
 
     pub(super) fn build(
@@ -62,24 +63,28 @@ impl PpoLearner {
     ) -> Result<Self, LearnError> {
         config.validate()?;
         spec.validate()?;
+        if config.norm_obs && matches!(spec.obs, ObsKind::Image(_)) {
+            let text = "ppo norm_obs is for vectors: the pixels of images are divided by 255 instead";
+            return Err(LearnError::Config(text.to_owned()));
+        }
         let streams = Streams::new(seed);
-        let shape = spec.net_shape(&config.hidden, config.activation);
         let plain = device.plain();
         let copy = match &skill {
             Some(skill) => skill.copy(config.norm_obs)?,
             None => None,
         };
-        let actor = copy.unwrap_or_else(|| {
-            let mut rng = streams.stream("ppo.actor", 0);
-            Actor::new(&shape, spec.action_space, StdKind::Vector, &mut rng, &plain)
-        });
+        let actor = match copy {
+            Some(actor) => actor,
+            None => fresh_actor(&config, &spec, &streams, &plain)?,
+        };
+        let shape = spec.net_shape(actor.obs_dim(spec.latent), &config.hidden, config.activation);
         let critic = Critic::new(&shape, &mut streams.stream("ppo.critic", 0), &plain);
         let adam = AdamConfig { eps: config.adam_eps, ..AdamConfig::default() };
         Ok(Self {
             nets: tracked(&PpoNets { actor, critic }),
             adam: Adam::new(adam),
             rewards: config.norm_reward.then(|| config.reward_normalizer()),
-            observations: config.norm_obs.then(|| ObsNormalizer::new(spec.obs_dim)),
+            observations: config.norm_obs.then(|| ObsNormalizer::new(spec.obs.numbers())),
             updates: 0,
             config,
             spec,
@@ -138,7 +143,7 @@ impl PpoLearner {
     /// A snapshot of the policy that plays, with its critic.
     pub fn policy(&self) -> Policy {
         let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
-        let widths = (self.spec.obs_dim, self.spec.latent);
+        let widths = (self.spec.obs, self.spec.latent);
         let (actor, critic) = (&self.nets.actor, Some(&self.nets.critic));
         Policy::new(actor, critic, stats, self.spec.action_space, widths, self.device.plain())
     }
@@ -149,9 +154,9 @@ impl PpoLearner {
     /// # Errors
     /// [`LearnError::InitialKl`] if the policy should be a copy (no update was done, and
     /// [`ScoreConfig::init_from_decoder`]) and the divergence is not exactly 0; [`LearnError::Shape`].
-    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
+    pub fn initial_kl<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Option<f32>, LearnError> {
         let Some(skill) = &self.skill else { return Ok(None) };
-        skill.initial_kl(&self.policy(), self.updates == 0, (z, obs, n), self.device).map(Some)
+        skill.initial_kl(&self.policy(), self.updates == 0, (z, obs.into(), n), self.device).map(Some)
     }
 
     /// Trains on a rollout: epochs × minibatches gradient steps.
@@ -192,8 +197,8 @@ impl PpoLearner {
             }
         }
         self.updates += 1;
-        if let Some(normalizer) = &mut self.observations {
-            normalizer.update(&rollout.obs);
+        if let (Some(normalizer), Observations::Vector(values)) = (&mut self.observations, &rollout.obs) {
+            normalizer.update(values);
         }
         let mean = |total: f64| (total / (self.config.epochs * parts) as f64) as f32;
         let penalised = prepared.decoder.is_some();
@@ -223,4 +228,16 @@ impl PpoLearner {
         let mut rng = self.streams.stream("score.own_samples", self.updates);
         skill.rows((&rollout.z, &rollout.obs), &rollout.actions, false, &mut rng, self.device)
     }
+}
+
+/// An actor with weights of its own, and a trunk if it reads images.
+fn fresh_actor(config: &PpoConfig, spec: &PolicySpec, streams: &Streams, device: &Device) -> Result<Actor, LearnError> {
+    let features = match spec.obs {
+        ObsKind::Vector(width) => width,
+        ObsKind::Image(_) => config.cnn.features(),
+    };
+    let shape = spec.net_shape(features, &config.hidden, config.activation);
+    let actor = Actor::new(&shape, spec.action_space, StdKind::Vector, &mut streams.stream("ppo.actor", 0), device);
+    let ObsKind::Image(image) = spec.obs else { return Ok(actor) };
+    Ok(actor.with_cnn(ImageNet::new(&config.cnn, image, &mut streams.stream("ppo.actor.cnn", 0), device)?))
 }

@@ -3,7 +3,8 @@
 use crate::nn::{ParamVisitor, Parameters, path};
 use crate::policy::{Actor, Critic};
 
-/// What PPO trains: the parameters `actor.*` and `critic.*`, whose gradients are clipped together.
+/// What PPO trains: the parameters `actor.*` and `critic.*`, whose gradients are clipped together. The trunk of images,
+/// `actor.cnn.*`, is the critic's too.
 #[derive(Clone, Debug)]
 pub struct PpoNets {
     /// The policy.

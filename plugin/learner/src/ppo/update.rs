@@ -52,7 +52,7 @@ impl StepMetrics {
 ///
 /// # Errors
 /// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
-/// first loss beyond all bounds.
+/// first loss beyond all bounds; [`LearnError::Config`] if the networks do not read such observations.
 pub fn gradient_step(
     nets: &mut PpoNets,
     adam: &mut Adam,
@@ -61,8 +61,9 @@ pub fn gradient_step(
     score: Option<&ScoreConfig>,
     lr: f64,
 ) -> Result<StepMetrics, LearnError> {
-    let dist = nets.actor.forward(batch.inputs.clone());
-    let values = nets.critic.forward(batch.inputs.clone());
+    let inputs = nets.actor.join(&batch.inputs)?;
+    let dist = nets.actor.forward(inputs.clone());
+    let values = nets.critic.forward(inputs);
     let loss = ppo_loss(&dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
     let steps = adam.steps();
     let mut metrics = StepMetrics {

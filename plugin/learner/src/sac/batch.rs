@@ -38,11 +38,11 @@ impl SacLearner {
     pub(super) fn batch(&self, slots: &[usize], with_actor: bool) -> Result<SacBatch, LearnError> {
         let (buffer, device, n) = (&self.buffer, self.device.plain(), slots.len());
         let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
-        let width = self.spec.latent + self.spec.obs_dim;
+        let (latent, obs_dim) = (self.spec.latent, buffer.obs_dim);
         let inputs = |z: &[f32], obs: &[f32]| {
             let rows = slots.iter().copied();
-            let rows = joined_rows(z, self.spec.latent, obs, self.spec.obs_dim, stats.as_ref(), rows);
-            matrix(rows, n, width, &device)
+            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_ref(), rows);
+            matrix(rows, n, self.inputs(), &device)
         };
         let reward = |&slot: &usize| match &self.rewards {
             Some(normalizer) => normalizer.scale(buffer.rewards[slot]),

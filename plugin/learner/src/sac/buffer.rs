@@ -3,7 +3,7 @@
 use super::transitions::{slice, transitions};
 use crate::file::TensorFile;
 use crate::rng::below;
-use crate::{Actions, FileError, LearnError, PolicySpec, Rollout, TimeLimit};
+use crate::{ActionSpace, Actions, FileError, LearnError, Rollout, TimeLimit};
 use rand::Rng;
 
 /// The newest transitions, raw as they were played: a ring of `capacity` slots in flat memory, which grows as it fills.
@@ -28,17 +28,17 @@ pub(super) struct ReplayBuffer {
 
 impl ReplayBuffer {
     /// Empty, for rollouts whose skills are `latent` wide.
-    pub(super) fn new(capacity: usize, spec: PolicySpec, latent: usize) -> Self {
+    pub(super) fn new(capacity: usize, obs_dim: usize, latent: usize, space: &ActionSpace) -> Self {
         Self {
             capacity,
-            obs_dim: spec.obs_dim,
+            obs_dim,
             latent,
             seen: 0,
             obs: Vec::new(),
             z: Vec::new(),
             next_obs: Vec::new(),
             next_z: Vec::new(),
-            actions: Actions::empty(&spec.action_space),
+            actions: Actions::empty(space),
             rewards: Vec::new(),
             terminated: Vec::new(),
             truncated: Vec::new(),
@@ -54,9 +54,10 @@ impl ReplayBuffer {
     /// termination is stored as zeros.
     pub(super) fn push(&mut self, rollout: &Rollout) -> Result<(), LearnError> {
         let (no_obs, no_z) = (vec![0.0; self.obs_dim], vec![0.0; self.latent]);
-        for transition in transitions(rollout) {
+        let obs = rollout.obs.as_slice().vectors("SAC")?;
+        for transition in transitions(rollout)? {
             let (row, at) = (transition.row, (self.seen % self.capacity as u64) as usize);
-            write(&mut self.obs, at, slice(&rollout.obs, self.obs_dim, row));
+            write(&mut self.obs, at, slice(obs, self.obs_dim, row));
             write(&mut self.z, at, slice(&rollout.z, self.latent, row));
             write(&mut self.next_obs, at, transition.next_obs.unwrap_or(&no_obs));
             write(&mut self.next_z, at, transition.next_z.unwrap_or(&no_z));
@@ -135,8 +136,7 @@ mod tests {
     use crate::rng::Streams;
 
     fn filled(capacity: usize) -> ReplayBuffer {
-        let spec = PolicySpec { obs_dim: 1, latent: 1, action_space: ActionSpace::Discrete(3) };
-        let mut buffer = ReplayBuffer::new(capacity, spec, 1);
+        let mut buffer = ReplayBuffer::new(capacity, 1, 1, &ActionSpace::Discrete(3));
         buffer.push(&rollout()).expect("it fits");
         buffer
     }

@@ -85,8 +85,9 @@ impl SacLearner {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.description(KIND, VERSION)?;
         let skill = FrozenSkill::described(header.score, header.skill, header.spec, &file, device)?;
-        let (shape, space) =
-            (header.spec.net_shape(&header.config.hidden, header.config.activation), header.spec.action_space);
+        let obs_dim = header.spec.obs.vector("SAC").map_err(|e| file.learner(e))?;
+        let shape = header.spec.net_shape(obs_dim, &header.config.hidden, header.config.activation);
+        let space = header.spec.action_space;
         let width = joined_width(&file, "q1", &shape)?;
         let (inputs, outputs) = match space {
             ActionSpace::Discrete(choices) => (width, choices),

@@ -1,22 +1,22 @@
 //! What plays before anything was learned.
 
+use crate::ActionSpace;
 use crate::nn::{Activation, Linear, Mlp, matrix, vector};
 use crate::policy::{Actor, LogStd};
-use crate::{ActionSpace, PolicySpec};
 use burn::tensor::Device;
 
 /// σ at which the tanh of a normal number is nearly uniform: that of the logistic distribution whose tanh is exactly
 /// uniform, π/(2√3). The density in [-0.98, 0.98] lies between 0.44 and 0.62 instead of at 0.5.
 const NEARLY_UNIFORM: f64 = 0.906_899_682_117_108_9;
 
-/// A policy that ignores what it sees: uniform over choices, nearly uniform over vectors in [-1, 1].
-pub(super) fn explorer(spec: PolicySpec, device: &Device) -> Actor {
-    let (inputs, dim) = (spec.latent + spec.obs_dim, spec.action_space.dim());
+/// A policy that ignores the `inputs` numbers it sees: uniform over choices, nearly uniform over vectors in [-1, 1].
+pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Actor {
+    let dim = space.dim();
     let zeros = || Linear {
         weight: matrix(vec![0.0; inputs * dim], inputs, dim, device),
         bias: vector(vec![0.0; dim], device),
     };
-    let log_std = match spec.action_space {
+    let log_std = match space {
         ActionSpace::Discrete(_) => LogStd::None,
         ActionSpace::Continuous(_) => {
             // In the middle of the range, where the zeros lead.
@@ -36,9 +36,8 @@ mod tests {
 
     /// How 20,000 actions fall into five bins.
     fn counts(space: ActionSpace) -> [usize; 5] {
-        let spec = PolicySpec { obs_dim: 2, latent: 1, action_space: space };
         let device = DeviceKind::Flex.plain();
-        let policy = Policy::new(&explorer(spec, &device), None, None, space, (2, 1), device);
+        let policy = Policy::new(&explorer(space, 3, &device), None, None, space, (2, 1), device);
         let output = policy.forward(&[5.0], &[-3.0, 4.0], 1).expect("finite");
         let mut rng = Streams::new(1).stream("draw", 0);
         let mut counts = [0; 5];

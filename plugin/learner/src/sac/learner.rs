@@ -11,7 +11,7 @@ use crate::policy::{Actor, Policy, SkillSource};
 use crate::rng::{ChaCha8Rng, Streams};
 use crate::score::{FrozenSkill, ScoreConfig};
 use crate::skill::{Prior, SkillModel};
-use crate::{ActionSpace, DeviceKind, LearnError, PolicySpec, Rollout};
+use crate::{ActionSpace, DeviceKind, LearnError, ObsSlice, PolicySpec, Rollout};
 
 /// Improves a policy from transitions, new and old.
 ///
@@ -48,7 +48,7 @@ impl SacLearner {
     /// Plain SAC with starting weights from `seed`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for settings that cannot work, or observations that are images.
     pub fn new(config: SacConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::build(config, spec, None, seed, device)
     }
@@ -61,7 +61,7 @@ impl SacLearner {
     /// [`crate::score::unsquashed`] makes it.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for settings that cannot work, or a skill model of images.
     pub fn with_skill(
         config: SacConfig,
         score: ScoreConfig,
@@ -70,7 +70,7 @@ impl SacLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         let skill = FrozenSkill::new(score, model);
-        Self::build(config, skill.spec()?, Some(skill), seed, device)
+        Self::build(config, skill.spec(), Some(skill), seed, device)
     }
 
     pub(super) fn build(
@@ -92,7 +92,8 @@ impl SacLearner {
             return Err(LearnError::Config(text.to_owned()));
         }
         let streams = Streams::new(seed);
-        let shape = spec.net_shape(&config.hidden, config.activation);
+        let obs_dim = spec.obs.vector("SAC")?;
+        let shape = spec.net_shape(obs_dim, &config.hidden, config.activation);
         let initial = match config.entropy {
             EntropyCoef::Auto { initial, .. } => initial,
             EntropyCoef::Fixed(_) => 1.0,
@@ -103,9 +104,9 @@ impl SacLearner {
         Ok(Self {
             nets,
             optimizers: Optimizers { critics: adam(), actor: adam(), alpha: adam() },
-            buffer: ReplayBuffer::new(config.buffer, spec, latent),
+            buffer: ReplayBuffer::new(config.buffer, obs_dim, latent, &spec.action_space),
             rewards: config.norm_reward.then(|| RewardNormalizer::new(config.gamma)),
-            observations: config.norm_obs.then(|| ObsNormalizer::new(spec.obs_dim)),
+            observations: config.norm_obs.then(|| ObsNormalizer::new(obs_dim)),
             updates: 0,
             gradient_steps: 0,
             carry: 0.0,
@@ -174,14 +175,14 @@ impl SacLearner {
         let copied = self.score_config().is_some_and(|score| score.init_from_decoder);
         let warming_up = self.buffer.seen < self.config.learning_starts;
         if warming_up && self.config.random_start && !copied {
-            return self.snapshot(&explorer(self.spec, &self.device.plain()));
+            return self.snapshot(&explorer(self.spec.action_space, self.inputs(), &self.device.plain()));
         }
         self.snapshot(&self.nets.actor)
     }
 
     fn snapshot(&self, actor: &Actor) -> Policy {
         let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
-        let widths = (self.spec.obs_dim, self.spec.latent);
+        let widths = (self.spec.obs, self.spec.latent);
         Policy::new(actor, None, stats, self.spec.action_space, widths, self.device.plain())
     }
 
@@ -191,10 +192,10 @@ impl SacLearner {
     /// # Errors
     /// [`LearnError::InitialKl`] if the actor should be a copy (no gradient step was done, and
     /// [`ScoreConfig::init_from_decoder`]) and the divergence is not exactly 0; [`LearnError::Shape`].
-    pub fn initial_kl(&self, z: &[f32], obs: &[f32], n: usize) -> Result<Option<f32>, LearnError> {
+    pub fn initial_kl<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Option<f32>, LearnError> {
         let Some(skill) = &self.skill else { return Ok(None) };
         let actor = self.snapshot(&self.nets.actor);
-        skill.initial_kl(&actor, self.gradient_steps == 0, (z, obs, n), self.device).map(Some)
+        skill.initial_kl(&actor, self.gradient_steps == 0, (z, obs.into(), n), self.device).map(Some)
     }
 
     /// Takes in a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
@@ -212,7 +213,7 @@ impl SacLearner {
             normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
         }
         if let Some(normalizer) = &mut self.observations {
-            normalizer.update(&rollout.obs);
+            normalizer.update(rollout.obs.as_slice().vectors("SAC")?);
         }
         self.buffer.push(rollout)?;
         let mut sums = Sums::default();
@@ -225,6 +226,11 @@ impl SacLearner {
         let entropy_coef = if due > 0 { Some(self.alpha()? as f32) } else { None };
         let (transitions, gradient_steps) = (self.buffer.seen, self.gradient_steps);
         Ok(SacMetrics { transitions, gradient_steps, entropy_coef, ..sums.means(penalised) })
+    }
+
+    /// Width of what the actor reads.
+    pub(super) fn inputs(&self) -> usize {
+        self.spec.latent + self.buffer.obs_dim
     }
 
     /// Whole gradient steps for `rows` new transitions.

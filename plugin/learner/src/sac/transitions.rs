@@ -1,6 +1,6 @@
 //! From rollouts to transitions.
 
-use crate::{LearnError, Rollout};
+use crate::{LearnError, Observations, Rollout};
 
 /// One step of one environment: row `row` of a rollout and the state it led to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,43 +29,47 @@ pub(super) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
     if let Some(row) = listed.next() {
         return Err(LearnError::Config(format!("rollout ends: row {row} is listed but cuts no episode off")));
     }
-    for (name, expected, found) in [
-        ("rollout ends next_obs", rollout.envs * rollout.obs_dim, ends.next_obs.len()),
-        ("rollout ends next_z", rollout.envs * rollout.latent, ends.next_z.len()),
-    ] {
-        LearnError::check(name, expected, found)?;
-    }
-    Ok(())
+    ends.next_obs.as_slice().check_size("rollout ends next_obs", &rollout.obs_kind, rollout.envs)?;
+    LearnError::check("rollout ends next_z", rollout.envs * rollout.latent, ends.next_z.len())
 }
 
 /// The transitions of a checked rollout, in order of its rows.
 ///
 /// The next state is the same environment's next row; where the episode was cut off it is the episode's own last
 /// state, and behind the last row where the rollout stopped. A row with both flags terminated.
-pub(super) fn transitions(rollout: &Rollout) -> impl Iterator<Item = Transition<'_>> {
+///
+/// # Errors
+/// [`LearnError::Config`] if the observations are images.
+pub(super) fn transitions(rollout: &Rollout) -> Result<impl Iterator<Item = Transition<'_>>, LearnError> {
     let ends = &rollout.ends;
+    let width = rollout.obs_kind.numbers();
+    let (obs, cut_obs, next_obs) = (vectors(&rollout.obs)?, vectors(&ends.cut_obs)?, vectors(&ends.next_obs)?);
     let mut cut = 0;
-    (0..rollout.rows()).map(move |row| {
+    Ok((0..rollout.rows()).map(move |row| {
         let next = |obs, z, at: usize| -> (Option<&[f32]>, Option<&[f32]>) {
-            (Some(slice(obs, rollout.obs_dim, at)), Some(slice(z, rollout.latent, at)))
+            (Some(slice(obs, width, at)), Some(slice(z, rollout.latent, at)))
         };
         let following = row + rollout.envs;
         let (next_obs, next_z) = if rollout.terminated[row] {
             (None, None)
         } else if is_cut(rollout, row) {
             cut += 1;
-            next(&ends.cut_obs, &ends.cut_z, cut - 1)
+            next(cut_obs, &ends.cut_z, cut - 1)
         } else if following < rollout.rows() {
-            next(&rollout.obs, &rollout.z, following)
+            next(obs, &rollout.z, following)
         } else {
-            next(&ends.next_obs, &ends.next_z, following - rollout.rows())
+            next(next_obs, &ends.next_z, following - rollout.rows())
         };
         Transition { row, next_obs, next_z }
-    })
+    }))
 }
 
 fn is_cut(rollout: &Rollout, row: usize) -> bool {
     rollout.truncated[row] && !rollout.terminated[row]
+}
+
+fn vectors(observations: &Observations) -> Result<&[f32], LearnError> {
+    observations.as_slice().vectors("SAC")
 }
 
 /// Row `at` of a flat matrix.
@@ -85,7 +89,7 @@ pub(super) mod tests {
         let at = |rows: &[usize]| (0..6).map(|row| rows.contains(&row)).collect::<Vec<bool>>();
         Rollout {
             steps: 3,
-            obs: numbers(0.0),
+            obs: numbers(0.0).into(),
             z: numbers(10.0),
             actions: Actions::Discrete(vec![0, 1, 2, 0, 1, 2]),
             log_probs: vec![0.0; 6],
@@ -97,9 +101,9 @@ pub(super) mod tests {
             next_values: vec![0.0; 2],
             ends: EndStates {
                 cut_rows: vec![0],
-                cut_obs: vec![50.0],
+                cut_obs: vec![50.0].into(),
                 cut_z: vec![60.0],
-                next_obs: vec![70.0, 71.0],
+                next_obs: vec![70.0, 71.0].into(),
                 next_z: vec![80.0, 81.0],
             },
             ..Rollout::new(2, 1, 1, &ActionSpace::Discrete(3))
@@ -111,8 +115,10 @@ pub(super) mod tests {
         let rollout = rollout();
         rollout.check().expect("it fits");
         check_ends(&rollout).expect("it fits");
-        let next: Vec<_> =
-            transitions(&rollout).map(|t| t.next_obs.zip(t.next_z).map(|(obs, z)| (obs[0], z[0]))).collect();
+        let next: Vec<_> = transitions(&rollout)
+            .expect("vectors")
+            .map(|t| t.next_obs.zip(t.next_z).map(|(obs, z)| (obs[0], z[0])))
+            .collect();
         let expected = [
             Some((50.0, 60.0)), // cut off: not the row below, which shows the next episode
             Some((3.0, 13.0)),
@@ -122,7 +128,7 @@ pub(super) mod tests {
             Some((71.0, 81.0)),
         ];
         assert_eq!(next, expected);
-        assert!(transitions(&rollout).map(|t| t.row).eq(0..6));
+        assert!(transitions(&rollout).expect("vectors").map(|t| t.row).eq(0..6));
     }
 
     #[test]
@@ -132,11 +138,11 @@ pub(super) mod tests {
             change(&mut rollout);
             rollout.check().and_then(|()| check_ends(&rollout)).expect_err("does not fit").to_string()
         };
-        assert!(after(|r| r.ends = EndStates::default()).contains("row 0"));
+        assert!(after(|r| r.ends = EndStates::new(&r.obs_kind)).contains("row 0"));
         assert!(
             after(|r| {
                 r.ends.cut_rows.push(3);
-                r.ends.cut_obs.push(0.0);
+                r.ends.cut_obs.push(&[0.0]).expect("vectors");
                 r.ends.cut_z.push(0.0);
             })
             .contains("row 3")

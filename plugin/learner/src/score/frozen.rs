@@ -3,14 +3,11 @@
 use super::decoder::DecoderRows;
 use super::{PriorKind, ScoreConfig, decoder_kl, row_weights, unsquashed};
 use crate::file::TensorFile;
-use crate::nn::{HostDist, matrix, scalar};
-use crate::policy::{Actor, Policy, SkillSource, joined_rows};
+use crate::nn::{HostDist, scalar};
+use crate::policy::{Actor, Policy, SkillSource};
 use crate::skill::{Prior, SkillDescription, SkillModel};
-use crate::{Actions, DeviceKind, FileError, LearnError, PolicyOutput, PolicySpec};
+use crate::{Actions, DeviceKind, FileError, LearnError, ObsSlice, PolicyOutput, PolicySpec};
 use rand::Rng;
-
-/// Rows that the frozen decoder reads at a time.
-const DECODER_CHUNK: usize = 2048;
 
 /// A skill model's decoder and prior, which do not learn any more.
 #[derive(Clone, Debug)]
@@ -45,7 +42,7 @@ impl FrozenSkill {
         description.check_actors(file)?;
         let (decoder, prior) = description.actors(device).map_err(|e| file.learner(e))?;
         let skill = Self { config, description, decoder, prior };
-        let tied = skill.spec().map_err(|e| file.learner(e))?;
+        let tied = skill.spec();
         if tied != spec {
             return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));
         }
@@ -70,19 +67,12 @@ impl FrozenSkill {
     }
 
     /// What a policy tied to this skill model reads and does.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] if the skill model reads images.
-    pub(crate) fn spec(&self) -> Result<PolicySpec, LearnError> {
-        Ok(PolicySpec {
-            obs_dim: self.obs_dim()?,
+    pub(crate) fn spec(&self) -> PolicySpec {
+        PolicySpec {
+            obs: self.description.observation,
             latent: if self.config.condition { self.latent() } else { 0 },
             action_space: self.description.action_space,
-        })
-    }
-
-    fn obs_dim(&self) -> Result<usize, LearnError> {
-        self.description.observation.vector("a policy that learns from reward")
+        }
     }
 
     /// Width of a skill.
@@ -132,7 +122,7 @@ impl FrozenSkill {
         &self,
         policy: &Policy,
         untrained: bool,
-        (z, obs, n): (&[f32], &[f32], usize),
+        (z, obs, n): (&[f32], ObsSlice<'_>, usize),
         device: DeviceKind,
     ) -> Result<f32, LearnError> {
         if n == 0 {
@@ -140,18 +130,13 @@ impl FrozenSkill {
         }
         let played = policy.forward(z, obs, n)?;
         let squashed = played.squashed;
-        let space = self.description.action_space;
-        let host = |output: PolicyOutput| {
-            let log_std = (!output.log_std.is_empty()).then_some(output.log_std);
-            HostDist { dim: space.dim(), head: output.head, log_std }
-        };
-        let mut decoded = host(self.decoder_policy(device).forward(z, obs, n)?);
+        let mut decoded = host_dist(self.decoder_policy(device).forward(z, obs, n)?);
         if squashed {
             decoded = unsquashed(&decoded);
         }
         let rows: Vec<usize> = (0..n).collect();
         let dist = |host: HostDist| host.rows(&rows, &device.plain());
-        let kl = decoder_kl(&dist(decoded), &dist(host(played)), self.config.direction())?;
+        let kl = decoder_kl(&dist(decoded), &dist(host_dist(played)), self.config.direction())?;
         let kl = scalar(kl.mean())?;
         if self.config.init_from_decoder && untrained && kl != 0.0 {
             return Err(LearnError::InitialKl { kl });
@@ -161,9 +146,9 @@ impl FrozenSkill {
 
     /// The decoder's distributions and α for rows of skills `z` and raw observations `obs` in which `actions` were
     /// taken; `None` if there is no penalty. `squashed`: the policy is a squashed Gaussian.
-    pub(crate) fn rows<R: Rng + ?Sized>(
+    pub(crate) fn rows<'a, R: Rng + ?Sized>(
         &self,
-        (z, obs): (&[f32], &[f32]),
+        (z, obs): (&[f32], impl Into<ObsSlice<'a>>),
         actions: &Actions,
         squashed: bool,
         own_samples_from: &mut R,
@@ -172,34 +157,22 @@ impl FrozenSkill {
         if !self.config.kl {
             return Ok(None);
         }
-        let (n, latent, obs_dim) = (actions.len(), self.latent(), self.obs_dim()?);
-        let device = device.plain();
-        let mut dist = HostDist { dim: self.description.action_space.dim(), head: Vec::new(), log_std: None };
-        for start in (0..n).step_by(DECODER_CHUNK) {
-            let rows = start..(start + DECODER_CHUNK).min(n);
-            let len = rows.len();
-            let mut inputs = joined_rows(z, latent, obs, obs_dim, None, rows);
-            if len == 1 {
-                // As in `Policy`: a single row would be summed in another order.
-                inputs.extend_from_within(..);
-            }
-            let mut part = self.decoder.forward(matrix(inputs, len.max(2), latent + obs_dim, &device)).to_host()?;
-            part.head.truncate(len * part.dim);
-            dist.head.extend(part.head);
-            if let Some(mut stds) = part.log_std {
-                stds.truncate(len * part.dim);
-                dist.log_std.get_or_insert_default().extend(stds);
-            }
-        }
+        let dist = host_dist(self.decoder_policy(device).forward(z, obs, actions.len())?);
         let alpha = row_weights(&self.config, &dist, actions, own_samples_from)?;
         let dist = if squashed { unsquashed(&dist) } else { dist };
         Ok(Some(DecoderRows { dist, alpha }))
     }
 }
 
+fn host_dist(output: PolicyOutput) -> HostDist {
+    let log_std = (!output.log_std.is_empty()).then_some(output.log_std);
+    HostDist { dim: output.space.dim(), head: output.head, log_std }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::policy::VECTORS_AT_A_TIME;
     use crate::rng::{Streams, normal};
     use crate::skill::SkillConfig;
     use crate::{ActionSpace, ObsKind};
@@ -214,7 +187,7 @@ mod tests {
         let model = SkillModel::new(description, &nets, device);
         let skill = FrozenSkill::new(ScoreConfig::default(), &model);
         let mut rng = Streams::new(1).stream("rows", 0);
-        let n = DECODER_CHUNK + 1;
+        let n = VECTORS_AT_A_TIME + 1;
         let mut numbers = |width: usize| -> Vec<f32> { (0..n * width).map(|_| normal(&mut rng)).collect() };
         let (z, obs) = (numbers(skill.latent()), numbers(obs_dim));
         let actions = Actions::Discrete(vec![0; n]);

@@ -40,7 +40,7 @@ impl Dataset {
         }
         for (i, episode) in episodes.iter().enumerate() {
             let what = format!("observations of episode {i}");
-            episode.observations.check(&what, &observation, episode.actions.len())?;
+            episode.observations.as_slice().check(&what, &observation, episode.actions.len())?;
             space.check(&episode.actions)?;
         }
         Ok(Self { observation, space, episodes })
@@ -100,7 +100,7 @@ impl Dataset {
             for window in windows {
                 let (episode, row) = self.step_of(window, t);
                 let episode = &self.episodes[episode];
-                observations.push_row(&episode.observations, row, width);
+                observations.push(episode.observations.row(row, width))?;
                 actions.extend_rows(&episode.actions, row, row + 1)?;
             }
         }

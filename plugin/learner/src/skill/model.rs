@@ -4,7 +4,7 @@ use super::{Prior, SkillConfig, SkillNets};
 use crate::file::TensorFile;
 use crate::layout::{check_actor, check_cnn, check_mlp, check_tensor, product};
 use crate::nn::{Activation, frozen};
-use crate::policy::{Actor, NetShape, Policy, StdKind};
+use crate::policy::{Actor, NetShape, PictureCard, Policy, StdKind};
 use crate::rng::Streams;
 use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,8 @@ struct Header {
     kind: String,
     version: u32,
     skill: SkillDescription,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    picture: Option<PictureCard>,
 }
 
 const KIND: &str = "skill model";
@@ -42,11 +44,22 @@ pub struct SkillModel {
     pub(crate) description: SkillDescription,
     pub(crate) nets: SkillNets,
     pub(crate) device: DeviceKind,
+    picture: Option<PictureCard>,
 }
 
 impl SkillModel {
     pub(crate) fn new(description: SkillDescription, nets: &SkillNets, device: DeviceKind) -> Self {
-        Self { description, nets: frozen(nets), device }
+        Self { description, nets: frozen(nets), device, picture: None }
+    }
+
+    /// The model with a note on how the images that it observes are made; `None` for vectors.
+    pub fn with_picture(self, picture: Option<PictureCard>) -> Self {
+        Self { picture, ..self }
+    }
+
+    /// How the images that it observes are made, if somebody noted it.
+    pub fn picture(&self) -> Option<&PictureCard> {
+        self.picture.as_ref()
     }
 
     /// The settings it was trained with.
@@ -100,10 +113,14 @@ impl SkillModel {
     /// Writes the file, in one step: under a temporary name first.
     ///
     /// # Errors
-    /// [`FileError::Io`] if it cannot be written.
+    /// [`FileError::Io`] if it cannot be written, [`FileError::Learner`] if the note on its images is not of their shape.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
-        let skill = self.description.clone();
-        let header = Header { kind: KIND.to_owned(), version: VERSION, skill };
+        let (skill, picture) = (self.description.clone(), self.picture.clone());
+        if let Some(picture) = &picture {
+            let learner = |source| FileError::Learner { path: path.to_owned(), source };
+            picture.check(self.observation()).map_err(learner)?;
+        }
+        let header = Header { kind: KIND.to_owned(), version: VERSION, skill, picture };
         let mut file = TensorFile::new(path, &header)?;
         file.put_network("", &self.nets)?;
         file.write()
@@ -118,10 +135,13 @@ impl SkillModel {
         let header: Header = file.description(KIND, VERSION)?;
         let description = header.skill;
         description.check(&file)?;
+        if let Some(picture) = &header.picture {
+            picture.check(description.observation).map_err(|e| file.learner(e))?;
+        }
         let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut nets, &device.plain())?;
         file.finish()?;
-        Ok(Self { description, nets, device })
+        Ok(Self { description, nets, device, picture: header.picture })
     }
 }
 

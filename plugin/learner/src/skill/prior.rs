@@ -1,8 +1,8 @@
 //! p(z | s₀) in use.
 
-use crate::nn::{ObsRows, frozen};
-use crate::policy::Actor;
-use crate::{LearnError, ObsKind, Observations};
+use crate::nn::frozen;
+use crate::policy::{Actor, HostStates};
+use crate::{LearnError, ObsKind, ObsSlice};
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
@@ -41,46 +41,28 @@ impl Prior {
         Self { net: None, latent, tanh }
     }
 
+    /// What it observes; nothing if it ignores the state.
+    pub fn observation(&self) -> Option<ObsKind> {
+        self.net.as_ref().map(|(_, kind, _)| *kind)
+    }
+
     /// Width of z.
     pub fn latent(&self) -> usize {
         self.latent
     }
 
-    /// Skills for `n` raw vectors (`n * obs_dim`), as the decoder and the policy take them: `n * latent`.
+    /// Skills for `n` raw observations, as the decoder and the policy take them: `n * latent`.
     ///
     /// `normal(row)` must give the next standard normal number of that row's own generator; it is called `latent`
     /// times per row, in order of rows, and not at all for [`SkillDraw::Mean`].
     ///
     /// # Errors
-    /// [`LearnError::Shape`] for observations of the wrong length, [`LearnError::Config`] if the prior reads images;
-    /// [`LearnError::Input`] if an observation is not finite, [`LearnError::NotFinite`] if a skill is not.
-    pub fn sample(
+    /// [`LearnError::Shape`] for observations of the wrong length, [`LearnError::Config`] for vectors where the prior
+    /// reads images, or the other way round; [`LearnError::Input`] if an observation is not finite,
+    /// [`LearnError::NotFinite`] if a skill is not.
+    pub fn sample<'a>(
         &self,
-        obs: &[f32],
-        n: usize,
-        draw: SkillDraw,
-        normal: &mut dyn FnMut(usize) -> f32,
-    ) -> Result<Vec<f32>, LearnError> {
-        self.draw(|| Observations::Vector(obs.to_vec()), n, draw, normal)
-    }
-
-    /// [`Self::sample`] for `n` images, whose `pixels` are in the order channel, row, column.
-    ///
-    /// # Errors
-    /// As [`Self::sample`]; [`LearnError::Config`] if the prior reads vectors.
-    pub fn sample_images(
-        &self,
-        pixels: &[u8],
-        n: usize,
-        draw: SkillDraw,
-        normal: &mut dyn FnMut(usize) -> f32,
-    ) -> Result<Vec<f32>, LearnError> {
-        self.draw(|| Observations::Image(pixels.to_vec()), n, draw, normal)
-    }
-
-    fn draw(
-        &self,
-        observations: impl FnOnce() -> Observations,
+        obs: impl Into<ObsSlice<'a>>,
         n: usize,
         draw: SkillDraw,
         normal: &mut dyn FnMut(usize) -> f32,
@@ -92,14 +74,15 @@ impl Prior {
         let (mut z, log_std) = match &self.net {
             None => (vec![0.0; numbers], vec![0.0; numbers]),
             Some((net, kind, device)) => {
-                let observations = observations();
-                observations.check("observations of the prior", kind, n)?;
-                let mut features = net.observe(&ObsRows::new(observations, kind, device))?;
+                let obs = obs.into();
+                obs.check("observations of the prior", kind, n)?;
+                let states = HostStates { z: &[], latent: 0, obs, kind, stats: None };
+                let mut x = net.join(&states.input(0..n, device))?;
                 if n == 1 {
                     // As in `Policy`: a single row would be summed in another order.
-                    features = features.repeat_dim(0, 2);
+                    x = x.repeat_dim(0, 2);
                 }
-                let dist = net.forward(features).to_host()?;
+                let dist = net.forward(x).to_host()?;
                 (dist.head, dist.log_std.unwrap_or_default())
             }
         };

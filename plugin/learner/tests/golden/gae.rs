@@ -10,7 +10,7 @@ fn check(name: &str) {
     let rows = steps * envs;
     let rollout = Rollout {
         steps,
-        obs: vec![0.0; rows],
+        obs: vec![0.0; rows].into(),
         actions: Actions::Discrete(vec![0; rows]),
         log_probs: vec![0.0; rows],
         values: case.f32s("in.values"),

@@ -131,7 +131,7 @@ impl<'a> Update<'a> {
             DecoderBatch { dist, alpha_mean: sum / alpha.len() as f64, alpha: vector(alpha) }
         });
         Minibatch {
-            inputs,
+            inputs: inputs.into(),
             ppo: PpoBatch {
                 actions: ActionRows::new(&actions("in.actions"), &device),
                 old_log_probs: vector(pick("in.old_log_probs")),
@@ -144,7 +144,7 @@ impl<'a> Update<'a> {
     }
 
     fn old_approx_kl(&self, batch: &Minibatch) -> f64 {
-        let dist = self.nets.actor.forward(batch.inputs.clone());
+        let dist = self.nets.actor.forward(self.nets.actor.join(&batch.inputs).expect("vectors"));
         let log_probs = dist.log_prob(&batch.ppo.actions).expect("same kind").inner();
         ratio_stats(&host(log_probs - batch.ppo.old_log_probs.clone()), self.config.clip).old_approx_kl
     }

@@ -6,7 +6,7 @@ use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::{DeviceKind, PolicySpec, PpoConfig, PpoLearner, ScoreConfig};
 
 fn learners() -> Vec<PpoLearner> {
-    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
     let awkward = PpoConfig { lr: 0.1 + 0.2 - 0.297, norm_obs: true, ..config() };
     let anneal = PpoConfig { anneal_lr: true, total_updates: Some(7), norm_reward: false, ..config() };
     vec![

@@ -16,7 +16,7 @@ pub fn config() -> PpoConfig {
 }
 
 fn train(config: PpoConfig, seed: u64, device: DeviceKind) -> (f64, f64) {
-    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
     let steps = config.num_steps;
     let mut learner = PpoLearner::new(config, spec, seed, device).expect("good settings");
     let mut driver = Driver::new(8, seed);

@@ -44,7 +44,7 @@ fn two_runs_are_equal() {
 
 /// Sizes at which matrix products are split over threads and blocks.
 fn wide_policy(device: DeviceKind) -> Policy {
-    let spec = PolicySpec { obs_dim: 530, latent: 8, action_space: ActionSpace::Discrete(15) };
+    let spec = PolicySpec { obs: 530.into(), latent: 8, action_space: ActionSpace::Discrete(15) };
     PpoLearner::new(PpoConfig::default(), spec, 1, device).expect("good settings").policy()
 }
 
@@ -115,7 +115,7 @@ fn mix(hash: u64, x: &f32) -> u64 {
 #[test]
 fn updates_do_not_depend_on_the_number_of_threads() {
     same_on_any_number_of_threads("updates_do_not_depend_on_the_number_of_threads", || {
-        let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+        let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
         let config = PpoConfig { hidden: vec![256, 256], activation: Activation::Tanh, minibatches: 2, ..config() };
         let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
         let mut driver = Driver::new(64, 1);
@@ -170,7 +170,7 @@ fn sac(config: SacConfig, spec: PolicySpec, mut rollout: impl FnMut(&SacLearner)
         learner.update(&played).expect("finite");
     }
     assert!(learner.gradient_steps() > 4);
-    let output = learner.policy().forward(&[], &numbers(64 * spec.obs_dim), 64).expect("finite");
+    let output = learner.policy().forward(&[], &numbers(64 * spec.obs.numbers()), 64).expect("finite");
     output.head.iter().chain(&output.log_std).fold(0, mix)
 }
 

@@ -2,11 +2,17 @@
 
 use crate::corridor::config;
 use crate::toy::{Driver, OBS, SPACE};
-use playbot_learner::{Actions, DeviceKind, LearnError, PolicySpec, PpoConfig, PpoLearner, Rollout};
+use playbot_learner::{Actions, DeviceKind, LearnError, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout};
 
 fn learner(config: PpoConfig) -> PpoLearner {
-    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings")
+}
+
+/// The numbers of a rollout's vectors, to be changed.
+pub fn vectors(observations: &mut Observations) -> &mut [f32] {
+    let Observations::Vector(values) = observations else { panic!("the corridor is seen as vectors") };
+    values
 }
 
 fn after(change: impl Fn(&mut Rollout)) -> LearnError {
@@ -40,8 +46,8 @@ fn numbers_that_are_not_finite_are_refused_before_anything_changes() {
     let before = bytes(&learner);
     let changes: [(&str, fn(&mut Rollout)); 3] = [
         ("rollout rewards: row 3", |rollout| rollout.rewards[3] = f32::NAN),
-        ("rollout obs: row 1", |rollout| rollout.obs[OBS] = f32::INFINITY),
-        ("rollout ends next_obs: row 2", |rollout| rollout.ends.next_obs[2 * OBS] = f32::NAN),
+        ("rollout obs: row 1", |rollout| vectors(&mut rollout.obs)[OBS] = f32::INFINITY),
+        ("rollout ends next_obs: row 2", |rollout| vectors(&mut rollout.ends.next_obs)[2 * OBS] = f32::NAN),
     ];
     for (text, change) in changes {
         let mut bad = rollout.clone();
@@ -69,12 +75,12 @@ fn a_policy_checks_its_inputs() {
     assert!(matches!(policy.forward(&[], &[0.0; OBS + 1], 1), Err(LearnError::Shape { .. })));
     let error = policy.forward(&[], &[f32::NAN; OBS], 1).expect_err("not a number");
     assert_eq!(error.to_string(), "`actor output` is not finite");
-    assert!(policy.forward(&[], &[], 0).expect("nothing to do").is_empty());
+    assert!(policy.forward(&[], &[0.0; 0], 0).expect("nothing to do").is_empty());
 }
 
 #[test]
 fn settings_that_cannot_work_are_named() {
-    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
     for (name, config) in [
         ("minibatches", PpoConfig { minibatches: 0, ..config() }),
         ("gamma", PpoConfig { gamma: 1.5, ..config() }),

@@ -175,7 +175,7 @@ fn sizes_that_the_file_does_not_hold_are_refused_before_anything_is_made() {
     let ppo = [
         ("/config/hidden", json!([HUGE]), "critic.l0.weight"),
         ("/skill/config/hidden", json!([u64::MAX]), "decoder.l0.weight"),
-        ("/spec/obs_dim", json!(HUGE), "its skill model makes it"),
+        ("/spec/obs", json!(HUGE), "its skill model makes it"),
     ];
     for (at, cases) in [(0, &skill[..]), (2, &ppo[..])] {
         let (path, load, _) = &files[at];

@@ -47,7 +47,7 @@ fn median(mut counts: Vec<usize>) -> usize {
 
 #[test]
 fn score_learns_the_whole_faster_than_ppo() {
-    let spec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+    let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
     let (mut with_skills, mut without) = (Vec::new(), Vec::new());
     for seed in 1..=5 {
         let model = half_the_task(seed);

@@ -3,8 +3,8 @@
 use playbot_learner::nn::CnnKind;
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
 use playbot_learner::{
-    ActionInput, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, ObsKind, PpoConfig,
-    PpoLearner, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, WindowRule,
+    ActionInput, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, ObsKind, SacConfig,
+    SacLearner, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, WindowRule,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -85,12 +85,12 @@ fn players(model: &SkillModel) {
     let n = 40;
     let (prior, policy) = (model.prior(), model.policy());
     let start: Vec<u8> = (0..n).flat_map(|i| image(i % 2 == 0, &mut rng)).collect();
-    let z = prior.sample_images(&start, n, SkillDraw::Sample, &mut |_| normal(&mut rng)).expect("finite");
+    let z = prior.sample(&start, n, SkillDraw::Sample, &mut |_| normal(&mut rng)).expect("finite");
     let mut found = [0, 0];
     for z in z.chunks_exact(2) {
         let rights = [false, true, false, true, true, false];
         let pixels: Vec<u8> = rights.iter().flat_map(|&right| image(right, &mut rng)).collect();
-        let output = policy.forward_images(&z.repeat(rights.len()), &pixels, rights.len()).expect("finite");
+        let output = policy.forward(&z.repeat(rights.len()), &pixels, rights.len()).expect("finite");
         for (found, second) in found.iter_mut().zip([false, true]) {
             let played = |row: usize| press(second, &rights).get(row) == Some(output.greedy(row));
             *found += usize::from((0..rights.len()).all(played));
@@ -180,8 +180,8 @@ fn a_model_comes_back_from_its_file_as_it_was() {
     assert!(names(&path).contains(&"decoder.cnn.s0.conv.weight".to_owned()));
     let pixels = image(true, &mut Streams::new(1).stream("image", 0));
     let act = |model: &SkillModel| {
-        let z = model.prior().sample_images(&pixels, 1, SkillDraw::Mean, &mut |_| 0.0).expect("finite");
-        model.policy().forward_images(&z, &pixels, 1).expect("finite")
+        let z = model.prior().sample(&pixels, 1, SkillDraw::Mean, &mut |_| 0.0).expect("finite");
+        model.policy().forward(&z, &pixels, 1).expect("finite")
     };
     assert_eq!(act(&back), act(&model));
 }
@@ -210,11 +210,11 @@ fn a_row_does_not_depend_on_the_other_rows() {
         let data = Dataset::new(shape, ActionSpace::Discrete(5), vec![episode]).expect("consistent");
         let config = SkillConfig { cnn, ..config() };
         let policy = SkillTrainer::new(config, data, 1, device).expect("a window fits").into_model().policy();
-        let whole = policy.forward_images(&z, &pixels, n).expect("finite");
+        let whole = policy.forward(&z, &pixels, n).expect("finite");
         for size in [1, 2, 3, 16] {
             let rows = 5..5 + size;
             let pixels = &pixels[rows.start * shape.numbers()..rows.end * shape.numbers()];
-            let part = policy.forward_images(&z[rows.start * 2..rows.end * 2], pixels, size).expect("finite");
+            let part = policy.forward(&z[rows.start * 2..rows.end * 2], pixels, size).expect("finite");
             assert_eq!(part.head, whole.head[rows.start * 5..rows.end * 5], "{size} rows on {device}");
         }
     }
@@ -227,13 +227,14 @@ fn what_cannot_read_images_says_so() {
         assert!(matches!(error, LearnError::Config(_)), "{error}");
         assert!(error.to_string().contains(text), "{error}");
     };
-    let ppo = PpoLearner::with_skill(PpoConfig::default(), ScoreConfig::default(), &model, 1, DeviceKind::Flex);
-    config_error(ppo.expect_err("images"), "reads vectors, not images");
+    let score = ScoreConfig::default();
+    let sac = SacLearner::with_skill(SacConfig::default(), score, &model, 1, DeviceKind::Flex);
+    config_error(sac.expect_err("images"), "SAC reads vectors, not images of 1 channels");
     let (z, vector) = ([0.0; 2], vec![0.0; SHAPE.numbers()]);
-    config_error(model.policy().forward(&z, &vector, 1).expect_err("a vector"), "`Policy::forward` reads vectors");
+    config_error(model.policy().forward(&z, &vector, 1).expect_err("a vector"), "observations are vectors, not images");
     let drawn = model.prior().sample(&vector, 1, SkillDraw::Mean, &mut |_| 0.0);
-    config_error(drawn.expect_err("a vector"), "are not images");
-    let short = model.policy().forward_images(&z, &[0; 143], 1).expect_err("a pixel is missing");
+    config_error(drawn.expect_err("a vector"), "prior are vectors, not images");
+    let short = model.policy().forward(&z, &vec![0u8; 143], 1).expect_err("a pixel is missing");
     assert!(matches!(short, LearnError::Shape { expected: 144, found: 143, .. }), "{short}");
     let small = SkillConfig { cnn: CnnKind::Nature { feature: 8 }, ..config() };
     let error = SkillTrainer::new(small, demos(2), 1, DeviceKind::Flex).expect_err("too small for it");

@@ -3,13 +3,13 @@
 use crate::toy::Plays;
 use playbot_learner::rng::{ChaCha8Rng, Streams, unit};
 use playbot_learner::{
-    Action, ActionSpace, Actions, DeviceKind, EntropyCoef, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep,
-    SacConfig, SacLearner, TimeLimit,
+    Action, ActionSpace, Actions, DeviceKind, EntropyCoef, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout,
+    RolloutStep, SacConfig, SacLearner, TimeLimit,
 };
 
 pub const OBS: usize = 4;
 pub const SPACE: ActionSpace = ActionSpace::Continuous(2);
-pub const SPEC: PolicySpec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(OBS), latent: 0, action_space: SPACE };
 /// How far a full action moves the point.
 const SPEED: f32 = 0.2;
 /// How near is there.
@@ -85,7 +85,7 @@ impl Field {
             }
             let last = self.observe();
             let step = RolloutStep {
-                obs: &obs,
+                obs: (&obs).into(),
                 z: &[],
                 actions: &actions,
                 log_probs: &log_probs,
@@ -98,7 +98,7 @@ impl Field {
             rollout.push_step(step).expect("continuous");
             for row in 0..envs {
                 if truncated[row] && !terminated[row] {
-                    rollout.push_cut(row, &last[row * OBS..(row + 1) * OBS], &[]);
+                    rollout.push_cut(row, &last[row * OBS..(row + 1) * OBS], &[]).expect("vectors");
                 }
                 if truncated[row] || terminated[row] {
                     self.reached.push(terminated[row]);
@@ -108,7 +108,7 @@ impl Field {
             obs = self.observe();
         }
         rollout.next_values = policy.values(&[], &obs, envs).expect("finite");
-        rollout.ends.next_obs = obs;
+        rollout.ends.next_obs = obs.into();
         rollout
     }
 

@@ -1,13 +1,14 @@
 //! SAC: discrete actions, the numbers of an update by hand, restarts, and what goes wrong.
 
+use crate::errors::vectors;
 use crate::point::{self, Field};
 use crate::toy::{BEST, Driver, OBS, SPACE};
 use playbot_learner::{
-    ActionSpace, Actions, DeviceKind, EndStates, EntropyCoef, FileError, LearnError, PolicySpec, PpoLearner, Rollout,
-    SacConfig, SacLearner, SacMetrics, TimeLimit,
+    ActionSpace, Actions, DeviceKind, EndStates, EntropyCoef, FileError, LearnError, ObsKind, PolicySpec, PpoLearner,
+    Rollout, SacConfig, SacLearner, SacMetrics, TimeLimit,
 };
 
-pub const SPEC: PolicySpec = PolicySpec { obs_dim: OBS, latent: 0, action_space: SPACE };
+pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(OBS), latent: 0, action_space: SPACE };
 
 pub fn config() -> SacConfig {
     SacConfig {
@@ -45,7 +46,7 @@ fn step(terminated: bool, truncated: bool) -> Rollout {
     let cut = truncated && !terminated;
     Rollout {
         steps: 1,
-        obs: vec![1.0],
+        obs: vec![1.0].into(),
         actions: Actions::Discrete(vec![0]),
         log_probs: vec![0.0],
         values: vec![0.0],
@@ -56,10 +57,10 @@ fn step(terminated: bool, truncated: bool) -> Rollout {
         next_values: vec![0.0],
         ends: EndStates {
             cut_rows: if cut { vec![0] } else { Vec::new() },
-            cut_obs: if cut { vec![2.0] } else { Vec::new() },
+            cut_obs: if cut { vec![2.0] } else { Vec::new() }.into(),
             // Where the episode was cut off, the next one begins at a place whose value is huge.
-            next_obs: vec![if terminated || truncated { 1e6 } else { 2.0 }],
-            ..EndStates::default()
+            next_obs: vec![if terminated || truncated { 1e6 } else { 2.0 }].into(),
+            ..EndStates::new(&ObsKind::Vector(1))
         },
         ..Rollout::new(1, 1, 0, &ActionSpace::Discrete(1))
     }
@@ -76,7 +77,7 @@ fn errors(terminated: bool, truncated: bool, time_limit: TimeLimit) -> f64 {
         entropy: EntropyCoef::Fixed(0.0),
         ..SacConfig::default()
     };
-    let spec = PolicySpec { obs_dim: 1, latent: 0, action_space: ActionSpace::Discrete(1) };
+    let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(1) };
     let mut learner = SacLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
     let metrics = learner.update(&step(terminated, truncated)).expect("finite");
     f64::from(metrics.qf_loss.expect("a step was due"))
@@ -178,11 +179,11 @@ fn bad_rollouts_and_numbers_are_named() {
     };
     let error = after(|rollout| rollout.rewards[3] = f32::NAN);
     assert!(matches!(&error, LearnError::Input { row: 3, .. }), "{error}");
-    let error = after(|rollout| rollout.obs[4 * OBS + 1] = f32::INFINITY);
+    let error = after(|rollout| vectors(&mut rollout.obs)[4 * OBS + 1] = f32::INFINITY);
     assert!(matches!(&error, LearnError::Input { row: 4, .. }), "{error}");
-    let error = after(|rollout| rollout.ends.next_obs[OBS] = f32::NAN);
+    let error = after(|rollout| vectors(&mut rollout.ends.next_obs)[OBS] = f32::NAN);
     assert!(error.to_string().contains("next_obs: row 1"), "{error}");
-    let error = after(|rollout| rollout.ends = EndStates::default());
+    let error = after(|rollout| rollout.ends = EndStates::new(&rollout.obs_kind));
     assert!(error.to_string().contains("next_obs"), "{error}");
     let error = after(|rollout| rollout.truncated[2] = true);
     assert!(error.to_string().contains("row 2"), "{error}");

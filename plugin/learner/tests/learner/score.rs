@@ -86,7 +86,7 @@ fn aimless_rollout(learner: &PpoLearner, update: u64) -> Rollout {
     }
     Rollout {
         steps,
-        obs,
+        obs: obs.into(),
         z,
         actions,
         log_probs,

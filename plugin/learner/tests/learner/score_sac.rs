@@ -6,7 +6,8 @@ use crate::toy::{Driver, OBS};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
     Action, ActionSpace, Actions, AlphaKind, Dataset, DemoEpisode, DeviceKind, EndStates, EntropyCoef, KlDirection,
-    LearnError, PriorKind, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel, SkillTrainer,
+    LearnError, ObsKind, Observations, PriorKind, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
+    SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -37,7 +38,7 @@ fn a_discrete_actor_starts_as_the_decoder_exactly() {
 fn divergence(model: &SkillModel, score: ScoreConfig) -> f32 {
     let mut learner = learner(config(), score.clone(), model);
     let mut driver = Driver::new(8, 1);
-    let mut observed = (Vec::new(), Vec::new());
+    let mut observed = (Vec::new(), Observations::empty(&OBS.into()));
     while learner.transitions() < 1000 {
         let rollout = driver.rollout(&learner, 8);
         let metrics = learner.update(&rollout).expect("finite");
@@ -47,7 +48,7 @@ fn divergence(model: &SkillModel, score: ScoreConfig) -> f32 {
         observed = (rollout.z, rollout.obs);
     }
     let (z, obs) = observed;
-    learner.initial_kl(&z, &obs, obs.len() / OBS).expect("updated").expect("a skill model")
+    learner.initial_kl(&z, &obs, obs.numbers() / OBS).expect("updated").expect("a skill model")
 }
 
 #[test]
@@ -108,7 +109,7 @@ fn random_rollout(seed: u64, n: usize) -> Rollout {
     Rollout {
         steps: 1,
         rewards: values.chunks_exact(2).map(|a| a[0] + a[1]).collect(),
-        obs,
+        obs: obs.into(),
         z,
         actions: Actions::Continuous { dim: 2, values },
         log_probs: vec![0.0; n],
@@ -117,7 +118,11 @@ fn random_rollout(seed: u64, n: usize) -> Rollout {
         truncated: vec![false; n],
         final_values: vec![0.0; n],
         next_values: vec![0.0; n],
-        ends: EndStates { next_obs: vec![0.0; n], next_z: vec![0.0; 2 * n], ..EndStates::default() },
+        ends: EndStates {
+            next_obs: vec![0.0; n].into(),
+            next_z: vec![0.0; 2 * n],
+            ..EndStates::new(&ObsKind::Vector(1))
+        },
         ..Rollout::new(n, 1, 2, &ActionSpace::Continuous(2))
     }
 }

@@ -159,7 +159,7 @@ impl Driver {
                 }
             }
             let step = RolloutStep {
-                obs: &obs,
+                obs: (&obs).into(),
                 z: &z,
                 actions: &Actions::Discrete(actions),
                 log_probs: &log_probs,
@@ -172,14 +172,14 @@ impl Driver {
             rollout.push_step(step).expect("discrete");
             for row in (0..envs).filter(|&row| truncated[row] && !terminated[row]) {
                 let skill = &z[row * latent..(row + 1) * latent];
-                rollout.push_cut(row, &last[row * OBS..(row + 1) * OBS], skill);
+                rollout.push_cut(row, &last[row * OBS..(row + 1) * OBS], skill).expect("vectors");
             }
             obs = self.observe();
             self.draw(learner, &obs, false);
         }
         rollout.next_values = policy.values(&self.skills, &obs, envs).expect("finite");
         rollout.ends.next_z = self.skills.clone();
-        rollout.ends.next_obs = obs;
+        rollout.ends.next_obs = obs.into();
         rollout
     }
 

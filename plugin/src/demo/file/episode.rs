@@ -1,5 +1,7 @@
 //! One recorded episode in memory.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::error::EpisodeFault;
@@ -18,6 +20,18 @@ pub enum Decider {
     Replay,
     /// Nobody: the agent did nothing.
     Idle,
+}
+
+impl std::fmt::Display for Decider {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Human => "human",
+            Self::Bot => "bot",
+            Self::Policy => "policy",
+            Self::Replay => "replay",
+            Self::Idle => "idle",
+        })
+    }
 }
 
 /// How an episode ended. Termination and truncation are never merged.
@@ -100,6 +114,15 @@ impl DemoEpisode {
     /// Sum of the rewards (undiscounted return).
     pub fn episode_return(&self) -> f64 {
         self.rewards.iter().map(|&r| f64::from(r)).sum()
+    }
+
+    /// Ticks that each decider decided; those that decided none are left out.
+    pub fn steps_by_decider(&self) -> BTreeMap<Decider, usize> {
+        let mut steps = BTreeMap::new();
+        for decider in &self.deciders {
+            *steps.entry(*decider).or_default() += 1;
+        }
+        steps
     }
 
     /// Whether the episode terminated with the goal reached.

@@ -89,8 +89,8 @@ impl DemoSummary {
             }
             return_sum += episode.episode_return();
             seeds.insert(episode.level_seed);
-            for decider in &episode.deciders {
-                *summary.steps_by_decider.entry(*decider).or_default() += 1;
+            for (decider, steps) in episode.steps_by_decider() {
+                *summary.steps_by_decider.entry(decider).or_default() += steps;
             }
         }
         if summary.episodes > 0 {

@@ -1,0 +1,39 @@
+//! Opening a recording to write.
+
+use std::path::Path;
+
+use bevy_playbot::demo::file::{DemoHeader, DemoWriter};
+
+use super::error::CliError;
+
+/// What becomes of a recording that exists.
+#[derive(clap::Args, Clone, Copy, Debug, Default)]
+pub struct Existing {
+    /// Add to a recording that exists.
+    #[arg(long, conflicts_with = "force")]
+    append: bool,
+    /// Overwrite a recording that exists.
+    #[arg(long)]
+    force: bool,
+}
+
+impl Existing {
+    /// Opens the file, and makes the folder it lies in.
+    ///
+    /// # Errors
+    ///
+    /// The file exists and nobody said what to do about it, was recorded under other conditions, or cannot be written.
+    pub fn open(self, path: &Path, header: DemoHeader) -> Result<DemoWriter, CliError> {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)
+                .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
+        }
+        if self.append {
+            return Ok(DemoWriter::append(path, &header)?);
+        }
+        if self.force {
+            return Ok(DemoWriter::replace(path, header)?);
+        }
+        Ok(DemoWriter::create(path, header)?)
+    }
+}

@@ -1,0 +1,80 @@
+//! What stands under a picture: tick, action, value, and the skill as bars.
+
+use super::{
+    font,
+    screen::{Colour, Screen},
+    stage::Shot,
+};
+
+/// Space around everything, pixels.
+const MARGIN: usize = 4;
+/// Height of the bars from their middle up and down, pixels.
+const BAR: usize = 12;
+/// The number that fills a bar. Skills are about normally distributed.
+const FULL: f32 = 3.0;
+/// Letters are enlarged so many times where there is room for it.
+const ENLARGED: usize = 2;
+/// Below this width letters keep their size.
+const ROOMY: usize = 300;
+/// No picture is too narrow for its caption.
+pub const NARROWEST: usize = 160;
+
+const WORDS: Colour = [235, 235, 235];
+const FAINT: Colour = [120, 120, 130];
+const UP: Colour = [90, 190, 255];
+const DOWN: Colour = [255, 150, 80];
+
+/// Where things are in captions of a width.
+pub struct Caption {
+    letter: usize,
+    skills: usize,
+}
+
+impl Caption {
+    /// For pictures `width` pixels wide and skills of `skills` numbers.
+    pub fn new(width: usize, skills: usize) -> Self {
+        Self { letter: if width < ROOMY { 1 } else { ENLARGED }, skills }
+    }
+
+    fn line(&self) -> usize {
+        font::HEIGHT * self.letter + MARGIN
+    }
+
+    /// Pixels from top to bottom.
+    pub fn height(&self) -> usize {
+        let bars = if self.skills > 0 { 2 * BAR + 1 + MARGIN } else { 0 };
+        MARGIN + 2 * self.line() + bars
+    }
+
+    /// Draws it from row `top` on.
+    pub fn draw(&self, screen: &mut Screen, top: usize, shot: &Shot) {
+        let (letter, first) = (self.letter, top + MARGIN);
+        let tick = format!("tick {}", shot.tick);
+        font::write(screen, &tick, letter, (MARGIN, first), FAINT);
+        // The action always begins at the same place.
+        let column = MARGIN + font::width("tick 9999  ") * letter;
+        font::write(screen, &shot.action, letter, (column, first), WORDS);
+        let second = first + self.line();
+        if let Some(value) = shot.value {
+            font::write(screen, &format!("value {value:.2}"), letter, (MARGIN, second), WORDS);
+        }
+        if shot.reward != 0.0 {
+            font::write(screen, &format!("reward {}", shot.reward), letter, (column, second), UP);
+        }
+        self.bars(screen, second + self.line(), &shot.skill);
+    }
+
+    fn bars(&self, screen: &mut Screen, top: usize, skill: &[f32]) {
+        if skill.is_empty() {
+            return;
+        }
+        let (middle, room) = (top + BAR, screen.width - 2 * MARGIN);
+        screen.block(MARGIN, middle, room, 1, FAINT);
+        let step = room / skill.len();
+        for (number, z) in skill.iter().enumerate() {
+            let length = ((z.abs() / FULL).min(1.0) * BAR as f32).round() as usize;
+            let (y, colour) = if *z > 0.0 { (middle - length, UP) } else { (middle + 1, DOWN) };
+            screen.block(MARGIN + number * step, y, (step * 3 / 4).max(1), length, colour);
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! A picture for people, and what is drawn on it.
+
+/// Red, green, blue.
+pub type Colour = [u8; 3];
+
+/// Pixels, top row first.
+pub struct Screen {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    pixels: Vec<Colour>,
+}
+
+impl Screen {
+    /// An empty screen.
+    pub fn new(width: usize, height: usize, colour: Colour) -> Self {
+        Self { width, height, pixels: vec![colour; width * height] }
+    }
+
+    /// The pixels as bytes, row by row.
+    pub fn bytes(&self) -> &[u8] {
+        self.pixels.as_flattened()
+    }
+
+    /// Fills a rectangle, as far as it is on the screen.
+    pub fn block(&mut self, x: usize, y: usize, width: usize, height: usize, colour: Colour) {
+        let (left, right) = (x.min(self.width), (x + width).min(self.width));
+        for row in y.min(self.height)..(y + height).min(self.height) {
+            self.pixels[row * self.width + left..row * self.width + right].fill(colour);
+        }
+    }
+
+    /// Draws planes of pixels `[1 or 3, height, width]`, enlarged, with the upper left corner at (x, y).
+    pub fn planes(&mut self, planes: &[u8], width: usize, height: usize, scale: usize, (x, y): (usize, usize)) {
+        let plane = width * height;
+        for row in 0..height {
+            for column in 0..width {
+                let at = row * width + column;
+                let grey = planes[at];
+                let colour =
+                    if planes.len() == plane { [grey; 3] } else { [grey, planes[plane + at], planes[2 * plane + at]] };
+                self.block(x + column * scale, y + row * scale, scale, scale, colour);
+            }
+        }
+    }
+}

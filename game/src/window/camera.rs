@@ -1,0 +1,86 @@
+//! The person's eye: the bots' square view, enlarged, with the player in the middle.
+
+use bevy::{
+    camera::{ScalingMode, Viewport},
+    prelude::*,
+    transform::helper::TransformHelper,
+    window::PrimaryWindow,
+};
+
+use super::seats::Seats;
+
+/// How far the view widens and narrows with each key, and how often.
+const ZOOM_STEP: f32 = 1.25;
+const MOST_STEPS: i32 = 8;
+
+pub(super) fn build(app: &mut App, width: f32) {
+    app.insert_resource(Zoom { width, steps: 0 })
+        .insert_resource(ClearColor(Color::BLACK))
+        .add_systems(Startup, spawn_camera)
+        .add_systems(PostUpdate, (follow, zoom, keep_square).before(TransformSystems::Propagate));
+}
+
+/// How much is seen.
+#[derive(Resource)]
+pub(super) struct Zoom {
+    /// World units that bots see from left to right.
+    width: f32,
+    /// Keys pressed to see more.
+    steps: i32,
+}
+
+impl Zoom {
+    /// Shows more.
+    pub fn out(&mut self) {
+        self.steps = (self.steps + 1).min(MOST_STEPS);
+    }
+
+    /// Shows less, down to what bots see.
+    pub fn closer(&mut self) {
+        self.steps = (self.steps - 1).max(0);
+    }
+
+    fn scaling(&self) -> ScalingMode {
+        let side = self.width * ZOOM_STEP.powi(self.steps);
+        ScalingMode::AutoMin { min_width: side, min_height: side }
+    }
+}
+
+#[derive(Component)]
+struct Eye;
+
+fn spawn_camera(zoom: Res<Zoom>, mut commands: Commands) {
+    let projection = OrthographicProjection { scaling_mode: zoom.scaling(), ..OrthographicProjection::default_2d() };
+    commands.spawn((Eye, Camera2d, Projection::Orthographic(projection), Msaa::Off));
+}
+
+fn follow(seats: Res<Seats>, mut eye: ParamSet<(TransformHelper, Single<&mut Transform, With<Eye>>)>) {
+    // Until the first level is drawn the agent may be nowhere.
+    let Ok(at) = eye.p0().compute_global_transform(seats.agent) else { return };
+    let at = at.translation();
+    let mut eye = eye.p1();
+    eye.translation.x = at.x;
+    eye.translation.y = at.y;
+}
+
+fn zoom(zoom: Res<Zoom>, mut eye: Single<&mut Projection, With<Eye>>) {
+    if zoom.is_changed()
+        && let Projection::Orthographic(projection) = &mut **eye
+    {
+        projection.scaling_mode = zoom.scaling();
+    }
+}
+
+/// A window of any shape shows the square in its middle.
+fn keep_square(window: Single<Ref<Window>, With<PrimaryWindow>>, mut eye: Single<&mut Camera, With<Eye>>) {
+    let size = window.physical_size();
+    let side = size.min_element();
+    if side == 0
+        || eye.viewport.as_ref().is_some_and(|viewport| viewport.physical_size == UVec2::splat(side))
+            && !window.is_changed()
+    {
+        return;
+    }
+    eye.viewport =
+        Some(Viewport { physical_position: (size - side) / 2, physical_size: UVec2::splat(side), ..default() });
+}

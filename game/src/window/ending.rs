@@ -1,0 +1,71 @@
+//! Ending in good order: the recording is finished before the window goes.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bevy::{prelude::*, window::WindowCloseRequested};
+use bevy_playbot::{demo::recorder::flush_unfinished, fault::Faults};
+
+use super::WindowError;
+
+pub(super) fn build(app: &mut App, stop: fn() -> bool) {
+    app.insert_resource(Ending { asked: false, ended: false, stop })
+        .init_resource::<Verdict>()
+        .add_systems(Last, (hear_close, end).chain());
+}
+
+/// Whether the window is to end.
+#[derive(Resource)]
+pub(super) struct Ending {
+    asked: bool,
+    ended: bool,
+    stop: fn() -> bool,
+}
+
+impl Ending {
+    /// Asks for the end.
+    pub fn ask(&mut self) {
+        self.asked = true;
+    }
+}
+
+/// Why the window ended, if not because somebody wished so. Outlives the World.
+#[derive(Resource, Clone, Default)]
+pub(super) struct Verdict(Arc<Mutex<Option<WindowError>>>);
+
+impl Verdict {
+    fn set(&self, error: WindowError) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+
+    /// The verdict of an app that has exited.
+    pub fn take(&self, exit: AppExit) -> Result<(), WindowError> {
+        match self.0.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            Some(error) => Err(error),
+            None if exit.is_error() => Err(WindowError::Lost("the display was closed".to_owned())),
+            None => Ok(()),
+        }
+    }
+}
+
+fn hear_close(mut closes: MessageReader<WindowCloseRequested>, mut ending: ResMut<Ending>) {
+    if closes.read().count() > 0 || (ending.stop)() {
+        ending.asked = true;
+    }
+}
+
+fn end(world: &mut World) {
+    let verdict = world.resource::<Verdict>().clone();
+    let fault = world.resource_mut::<Faults>().take();
+    let mut ending = world.resource_mut::<Ending>();
+    if ending.ended || (fault.is_ok() && !ending.asked) {
+        return;
+    }
+    ending.ended = true;
+    if let Err(fault) = fault {
+        verdict.set(fault.into());
+    }
+    if let Err(error) = flush_unfinished(world) {
+        verdict.set(error.into());
+    }
+    world.write_message(AppExit::Success);
+}

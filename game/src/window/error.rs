@@ -1,0 +1,112 @@
+//! Why a window does not open, or does not stay open.
+
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use bevy_playbot::{demo::file::DemoFileError, fault::Fault, vision::VisionError};
+use thiserror::Error;
+
+/// Why a window does not open, or does not stay open.
+#[derive(Debug, Error)]
+pub enum WindowError {
+    /// There is no display to open a window on.
+    #[error(
+        "no window can be opened ({0}): start this in a desktop session, or set DISPLAY to a running X server such as \
+         `Xvfb :99`; without a display there is `playbot eval`"
+    )]
+    NoDisplay(String),
+    /// A library of the window system is missing.
+    #[error(
+        "no window can be opened, since a library is missing ({0}): on Debian, install libx11-6, libx11-xcb1, libxcursor1, \
+         libxi6 and libxkbcommon-x11-0; without them there is `playbot eval`"
+    )]
+    NoLibrary(String),
+    /// Nothing can draw.
+    #[error(
+        "nothing here can draw a window ({0}): install a Vulkan driver, such as Debian's mesa-vulkan-drivers, which \
+         needs no graphics card; without one there is `playbot eval`"
+    )]
+    NoAdapter(String),
+    /// The keyboard means nothing to the game.
+    #[error("{0} has no keys for a person to play with")]
+    NoKeys(&'static str),
+    /// The game, or what the policy sees of it, cannot be drawn.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The running episode could not be written down.
+    #[error(transparent)]
+    Recording(#[from] DemoFileError),
+    /// The window system or the graphics driver gave up.
+    #[error("the window is gone ({0}); finished episodes are saved, the running one is lost")]
+    Lost(String),
+}
+
+impl WindowError {
+    /// Whether the caller can put it right by calling differently or from elsewhere.
+    pub fn is_usage(&self) -> bool {
+        !matches!(self, Self::Fault(_) | Self::Recording(_) | Self::Lost(_))
+    }
+
+    /// What a panic of Bevy's plugins means. They know no other way to say that something is missing.
+    pub(super) fn of_panic(words: String) -> Self {
+        if words.contains("XOpenDisplayFailed") {
+            let display = std::env::var("DISPLAY").unwrap_or_default();
+            Self::NoDisplay(format!("no X server answers at DISPLAY={display}"))
+        } else if words.contains(".so") {
+            Self::NoLibrary(words)
+        } else if words.contains("event loop") {
+            Self::NoDisplay(words)
+        } else if words.contains("find a GPU") {
+            Self::NoAdapter("there is no graphics adapter".to_owned())
+        } else if ["adapter", "surface"].iter().any(|part| words.contains(part)) {
+            Self::NoAdapter(words)
+        } else {
+            Self::Lost(words)
+        }
+    }
+}
+
+/// Runs what may panic, silently, and returns the words of the panic on one line.
+pub(super) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    let words = Arc::new(Mutex::new(String::new()));
+    let heard = words.clone();
+    let hook = take_hook();
+    set_hook(Box::new(move |panic| {
+        let said = panic.payload_as_str().unwrap_or("no reason given");
+        let mut words = heard.lock().unwrap_or_else(PoisonError::into_inner);
+        // What panics later only follows from the first.
+        if words.is_empty() {
+            *words = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        }
+        tracing::debug!("{panic}");
+    }));
+    let result = catch_unwind(AssertUnwindSafe(work));
+    set_hook(hook);
+    result.map_err(|_| std::mem::take(&mut *words.lock().unwrap_or_else(PoisonError::into_inner)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panics_become_words() {
+        assert_eq!(catch(|| 7), Ok(7));
+        assert_eq!(catch(|| panic!("no\n  luck")), Err::<(), _>("no luck".to_owned()));
+        for (words, kind) in [
+            ("Failed to build event loop: XNotSupported(XOpenDisplayFailed)", "no X server answers at DISPLAY="),
+            ("Failed to build event loop: no libX11.so", "install libx11-6"),
+            ("Unable to find a GPU! Make sure", "mesa-vulkan-drivers"),
+            ("No supported formats for surface", "nothing here can draw a window (No supported formats"),
+            ("index out of bounds", "the window is gone (index out of bounds)"),
+        ] {
+            let error = WindowError::of_panic(words.to_owned()).to_string();
+            assert!(error.contains(kind), "{error}");
+        }
+    }
+}

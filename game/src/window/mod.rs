@@ -1,0 +1,20 @@
+//! A window in which a person plays, and hands over to a policy or a bot and back.
+//!
+//! The game runs as it does without a window: its rules, the recorder and the policy see fixed ticks only, so that what
+//! was recorded here replays headless. The window adds a clock, a keyboard and a camera.
+
+mod app;
+mod camera;
+mod ending;
+mod error;
+mod keys;
+mod pace;
+mod playlist;
+mod score;
+mod seats;
+mod title;
+
+pub use app::{GameWindow, WindowSetup};
+pub use error::WindowError;
+pub use playlist::Playlist;
+pub use seats::Partner;

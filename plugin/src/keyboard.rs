@@ -1,0 +1,49 @@
+//! People at the keyboard.
+
+use bevy::{input::InputSystems, prelude::*};
+
+use crate::{action::Action, bot, control::Control, episode::Episode, input_map::InputMap, systems::PlaybotSystems};
+
+/// Turns keys into the actions of agents under [`Control::Human`] that have an [`InputMap`].
+///
+/// Ticks and frames have their own rates. A key counts in a tick if it is held then, or was pressed at any time since
+/// the tick before, so that a short tap is never lost between two ticks. Needs Bevy's `InputPlugin`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct KeyboardPlugin;
+
+/// Keys that were pressed since the last tick, whether or not they are still held.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct TappedKeys(Vec<KeyCode>);
+
+impl TappedKeys {
+    /// Forgets them: what was pressed while the game stood still is not meant for it.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
+impl Plugin for KeyboardPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<TappedKeys>()
+            .add_systems(PreUpdate, note_taps.after(InputSystems))
+            .add_systems(FixedPreUpdate, decide.in_set(PlaybotSystems::Decide).before(bot::run_blind_bots));
+    }
+}
+
+fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
+    // Nothing asks for the order of these.
+    tapped.0.extend(keys.get_just_pressed());
+}
+
+fn decide(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut tapped: ResMut<TappedKeys>,
+    mut agents: Query<(&Control, &InputMap, &Episode, &mut Action)>,
+) {
+    for (control, map, episode, mut action) in &mut agents {
+        if *control == Control::Human && episode.is_running() {
+            action.0 = map.action(|key| keys.pressed(key) || tapped.0.contains(&key));
+        }
+    }
+    tapped.clear();
+}
