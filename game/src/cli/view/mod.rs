@@ -27,7 +27,6 @@ use super::{
 };
 use crate::registry;
 use film::Film;
-use screen::Screen;
 use stage::{Shot, Stage};
 
 /// Writes what a bot sees as a PNG: one observation, or with --episode a whole episode as an animated PNG with tick,
