@@ -6,8 +6,13 @@ use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations};
 use serde::{Deserialize, Serialize};
 
-use crate::fault::Faults;
-use crate::{agent::Agent, episode::Episode};
+use crate::{
+    agent::Agent,
+    control::Control,
+    episode::Episode,
+    fault::Faults,
+    vision::{ImageSensor, is_observed},
+};
 
 /// Names and number of the values of a vector observation, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -109,6 +114,23 @@ pub(crate) fn check_observations(
                 at(),
                 sensor.space.names[bad],
                 observation.vector[bad]
+            ));
+        }
+    }
+}
+
+/// Reports images of the wrong length, with agent and tick.
+pub(crate) fn check_images(
+    agents: Query<(&Agent, &ImageSensor, &Observation, &Control, &Episode)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, sensor, observation, control, episode) in &agents {
+        let (expected, got) = (sensor.0.shape().numbers(), observation.image.len());
+        if is_observed(control, episode) && got != expected {
+            faults.report(format!(
+                "agent {}, level {}, tick {}: the observation's image has {got} bytes, its sensor makes {expected}; add \
+                 the sensor and its plugin, and leave the image to them",
+                agent.index, episode.level, episode.tick
             ));
         }
     }

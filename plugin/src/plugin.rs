@@ -44,7 +44,9 @@ fn add_decision_systems(app: &mut App) {
             (policy::seed_streams, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
                 .chain()
                 .in_set(PlaybotSystems::Begin),
-            (run_observe_schedule, observation::check_observations).chain().in_set(PlaybotSystems::Observe),
+            (run_observe_schedule, observation::check_observations, observation::check_images)
+                .chain()
+                .in_set(PlaybotSystems::Observe),
             (
                 bot::run_blind_bots,
                 demo::replay::run_replays,

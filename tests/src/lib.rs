@@ -1,5 +1,11 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
+pub mod memory;
+mod painted;
+pub mod scene;
+
+pub use painted::PaintedCorridor;
+
 use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use bevy::prelude::World;
 use bevy_playbot::{
-    game::{Game, build_world},
+    game::{Game, build_seeing_world},
     learner::DeviceKind,
     prelude::*,
     stage_clock::StageClock,
@@ -12,6 +12,7 @@ use bevy_playbot::{
         Algorithm, Trainer,
         worlds::{default_threads, on_threads},
     },
+    vision::{ObservationKind, Sight},
 };
 use serde_json::{Value, json};
 
@@ -57,9 +58,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
     }
     let (plain, with_physics) = (registry::game("coinrun")?, &CoinRun { physics: true });
-    let cases: [Case; 3] = [
-        ("sim/coinrun/vector", plain, simulate),
-        ("sim/coinrun/physics", with_physics, simulate),
+    let cases: [Case; 4] = [
+        ("sim/coinrun/vector", plain, see_vectors),
+        ("sim/coinrun/physics", with_physics, see_vectors),
+        ("sim/coinrun/raster", plain, see_raster),
         ("train/coinrun/vector", plain, train),
     ];
     let wanted: Vec<_> = cases.iter().filter(|(name, ..)| name.contains(&args.case)).collect();
@@ -106,21 +108,29 @@ impl Measure {
     }
 }
 
+fn see_vectors(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
+    simulate(game, ObservationKind::Vector, args)
+}
+
+fn see_raster(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
+    simulate(game, ObservationKind::Raster, args)
+}
+
 /// Random actions on hard levels, observations filled every tick.
-fn simulate(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
+fn simulate(game: &dyn Game, kind: ObservationKind, args: &Args) -> Result<Measure, CliError> {
+    let sight = Sight { kind, ..Sight::default() };
     let threads = args.threads as u32;
     let share = args.arenas / threads;
-    let mut worlds: Vec<_> = (0..threads)
-        .map(|index| {
-            let (mut world, agents) = build_world(game, "hard", 1, index * share, share);
-            for agent in agents {
-                let queue = LevelQueue::Uniform { first: 0, last: 63 };
-                world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
-            }
-            world
-        })
-        .collect();
-    worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    let mut worlds = Vec::new();
+    for index in 0..threads {
+        let (mut world, agents) = build_seeing_world(game, "hard", &sight, 1, index * share, share)?;
+        for agent in agents {
+            let queue = LevelQueue::Uniform { first: 0, last: 63 };
+            world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
+        }
+        world.insert_resource(StageClock::default());
+        worlds.push(world);
+    }
     const TICKS: u64 = 500;
     let (start, mut ticks) = (Instant::now(), 0);
     while start.elapsed().as_secs_f64() < args.seconds {

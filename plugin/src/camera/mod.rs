@@ -1,27 +1,44 @@
-//! Pictures from Bevy cameras.
+//! Pictures from Bevy's renderer, on a GPU or on software Vulkan.
+//!
+//! Give an agent a [`CameraSensor`] and add the [`CameraSensorPlugin`]; each tick its
+//! [`Frame`](crate::vision::Frame) holds what the World looks like in that tick, after
+//! [`VisionSystems::Dress`](crate::vision::VisionSystems::Dress).
+//!
+//! # How it is drawn
+//!
+//! The renderer is taken out of Bevy's loop and run by hand, in
+//! [`VisionSystems::Look`](crate::vision::VisionSystems::Look): the scene is extracted, drawn, read back and handed out
+//! before anybody decides, so that no frame is ever late.
+//!
+//! A Bevy camera costs about half a millisecond, however little it sees. Sensors that follow a target therefore share
+//! one camera, whose whole work on the CPU is done once; what it would draw is dealt out to one cell of a common
+//! texture for each agent, and each cell is drawn with a view of its own in the same render pass. One copy and one
+//! mapped buffer bring all cells back. Sensors that reuse a camera of the game draw it as it is, into a texture of its
+//! own, and come back in the same buffer.
+//!
+//! Frames carry the number of the look they were extracted in through the render world. One that comes back with
+//! another number is reported in [`Faults`](crate::fault::Faults), with its agent and tick, and is not handed out.
 
+mod adapter;
+mod atlas;
+mod borrow;
+mod error;
+mod eye;
+mod eye_draw;
+mod images;
+mod look;
+mod plugin;
+mod prepare;
+mod readback;
+mod renderer;
+mod request;
+mod scene_schedule;
 mod sensor;
+mod tiles;
 
-pub use sensor::CameraSensor;
-
-use crate::vision::VisionError;
-use bevy::prelude::*;
-
-/// Adds [`CameraSensor`]s to a game.
-#[derive(Clone, Debug, Default)]
-pub struct CameraSensorPlugin;
-
-impl CameraSensorPlugin {
-    /// For an app without a window: brings Bevy's renderer along.
-    ///
-    /// # Errors
-    ///
-    /// No graphics adapter.
-    pub fn headless() -> Result<Self, VisionError> {
-        Ok(Self)
-    }
-}
-
-impl Plugin for CameraSensorPlugin {
-    fn build(&self, _app: &mut App) {}
-}
+pub use error::CameraError;
+pub use eye::SensorCamera;
+pub use plugin::CameraSensorPlugin;
+pub use readback::ReadbackDelay;
+pub use sensor::{CameraSensor, CameraSource};
+pub use tiles::{TileBorder, TileLayerPlugin};

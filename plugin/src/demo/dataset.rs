@@ -209,3 +209,39 @@ fn learner_actions(episode: &DemoEpisode) -> Actions {
         EpisodeActions::Continuous { dim, values } => Actions::Continuous { dim: *dim, values: values.clone() },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::file::DemoActions;
+
+    #[test]
+    fn what_is_kept_is_spread_over_all_episodes_whatever_their_rhythm() {
+        let episode = |index: usize| {
+            let mut episode = DemoEpisode::new(index as u64 % 8, DemoActions::Discrete(2));
+            episode.state_hashes = vec![0; 10];
+            episode
+        };
+        let all = || Demonstrations {
+            sight: Sight::default(),
+            episodes: (0..80)
+                .map(|index| Demonstration {
+                    file: Path::new("a.demo").into(),
+                    index,
+                    mode: "plain".into(),
+                    episode: Arc::new(episode(index)),
+                    is_seen: false,
+                })
+                .collect(),
+        };
+        let kept = |steps| all().at_most(steps).episodes.iter().map(|demo| demo.index).collect::<Vec<_>>();
+        let part = kept(209);
+        assert_eq!(part.len(), 20);
+        let gap = part.windows(2).map(|pair| pair[1] - pair[0]).max();
+        assert!(gap.is_some_and(|gap| gap <= 8) && part[0] < 8 && part[19] >= 72, "{part:?}");
+        let levels: std::collections::BTreeSet<usize> = part.iter().map(|index| index % 8).collect();
+        assert_eq!(levels.len(), 8, "each of the levels that follow one another");
+        assert!(kept(150).iter().all(|index| part.contains(index)), "fewer steps are a part of more");
+        assert_eq!((kept(1).len(), kept(800).len(), kept(u64::MAX).len()), (1, 80, 80));
+    }
+}

@@ -8,23 +8,33 @@
 //! | [`TileLayer`] | a grid of tiles, drawn at once |
 //!
 //! A sensor fills [`Frame`] in [`VisionSystems::Look`]; [`VisionSystems::Compose`] checks its tick and makes
-//! [`Observation::image`](crate::observation::Observation::image) of it.
+//! [`Observation::image`](crate::observation::Observation::image) of it. Agents that nobody decides for, and agents between
+//! two episodes, are not looked after.
 
+mod blank;
 mod card;
+mod compose;
 mod frame;
 mod options;
+mod planes;
+mod plugin;
 mod sight;
+mod stack;
 mod stage;
 mod tile_layer;
 mod velocity;
 
+pub use blank::BlankEpisodes;
 pub use card::UnknownSight;
 pub use frame::Frame;
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
+pub use plugin::VisionPlugin;
 pub use sight::{ObservationKind, Picture, Sight};
 pub use stage::Stage;
 pub use tile_layer::TileLayer;
 pub use velocity::PaintedVelocity;
+
+pub(crate) use compose::is_observed;
 
 use bevy::ecs::schedule::SystemSet;
 

@@ -5,7 +5,7 @@ use playbot_learner::{ImageShape, ObsKind};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Frame;
+use super::{Frame, blank::BlankEpisodes, stack::PictureStack};
 
 /// Largest width and height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 1024;
@@ -53,6 +53,12 @@ pub enum VisionError {
         /// Name of the game.
         game: &'static str,
     },
+    /// There is nothing to draw with.
+    #[error(
+        "no graphics adapter was found; install a Vulkan driver (Debian's `mesa-vulkan-drivers` needs no GPU), or use \
+         `observation: Raster`"
+    )]
+    NoAdapter,
     /// The program was built without cameras.
     #[error("this program was built without cameras; build it with `--features camera`, or use `observation: Raster`")]
     NoCamera,
@@ -103,5 +109,5 @@ impl ImageOptions {
 
 /// Marks an agent whose policy reads pictures of this size and form. Comes with every sensor that makes pictures.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[require(Frame)]
+#[require(Frame, BlankEpisodes, PictureStack)]
 pub struct ImageSensor(pub ImageOptions);

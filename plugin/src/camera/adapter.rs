@@ -1,0 +1,33 @@
+//! Finding a graphics adapter.
+
+use bevy::{
+    render::settings::{Backends, RenderCreation, WgpuSettings},
+    tasks::block_on,
+};
+
+use crate::vision::VisionError;
+
+/// Settings of a renderer without a window. OpenGL is left out: it needs a display, and its drivers print.
+fn settings() -> WgpuSettings {
+    WgpuSettings { backends: Some(Backends::from_env().unwrap_or(Backends::PRIMARY)), ..WgpuSettings::default() }
+}
+
+pub(super) fn creation() -> RenderCreation {
+    settings().into()
+}
+
+/// Settings of a renderer that draws nothing.
+pub(super) fn none() -> RenderCreation {
+    WgpuSettings { backends: None, ..WgpuSettings::default() }.into()
+}
+
+/// Bevy panics without an adapter, so that it must be looked for first.
+pub(super) fn check() -> Result<(), VisionError> {
+    let settings = settings();
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = settings.backends.unwrap_or(Backends::PRIMARY);
+    descriptor.flags = settings.instance_flags;
+    let instance = wgpu::Instance::new(descriptor);
+    let options = wgpu::RequestAdapterOptions { power_preference: settings.power_preference, ..Default::default() };
+    block_on(instance.request_adapter(&options)).map(drop).map_err(|_| VisionError::NoAdapter)
+}

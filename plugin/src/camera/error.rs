@@ -1,0 +1,77 @@
+//! What can go wrong when an agent looks.
+
+use bevy::prelude::*;
+use thiserror::Error;
+
+use crate::vision::VisionError;
+
+/// Why an agent got no picture in a tick. Reported in [`Faults`](crate::fault::Faults) with the agent and the tick.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CameraError {
+    /// A width or height that no picture can have.
+    #[error(transparent)]
+    Size(#[from] VisionError),
+    /// A picture larger than the adapter can draw.
+    #[error("a picture of {width}x{height} is over the graphics adapter's limit of {limit} pixels a side")]
+    OverLimit {
+        /// Columns of pixels.
+        width: u32,
+        /// Rows of pixels.
+        height: u32,
+        /// The most of either.
+        limit: u32,
+    },
+    /// All pictures together are larger than the adapter can draw.
+    #[error(
+        "{agents} pictures together are over the graphics adapter's limit of {limit}x{limit} pixels; \
+         use fewer agents in one World, or smaller pictures"
+    )]
+    TooMany {
+        /// Agents that look.
+        agents: usize,
+        /// The most pixels a side.
+        limit: u32,
+    },
+    /// The width of what is seen is not a length.
+    #[error("its sensor is {0} world units wide; the width must be positive and finite")]
+    Width(f32),
+    /// The target was despawned, or is nowhere.
+    #[error("the target {0} of its sensor does not exist or has no Transform; despawn the sensor with its target")]
+    NoTarget(Entity),
+    /// The camera was despawned, or is none.
+    #[error("the camera {0} of its sensor does not exist or is no camera; despawn the sensor with its camera")]
+    NoCamera(Entity),
+    /// Two agents want different things of one camera.
+    #[error("another agent looks through the same camera {0} in another size; give them the same size")]
+    CameraShared(Entity),
+    /// The picture that came back is an older one.
+    #[error("its picture is of tick {0}: the readback is late, and no picture was handed out")]
+    Stale(u64),
+    /// No picture came back.
+    #[error("no picture came back: {0}")]
+    Missing(String),
+    /// The renderer is not to be had.
+    #[error(
+        "there is no renderer: add CameraSensorPlugin::headless(), or add CameraSensorPlugin after DefaultPlugins \
+         without PipelinedRenderingPlugin"
+    )]
+    NoRenderer,
+    /// Shaders or images did not become ready.
+    #[error("{0} are not ready after {1} seconds")]
+    NotReady(&'static str, u64),
+}
+
+/// Something to be drawn lacks its image.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{what} {entity} has no image{}: {why}", called(.name))]
+pub(super) struct NoImage {
+    /// `sprite` or `tile layer`.
+    pub(super) what: &'static str,
+    pub(super) entity: Entity,
+    pub(super) name: Option<Name>,
+    pub(super) why: String,
+}
+
+fn called(name: &Option<Name>) -> String {
+    name.as_ref().map_or_else(String::new, |name| format!(" (named `{name}`)"))
+}

@@ -1,0 +1,276 @@
+//! Drawing many eyes with the work of one camera, in the render World.
+//!
+//! Bevy prepares the shared camera as any other: it extracts, specialises, queues and sorts everything once. Before
+//! buffers are filled, the sorted items are dealt out to one phase for each eye, by what lies in its sight. All eyes
+//! are then drawn in one pass, each with its own view uniform, viewport and scissor. Items that Bevy keeps in bins
+//! (opaque 2D meshes) are few and are drawn for each eye.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bevy::{
+    core_pipeline::{
+        core_2d::{AlphaMask2d, Opaque2d, Transparent2d},
+        tonemapping::Tonemapping,
+    },
+    ecs::{
+        entity::EntityHashMap,
+        schedule::{ScheduleLabel, SingleThreadedExecutor},
+    },
+    prelude::*,
+    render::{
+        Extract, ExtractSchedule, Render, RenderApp, RenderSystems,
+        render_phase::{SortedRenderPhase, ViewBinnedRenderPhases, ViewSortedRenderPhases},
+        render_resource::{RenderPassDescriptor, StoreOp, TextureFormat},
+        renderer::{RenderContext, ViewQuery},
+        sync_world::MainEntity,
+        view::{ExtractedView, RetainedViewEntity, ViewDepthTexture, ViewTarget},
+    },
+    sprite_render::{Mesh2dViewBindGroup, SpriteViewBindGroup},
+};
+
+use super::eye::{Eyes, Stamp};
+
+/// What the shared camera does instead of Bevy's 2D rendering.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct DrawEyes;
+
+/// The eyes in the render World. Their phases and entities are used again and again.
+#[derive(Resource, Default)]
+struct RenderEyes {
+    scene: Eyes,
+    entities: Vec<Entity>,
+    /// Empty phases between two pictures.
+    phases: Vec<SortedRenderPhase<Transparent2d>>,
+    /// The shared camera's own phase, while the eyes' ones stand in for it.
+    whole: Option<SortedRenderPhase<Transparent2d>>,
+    bounds: EntityHashMap<Rect>,
+}
+
+/// The stamp of the scene that was extracted last.
+#[derive(Resource, Clone, Copy, Default)]
+pub(super) struct ExtractedStamp(pub(super) Stamp);
+
+/// The stamp of the scene that the eyes were drawn from last.
+#[derive(Resource, Default)]
+pub(super) struct DrawnStamp {
+    look: AtomicU64,
+    tick: AtomicU64,
+}
+
+impl DrawnStamp {
+    fn set(&self, stamp: Stamp) {
+        self.look.store(stamp.look, Ordering::Relaxed);
+        self.tick.store(stamp.tick, Ordering::Relaxed);
+    }
+
+    pub(super) fn get(&self) -> Stamp {
+        Stamp { look: self.look.load(Ordering::Relaxed), tick: self.tick.load(Ordering::Relaxed) }
+    }
+}
+
+/// Adds the eyes to the renderer, if the app has one.
+pub(super) fn add_eyes(app: &mut App) {
+    let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+    let mut draw = Schedule::new(DrawEyes);
+    draw.set_executor(SingleThreadedExecutor::new());
+    draw.add_systems(draw_eyes);
+    render_app
+        .init_resource::<RenderEyes>()
+        .init_resource::<ExtractedStamp>()
+        .init_resource::<DrawnStamp>()
+        .add_schedule(draw)
+        .add_systems(ExtractSchedule, extract_eyes)
+        .add_systems(
+            Render,
+            (
+                open_eyes.after(RenderSystems::PhaseSort).before(RenderSystems::Prepare),
+                lend_bind_groups.after(RenderSystems::PrepareBindGroups).before(RenderSystems::Render),
+                close_eyes.in_set(RenderSystems::Cleanup),
+            ),
+        );
+}
+
+fn extract_eyes(
+    mut eyes: ResMut<RenderEyes>,
+    mut stamp: ResMut<ExtractedStamp>,
+    main_eyes: Extract<Res<Eyes>>,
+    main_stamp: Extract<Res<Stamp>>,
+) {
+    stamp.0 = **main_stamp;
+    let RenderEyes { scene, bounds, .. } = &mut *eyes;
+    scene.camera = main_eyes.camera;
+    scene.eyes.clone_from(&main_eyes.eyes);
+    bounds.clear();
+    bounds.extend(main_eyes.bounds.iter().copied());
+}
+
+/// The view of eye number `eye`.
+fn eye_view(camera: Entity, eye: usize) -> RetainedViewEntity {
+    RetainedViewEntity::new(MainEntity::from(camera), None, eye as u32 + 1)
+}
+
+/// Gives each eye a view and deals out what the shared camera would draw.
+fn open_eyes(world: &mut World) {
+    world.resource_scope(|world, mut eyes: Mut<RenderEyes>| {
+        let Some(camera) = eyes.scene.camera else { return };
+        while eyes.entities.len() < eyes.scene.eyes.len() {
+            eyes.entities.push(world.spawn_empty().id());
+        }
+        while eyes.entities.len() > eyes.scene.eyes.len() {
+            eyes.entities.pop().map(|entity| world.despawn(entity));
+        }
+        for (i, (&entity, eye)) in eyes.entities.iter().zip(&eyes.scene.eyes).enumerate() {
+            let size = eye.cell.size();
+            world.entity_mut(entity).insert(ExtractedView {
+                retained_view_entity: eye_view(camera, i),
+                clip_from_view: eye.projection(),
+                world_from_view: GlobalTransform::from_translation(eye.centre.extend(0.0)),
+                clip_from_world: None,
+                target_format: TextureFormat::Rgba8UnormSrgb,
+                viewport: UVec4::new(eye.cell.min.x, eye.cell.min.y, size.x, size.y),
+                color_grading: default(),
+                invert_culling: false,
+            });
+        }
+        let mut phases = world.resource_mut::<ViewSortedRenderPhases<Transparent2d>>();
+        let shared = RetainedViewEntity::new(MainEntity::from(camera), None, 0);
+        let Some(whole) = phases.get_mut(&shared).map(std::mem::take) else { return };
+        deal_out(&mut eyes, &whole, camera, &mut phases);
+        eyes.whole = Some(whole);
+        tone(world, camera, true);
+    });
+}
+
+fn deal_out(
+    eyes: &mut RenderEyes,
+    whole: &SortedRenderPhase<Transparent2d>,
+    camera: Entity,
+    phases: &mut ViewSortedRenderPhases<Transparent2d>,
+) {
+    let areas: Vec<Rect> = eyes.scene.eyes.iter().map(|eye| eye.area()).collect();
+    let mut seen: Vec<_> = areas.iter().map(|_| eyes.phases.pop().unwrap_or_default()).collect();
+    for item in whole.items.values() {
+        // What has no bounds may be anywhere.
+        let bounds = eyes.bounds.get(&item.entity.1.id());
+        for (area, phase) in areas.iter().zip(&mut seen) {
+            if bounds.is_none_or(|bounds| touches(area, bounds)) {
+                phase.add_transient(copy(item));
+            }
+        }
+    }
+    for (i, phase) in seen.into_iter().enumerate() {
+        phases.insert(eye_view(camera, i), phase);
+    }
+}
+
+fn touches(a: &Rect, b: &Rect) -> bool {
+    a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y
+}
+
+fn copy(item: &Transparent2d) -> Transparent2d {
+    Transparent2d {
+        sort_key: item.sort_key,
+        entity: item.entity,
+        pipeline: item.pipeline,
+        draw_function: item.draw_function,
+        batch_range: item.batch_range.clone(),
+        extracted_index: item.extracted_index,
+        extra_index: item.extra_index.clone(),
+        indexed: item.indexed,
+    }
+}
+
+/// Bevy makes bind groups only for views that name a tone mapping. The shared camera must name none while pipelines are
+/// chosen, so that nothing is toned.
+fn tone(world: &mut World, camera: Entity, on: bool) {
+    let mut views = world.query_filtered::<(Entity, &MainEntity), With<ExtractedView>>();
+    let view = views.iter(world).find(|(_, main)| main.id() == camera).map(|(view, _)| view);
+    match view {
+        Some(view) if on => {
+            world.entity_mut(view).insert(Tonemapping::None);
+        }
+        Some(view) => {
+            world.entity_mut(view).remove::<Tonemapping>();
+        }
+        None => {}
+    }
+}
+
+/// All views share one buffer of uniforms, and so one bind group each for sprites and meshes.
+fn lend_bind_groups(
+    eyes: Res<RenderEyes>,
+    shared: Query<(&MainEntity, &SpriteViewBindGroup, &Mesh2dViewBindGroup)>,
+    mut commands: Commands,
+) {
+    let Some((_, sprites, meshes)) = shared.iter().find(|(main, ..)| Some(main.id()) == eyes.scene.camera) else {
+        return;
+    };
+    for &eye in &eyes.entities {
+        commands.entity(eye).insert((
+            SpriteViewBindGroup { value: sprites.value.clone() },
+            Mesh2dViewBindGroup { value: meshes.value.clone() },
+        ));
+    }
+}
+
+/// Draws all eyes in one pass.
+fn draw_eyes(
+    world: &World,
+    shared: ViewQuery<(&ExtractedView, &ViewTarget, &ViewDepthTexture)>,
+    eyes: Res<RenderEyes>,
+    drawn: Res<DrawnStamp>,
+    stamp: Res<ExtractedStamp>,
+    background: Res<ClearColor>,
+    transparent: Res<ViewSortedRenderPhases<Transparent2d>>,
+    opaque: Res<ViewBinnedRenderPhases<Opaque2d>>,
+    masked: Res<ViewBinnedRenderPhases<AlphaMask2d>>,
+    mut context: RenderContext,
+) {
+    let (view, target, depth) = shared.into_inner();
+    let Some(camera) = eyes.scene.camera else { return };
+    let Some(attachment) = target.out_texture_color_attachment(Some(background.to_linear())) else { return };
+    let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
+        label: Some("eyes"),
+        color_attachments: &[Some(attachment)],
+        depth_stencil_attachment: Some(depth.get_attachment(StoreOp::Discard)),
+        ..default()
+    });
+    let opaque = opaque.get(&view.retained_view_entity).filter(|phase| !phase.is_empty());
+    let masked = masked.get(&view.retained_view_entity).filter(|phase| !phase.is_empty());
+    for (i, (&entity, eye)) in eyes.entities.iter().zip(&eyes.scene.eyes).enumerate() {
+        let (corner, size) = (eye.cell.min, eye.cell.size());
+        let rect = [corner.x as f32, corner.y as f32, size.x as f32, size.y as f32];
+        pass.set_viewport(rect[0], rect[1], rect[2], rect[3], 0.0, 1.0);
+        pass.set_scissor_rect(corner.x, corner.y, size.x, size.y);
+        let result = opaque
+            .map_or(Ok(()), |phase| phase.render(&mut pass, world, entity))
+            .and_then(|()| masked.map_or(Ok(()), |phase| phase.render(&mut pass, world, entity)))
+            .and_then(|()| {
+                transparent.get(&eye_view(camera, i)).map_or(Ok(()), |phase| phase.render(&mut pass, world, entity))
+            });
+        if let Err(error) = result {
+            // The stamp stays behind, so that the picture counts as missing.
+            return tracing::error!("the picture of a sensor could not be drawn: {error:?}");
+        }
+    }
+    drawn.set(stamp.0);
+}
+
+/// Puts everything back as Bevy left it.
+fn close_eyes(world: &mut World) {
+    world.resource_scope(|world, mut eyes: Mut<RenderEyes>| {
+        let Some(camera) = eyes.scene.camera else { return };
+        let mut phases = world.resource_mut::<ViewSortedRenderPhases<Transparent2d>>();
+        for i in 0..eyes.entities.len() {
+            if let Some(mut phase) = phases.remove(&eye_view(camera, i)) {
+                phase.items.clear();
+                phase.transient_items.clear();
+                eyes.phases.push(phase);
+            }
+        }
+        if let Some(whole) = eyes.whole.take() {
+            phases.insert(RetainedViewEntity::new(MainEntity::from(camera), None, 0), whole);
+        }
+        tone(world, camera, false);
+    });
+}

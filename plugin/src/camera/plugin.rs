@@ -1,0 +1,71 @@
+//! The plugin.
+
+use bevy::{prelude::*, render::RenderApp};
+
+use super::{
+    ReadbackDelay, TileLayerPlugin, adapter,
+    borrow::BorrowedTargets,
+    eye::{Eyes, Stamp},
+    eye_draw, images, look,
+    prepare::Atlas,
+    readback::Readback,
+    renderer::{self, Renderer},
+    scene_schedule::add_renderer,
+};
+use crate::{
+    systems::ObserveSchedule,
+    vision::{VisionError, VisionPlugin, VisionSystems},
+};
+
+/// Adds [`CameraSensor`](super::CameraSensor)s to a game.
+///
+/// In an app without a window, [`headless`](Self::headless) brings Bevy's renderer along. In a game with a window, add
+/// `CameraSensorPlugin::default()` after `DefaultPlugins`, whose `PipelinedRenderingPlugin` must be disabled where it
+/// exists (Bevy's feature `multi_threaded`): the plugin runs the renderer itself, for sensors in the middle of a tick
+/// and for windows in `Last`.
+#[derive(Clone, Debug, Default)]
+pub struct CameraSensorPlugin {
+    headless: bool,
+}
+
+impl CameraSensorPlugin {
+    /// For an app without a window: brings along what the renderer needs, as far as the app does not have it.
+    ///
+    /// # Errors
+    ///
+    /// [`VisionError::NoAdapter`].
+    pub fn headless() -> Result<Self, VisionError> {
+        adapter::check()?;
+        Ok(Self { headless: true })
+    }
+}
+
+impl Plugin for CameraSensorPlugin {
+    fn build(&self, app: &mut App) {
+        if self.headless {
+            add_renderer(app, adapter::creation());
+        } else if !app.is_plugin_added::<TileLayerPlugin>() && app.get_sub_app(RenderApp).is_some() {
+            app.add_plugins(TileLayerPlugin);
+        }
+        VisionPlugin::add_to(app);
+        eye_draw::add_eyes(app);
+        app.init_resource::<ReadbackDelay>()
+            .init_resource::<Atlas>()
+            .init_resource::<BorrowedTargets>()
+            .init_resource::<Eyes>()
+            .init_resource::<Stamp>()
+            .init_resource::<Readback>()
+            .init_resource::<images::MissingImages>()
+            // It reads whatever can be drawn; what a game changes in `Dress` or before is seen.
+            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Look).ambiguous_with_all());
+        if !self.headless {
+            app.add_systems(Last, renderer::draw_windows);
+        }
+    }
+
+    fn cleanup(&self, app: &mut App) {
+        if let Some(renderer) = Renderer::take(app, !self.headless) {
+            app.insert_resource(renderer);
+        }
+    }
+}

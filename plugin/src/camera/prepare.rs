@@ -1,0 +1,79 @@
+//! Textures for what is asked for.
+
+use bevy::{prelude::*, render::renderer::RenderDevice};
+
+use super::{
+    CameraError, TileBorder,
+    atlas::{Layout, render_target, target_image},
+    borrow::BorrowedTargets,
+    eye::{Eyes, spawn_camera},
+    request::Asked,
+};
+
+/// The common texture and how it is divided.
+#[derive(Resource, Default)]
+pub(super) struct Atlas {
+    /// Sizes of the pictures it was made for.
+    sizes: Vec<UVec2>,
+    pub(super) layout: Layout,
+    pub(super) image: Option<Handle<Image>>,
+}
+
+/// Makes room for all pictures. Nothing is done as long as their sizes stay as they are.
+pub(super) fn prepare(world: &mut World, asked: &Asked) -> Result<(), CameraError> {
+    divide_atlas(world, asked)?;
+    let mut cameras: Vec<(Entity, UVec2)> = Vec::new();
+    for (request, camera) in &asked.through {
+        if !cameras.contains(&(*camera, request.size)) {
+            cameras.push((*camera, request.size));
+        }
+    }
+    world.resource_scope(|world, mut targets: Mut<BorrowedTargets>| {
+        targets.update(&cameras, &mut world.resource_mut::<Assets<Image>>());
+    });
+    raise_border(world, asked);
+    Ok(())
+}
+
+fn divide_atlas(world: &mut World, asked: &Asked) -> Result<(), CameraError> {
+    let sizes: Vec<UVec2> = asked.following.iter().map(|(request, ..)| request.size).collect();
+    if sizes.is_empty() || sizes == world.resource::<Atlas>().sizes {
+        return Ok(());
+    }
+    let limit = world.resource::<RenderDevice>().limits().max_texture_dimension_2d;
+    let layout = Layout::new(&sizes, limit)?;
+    let atlas = world.resource::<Atlas>();
+    let mut image = atlas.image.clone().filter(|_| atlas.layout.size == layout.size);
+    if image.is_none() {
+        let new = world.resource_mut::<Assets<Image>>().add(target_image(layout.size));
+        point_camera(world, new.clone());
+        image = Some(new);
+    }
+    *world.resource_mut::<Atlas>() = Atlas { sizes, layout, image };
+    Ok(())
+}
+
+/// Lets the shared camera draw on the texture.
+fn point_camera(world: &mut World, image: Handle<Image>) {
+    let camera = world.resource::<Eyes>().camera.filter(|&camera| world.get::<Camera>(camera).is_some());
+    let camera = camera.unwrap_or_else(|| spawn_camera(world));
+    world.resource_mut::<Eyes>().camera = Some(camera);
+    let mut camera = world.entity_mut(camera);
+    camera.insert(render_target(image));
+    if let Some(mut projection) = camera.get_mut::<Projection>() {
+        // Makes Bevy look at the new target's size.
+        projection.set_changed();
+    }
+}
+
+/// Tile layers must reach as far as can be seen.
+fn raise_border(world: &mut World, asked: &Asked) {
+    let seen = |(request, _, width): &(super::request::Request, Entity, f32)| {
+        let height = width * request.size.y as f32 / request.size.x as f32;
+        width.max(height) / 2.0 + 1.0
+    };
+    let needed = asked.following.iter().map(seen).fold(0.0, f32::max);
+    if world.resource::<TileBorder>().0 < needed {
+        world.resource_mut::<TileBorder>().0 = needed;
+    }
+}

@@ -1,0 +1,100 @@
+//! What the agents ask to see.
+
+use bevy::{prelude::*, render::renderer::RenderDevice};
+
+use super::{CameraError, CameraSensor, CameraSource};
+use crate::{
+    agent::Agent,
+    fault::Faults,
+    headless::Tick,
+    vision::{ImageOptions, ImageSensor},
+};
+
+/// One agent's picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Request {
+    pub(super) agent: Entity,
+    /// The agent's number, for messages.
+    index: u32,
+    /// Columns and rows of pixels.
+    pub(super) size: UVec2,
+}
+
+/// All that is asked for and possible, in the order of the agents' numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Asked {
+    /// With the target and the width of the picture in world units.
+    pub(super) following: Vec<(Request, Entity, f32)>,
+    /// With the camera of the game.
+    pub(super) through: Vec<(Request, Entity)>,
+}
+
+impl Asked {
+    pub(super) fn is_empty(&self) -> bool {
+        self.following.is_empty() && self.through.is_empty()
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Request> {
+        let following = self.following.iter().map(|(request, ..)| request);
+        following.chain(self.through.iter().map(|(request, _)| request))
+    }
+}
+
+/// Reports an error for some agents.
+pub(super) fn report<'a>(world: &mut World, requests: impl Iterator<Item = &'a Request>, error: &CameraError) {
+    let tick = world.resource::<Tick>().0;
+    let mut faults = world.resource_mut::<Faults>();
+    for request in requests {
+        faults.report(format!("agent {}, tick {tick}: {error}", request.index));
+    }
+}
+
+/// Gathers what is asked for; what is impossible is reported.
+pub(super) fn requests(world: &mut World) -> Asked {
+    let limit = world.get_resource::<RenderDevice>().map(|device| device.limits().max_texture_dimension_2d);
+    let mut sensors = world.query::<(Entity, &CameraSensor, &ImageSensor, Option<&Agent>)>();
+    let mut all: Vec<_> = sensors
+        .iter(world)
+        .map(|(agent, sensor, image, identity)| {
+            let size = UVec2::new(image.0.width, image.0.height);
+            (Request { agent, index: identity.map_or(0, |agent| agent.index), size }, sensor.source, image.0)
+        })
+        .collect();
+    all.sort_by_key(|(request, ..)| (request.index, request.agent));
+    let mut asked = Asked::default();
+    for (request, source, options) in all {
+        let result = check_size(&options, limit.unwrap_or(u32::MAX)).and_then(|()| match source {
+            CameraSource::Following { target, width } => {
+                check_target(world, target, width).map(|()| asked.following.push((request, target, width)))
+            }
+            CameraSource::Camera(camera) => {
+                check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
+            }
+        });
+        if let Err(error) = result {
+            report(world, [&request].into_iter(), &error);
+        }
+    }
+    asked
+}
+
+fn check_size(options: &ImageOptions, limit: u32) -> Result<(), CameraError> {
+    options.check()?;
+    let ImageOptions { width, height, .. } = *options;
+    if width.max(height) > limit { Err(CameraError::OverLimit { width, height, limit }) } else { Ok(()) }
+}
+
+fn check_target(world: &World, target: Entity, width: f32) -> Result<(), CameraError> {
+    if !(width.is_finite() && width > 0.0) {
+        return Err(CameraError::Width(width));
+    }
+    world.get::<GlobalTransform>(target).map(|_| ()).ok_or(CameraError::NoTarget(target))
+}
+
+fn check_camera(world: &World, asked: &Asked, request: &Request, camera: Entity) -> Result<(), CameraError> {
+    if world.get::<Camera>(camera).is_none() || world.get::<Projection>(camera).is_none() {
+        return Err(CameraError::NoCamera(camera));
+    }
+    let shared = asked.through.iter().any(|(other, used)| *used == camera && other.size != request.size);
+    if shared { Err(CameraError::CameraShared(camera)) } else { Ok(()) }
+}
