@@ -144,7 +144,8 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
 }
 
 fn init_tracing(verbose: u8) {
-    let level = ["warn", "info", "debug"][usize::from(verbose.min(2))];
+    // A window manager without settings and a renderer in software are nothing to warn of.
+    let level = ["warn,winit=error,bevy_render::renderer=error", "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();

@@ -12,7 +12,7 @@ use bevy_playbot::{
     headless::set_fixed_step,
     keyboard::KeyboardPlugin,
     prelude::*,
-    vision::{ObservationKind, Sight, VisionError},
+    vision::{Sight, VisionError},
 };
 
 use super::{
@@ -66,7 +66,7 @@ impl GameWindow {
         app.add_plugins((PlaybotPlugin, KeyboardPlugin));
         set_fixed_step(&mut app, game.tick_hz());
         furnish_app(game, &mut app, playlist.mode(), &sight, seed)?;
-        if sight.kind == ObservationKind::Vector {
+        if !sight.is_image() {
             // Those who see pictures have brought it already.
             game.build_picture(&mut app);
         }

@@ -64,6 +64,7 @@ impl Plugin for CameraSensorPlugin {
     }
 
     fn cleanup(&self, app: &mut App) {
+        adapter::keep_memory();
         if let Some(renderer) = Renderer::take(app, !self.headless) {
             app.insert_resource(renderer);
         }

@@ -36,9 +36,6 @@ pub(super) fn players(
 ) {
     for (episode, action, plays_in, body, memory, mut transform, mut sprite, mut velocity) in &mut players {
         let Ok((arena, mut scenery)) = arenas.get_mut(plays_in.0) else { continue };
-        if !episode.is_running() {
-            continue;
-        }
         scenery.tick = episode.tick;
         let (body, memory) = (&body.0, &memory.0);
         // At the start of an episode, the action is still that of the last one.
