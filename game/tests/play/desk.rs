@@ -62,7 +62,12 @@ impl Desk {
             seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
             !seat.window.is_empty()
         });
-        seat.xdotool(&["windowfocus", &seat.window]);
+        seat.wait("keyboard", |seat| {
+            // Refused until the window is on the screen; keys pressed before would be lost.
+            seat.desk.xdotool(&["windowfocus", &seat.window]);
+            let focus = seat.desk.xdotool(&["getwindowfocus", "-f"]);
+            String::from_utf8_lossy(&focus.stdout).trim() == seat.window
+        });
         seat
     }
 

@@ -24,6 +24,7 @@ mod stage;
 mod tile_layer;
 mod velocity;
 
+pub use blank::BlankEpisodes;
 pub use card::UnknownSight;
 pub use frame::Frame;
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
