@@ -163,7 +163,7 @@ impl Looker {
     /// The picture that the next tick begins with; `None` when all levels have been played.
     fn tick(&mut self) -> Result<Option<Seen>, CliError> {
         tick_world(&mut self.world)?;
-        if !self.world.get::<Control>(self.agent).is_some_and(Control::is_active) {
+        if !self.world.get::<Control>(self.agent).is_some_and(|control| control.is_active()) {
             return Ok(None);
         }
         let episode = self.world.get::<Episode>(self.agent).expect("required by Agent");
