@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bevy::{prelude::*, tasks::tick_global_task_pools_on_main_thread};
 
 use super::{
-    BlankEpisodes, CameraError, ReadbackDelay,
+    CameraError, ReadbackDelay,
     borrow::{BorrowedTargets, Loan},
     eye::{self, Eye, Eyes, Stamp},
     eye_draw::{DrawnStamp, ExtractedStamp},
@@ -146,13 +146,6 @@ fn hand_out(world: &mut World, asked: &Asked, arrived: &Arrived, now: Stamp) {
         frame.pixels.clear();
         for row in rows {
             frame.pixels.extend(row.chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2], 255]));
-        }
-        let pixels = std::mem::take(&mut frame.pixels);
-        if let Some(mut blank) = agent.get_mut::<BlankEpisodes>() {
-            blank.count(&pixels);
-        }
-        if let Some(mut frame) = agent.get_mut::<Frame>() {
-            frame.pixels = pixels;
         }
     });
     for (agent, tick) in late {

@@ -21,7 +21,6 @@
 
 mod adapter;
 mod atlas;
-mod blank;
 mod borrow;
 mod error;
 mod eye;
@@ -37,7 +36,6 @@ mod scene_schedule;
 mod sensor;
 mod tiles;
 
-pub use blank::BlankEpisodes;
 pub use error::CameraError;
 pub use eye::SensorCamera;
 pub use plugin::CameraSensorPlugin;

@@ -3,7 +3,7 @@
 use bevy::{prelude::*, render::RenderApp};
 
 use super::{
-    ReadbackDelay, TileLayerPlugin, adapter, blank,
+    ReadbackDelay, TileLayerPlugin, adapter,
     borrow::BorrowedTargets,
     eye::{Eyes, Stamp},
     eye_draw, images, look,
@@ -12,7 +12,10 @@ use super::{
     renderer::{self, Renderer},
     scene_schedule::add_renderer,
 };
-use crate::{systems::ObserveSchedule, vision::VisionError, vision::VisionSystems};
+use crate::{
+    systems::ObserveSchedule,
+    vision::{VisionError, VisionPlugin, VisionSystems},
+};
 
 /// Adds [`CameraSensor`](super::CameraSensor)s to a game.
 ///
@@ -53,6 +56,7 @@ impl Plugin for CameraSensorPlugin {
         } else if !app.is_plugin_added::<TileLayerPlugin>() && app.get_sub_app(RenderApp).is_some() {
             app.add_plugins(TileLayerPlugin);
         }
+        VisionPlugin::add_to(app);
         eye_draw::add_eyes(app);
         app.init_resource::<ReadbackDelay>()
             .init_resource::<Atlas>()
@@ -61,11 +65,6 @@ impl Plugin for CameraSensorPlugin {
             .init_resource::<Stamp>()
             .init_resource::<Readback>()
             .init_resource::<images::MissingImages>()
-            .add_observer(blank::report_blank)
-            .configure_sets(
-                ObserveSchedule,
-                (VisionSystems::Dress, VisionSystems::Look, VisionSystems::Compose).chain(),
-            )
             // It reads whatever can be drawn; what a game changes in `Dress` or before is seen.
             .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Look).ambiguous_with_all());
         if !self.headless {
@@ -74,6 +73,7 @@ impl Plugin for CameraSensorPlugin {
     }
 
     fn cleanup(&self, app: &mut App) {
+        adapter::keep_memory();
         if let Some(renderer) = Renderer::take(app, !self.headless) {
             app.insert_resource(renderer);
         }

@@ -2,7 +2,6 @@
 
 use bevy::prelude::*;
 
-use super::BlankEpisodes;
 use crate::vision::{ImageOptions, ImageSensor};
 
 /// Where a [`CameraSensor`] looks from.
@@ -24,7 +23,7 @@ pub enum CameraSource {
 /// One that follows a target sees the 2D scene on render layer 0, in front of the World's `ClearColor`: sprites, tile
 /// layers, 2D meshes. Colours come back as the bytes of the images they are from.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
-#[require(ImageSensor, BlankEpisodes)]
+#[require(ImageSensor)]
 pub struct CameraSensor {
     /// Where it looks from.
     pub source: CameraSource,

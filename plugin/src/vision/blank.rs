@@ -4,45 +4,53 @@ use bevy::prelude::*;
 
 use crate::{agent::Agent, episode::EpisodeEnded, fault::Faults};
 
-/// Whether all pictures of an agent's running episode were of one colour.
-#[derive(Component, Clone, Copy, Debug, Default)]
-pub(crate) struct BlankWatch {
-    /// There was a picture, and each was of one colour.
+/// Counts the episodes of an agent in which each picture was of a single colour: it saw nothing.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BlankEpisodes {
+    /// Finished episodes in which nothing was to be seen.
+    pub episodes: u64,
+    /// There was a picture in this episode, and each was of one colour.
     blank: bool,
     /// Something was to be seen in this episode.
-    seen: bool,
-    /// The agent was reported before.
-    reported: bool,
+    sees: bool,
+    /// Something was to be seen in some episode.
+    has_seen: bool,
 }
 
-impl BlankWatch {
-    /// Looks at a picture of the episode. Once there was something to be seen, this costs nothing.
+impl BlankEpisodes {
+    /// Looks at a picture of the episode. Once something was to be seen, this costs nothing.
     pub(super) fn note(&mut self, pixels: &[[u8; 4]], starts: bool) {
         if starts {
-            (self.blank, self.seen) = (false, false);
+            self.sees = false;
         }
-        if self.seen {
-            return;
+        if !self.sees {
+            self.sees = pixels.iter().any(|pixel| pixel != &pixels[0]);
+            self.has_seen |= self.sees;
+            self.blank = !self.sees;
         }
-        self.seen = pixels.iter().any(|pixel| pixel != &pixels[0]);
-        self.blank = !self.seen;
     }
 }
 
-/// Reports an agent whose pictures were of one colour for a whole episode: the first time, and then no more.
+/// Reports an agent that saw nothing in its first episodes: its sensor looks at nothing that is drawn. For an agent that
+/// has seen something before, it may be the level, which is worth a warning, the first time.
 pub(super) fn report_blank(
     event: On<EpisodeEnded>,
-    mut eyes: Query<(&Agent, &mut BlankWatch)>,
+    mut eyes: Query<(&Agent, &mut BlankEpisodes)>,
     mut faults: ResMut<Faults>,
 ) {
-    let Ok((agent, mut watch)) = eyes.get_mut(event.entity) else { return };
-    if watch.blank && !watch.reported {
-        watch.reported = true;
-        faults.report(format!(
-            "agent {}, level {}: each picture of an episode of {} ticks was of a single colour; point the sensor at \
-             something that is drawn",
-            agent.index, event.level, event.ticks
-        ));
+    let Ok((agent, mut eye)) = eyes.get_mut(event.entity) else { return };
+    if !std::mem::take(&mut eye.blank) {
+        return;
     }
-    watch.blank = false;
+    eye.episodes += 1;
+    let what = format!(
+        "agent {}, level {}: each picture of an episode of {} ticks was of a single colour; point its sensor at something \
+         that is drawn",
+        agent.index, event.level, event.ticks
+    );
+    if !eye.has_seen {
+        faults.report(what);
+    } else if eye.episodes == 1 {
+        tracing::warn!("{what}");
+    }
 }

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::{
     Frame, ImageOptions, ImageSensor, PaintedVelocity, VisionError,
-    blank::BlankWatch,
+    blank::BlankEpisodes,
     planes,
     stack::{Moment, PictureStack},
 };
@@ -47,12 +47,12 @@ pub(super) fn compose(
     mut agents: Query<(
         (&Agent, &Control, &Episode, &EpisodeCount),
         (&ImageSensor, &Frame, Option<&PaintedVelocity>),
-        (&mut PictureStack, &mut BlankWatch, &mut Observation),
+        (&mut PictureStack, &mut BlankEpisodes, &mut Observation),
     )>,
     mut faults: ResMut<Faults>,
 ) {
     for &entity in order.entities() {
-        let Ok(((agent, control, episode, count), (sensor, frame, velocity), (mut stack, mut watch, mut observation))) =
+        let Ok(((agent, control, episode, count), (sensor, frame, velocity), (mut stack, mut blank, mut observation))) =
             agents.get_mut(entity)
         else {
             continue;
@@ -65,7 +65,7 @@ pub(super) fn compose(
             faults.report(format!("agent {}, level {level}, tick {tick}: {error}", agent.index));
             continue;
         }
-        watch.note(&frame.pixels, episode.tick == 0);
+        blank.note(&frame.pixels, episode.tick == 0);
         let moment = Moment { episode: count.finished, level: episode.level, tick: episode.tick };
         write_image(&sensor.0, frame, velocity, moment, &mut stack, &mut observation.image);
     }

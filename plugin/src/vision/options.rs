@@ -5,7 +5,7 @@ use playbot_learner::{ImageShape, ObsKind};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Frame, blank::BlankWatch, stack::PictureStack};
+use super::{Frame, blank::BlankEpisodes, stack::PictureStack};
 
 /// Largest width and height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 1024;
@@ -109,5 +109,5 @@ impl ImageOptions {
 
 /// Marks an agent whose policy reads pictures of this size and form. Comes with every sensor that makes pictures.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[require(Frame, BlankWatch, PictureStack)]
+#[require(Frame, BlankEpisodes, PictureStack)]
 pub struct ImageSensor(pub ImageOptions);

@@ -1,0 +1,109 @@
+//! Where a sprite lies and which part of its image it shows, by the rules of Bevy's sprite renderer.
+
+use bevy::{
+    prelude::*,
+    sprite::{Anchor, SpriteScalingMode},
+};
+
+use super::{error::Undrawable, pose::Pose};
+
+/// A parallelogram: a corner and two sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Quad {
+    /// The sprite's bottom left corner.
+    pub corner: Vec2,
+    /// From the left to the right.
+    pub across: Vec2,
+    /// From the bottom to the top.
+    pub up: Vec2,
+}
+
+/// A part of an image, in texels from its top left: from `start`, which the bottom left corner of the sprite shows, to
+/// `start + size`, which the top right corner shows. So y falls, and a flip turns a size around.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part {
+    pub start: Vec2,
+    pub size: Vec2,
+}
+
+/// Lays a sprite out.
+pub(super) fn lay_out(
+    sprite: &Sprite,
+    anchor: &Anchor,
+    pose: &Pose,
+    image_size: Vec2,
+    layouts: &Assets<TextureAtlasLayout>,
+) -> Result<(Quad, Part), Undrawable> {
+    let rect = shown_rect(sprite, image_size, layouts)?;
+    let mut part = Part { start: Vec2::new(rect.min.x, rect.max.y), size: Vec2::new(rect.width(), -rect.height()) };
+    for (axis, flipped) in [sprite.flip_x, sprite.flip_y].into_iter().enumerate() {
+        if flipped {
+            part.start[axis] += part.size[axis];
+            part.size[axis] = -part.size[axis];
+        }
+    }
+    let mut size = sprite.custom_size.unwrap_or(rect.size());
+    let mut shift = Vec2::ZERO;
+    match sprite.image_mode {
+        SpriteImageMode::Auto => {}
+        SpriteImageMode::Scale(mode) => scale(mode, rect.size(), &mut size, &mut shift, &mut part),
+        SpriteImageMode::Sliced(_) => return Err(Undrawable::Mode("Sliced")),
+        SpriteImageMode::Tiled { .. } => return Err(Undrawable::Mode("Tiled")),
+    }
+    let corner = (size + shift) * (-anchor.as_vec() - Vec2::splat(0.5));
+    let (x, y) = (pose.x.truncate(), pose.y.truncate());
+    let quad = Quad { corner: x * corner.x + y * corner.y + pose.at.truncate(), across: x * size.x, up: y * size.y };
+    Ok((quad, part))
+}
+
+/// A rectangle counts from the top left of the atlas's section, if there is one.
+fn shown_rect(sprite: &Sprite, image_size: Vec2, layouts: &Assets<TextureAtlasLayout>) -> Result<Rect, Undrawable> {
+    let Some(atlas) = &sprite.texture_atlas else {
+        return Ok(sprite.rect.unwrap_or(Rect { min: Vec2::ZERO, max: image_size }));
+    };
+    let section = atlas.texture_rect(layouts).ok_or(Undrawable::Atlas(atlas.index))?.as_rect();
+    Ok(sprite.rect.map_or(section, |rect| Rect { min: rect.min + section.min, max: rect.max + section.min }))
+}
+
+/// Which end of the longer axis is kept: of the image when it fills, of the space when it fits.
+#[derive(Clone, Copy)]
+enum Keep {
+    Start,
+    Centre,
+    End,
+}
+
+/// Keeps the image's aspect ratio: `Fill` modes cut the image, `Fit` modes shrink the rectangle.
+fn scale(mode: SpriteScalingMode, texture: Vec2, size: &mut Vec2, shift: &mut Vec2, part: &mut Part) {
+    let (fills, keep) = match mode {
+        SpriteScalingMode::FillStart => (true, Keep::Start),
+        SpriteScalingMode::FillCenter => (true, Keep::Centre),
+        SpriteScalingMode::FillEnd => (true, Keep::End),
+        SpriteScalingMode::FitStart => (false, Keep::Start),
+        SpriteScalingMode::FitCenter => (false, Keep::Centre),
+        SpriteScalingMode::FitEnd => (false, Keep::End),
+    };
+    let (wanted, given) = (size.x / size.y, texture.x / texture.y);
+    let wider = wanted > given;
+    let share = if wider { given / wanted } else { wanted / given };
+    if fills {
+        let axis = usize::from(wider);
+        let spare = part.size[axis] * (1.0 - share);
+        // Parts start at the bottom, but vertically it is the top that counts as the start.
+        part.start[axis] += match (keep, axis) {
+            (Keep::Centre, _) => spare * 0.5,
+            (Keep::Start, 1) | (Keep::End, 0) => spare,
+            _ => 0.0,
+        };
+        part.size[axis] *= share;
+    } else {
+        let axis = usize::from(!wider);
+        let spare = size[axis] * (1.0 - share);
+        size[axis] *= share;
+        shift[axis] = match (keep, axis) {
+            (Keep::Centre, _) => 0.0,
+            (Keep::Start, 0) | (Keep::End, 1) => spare,
+            _ => -spare,
+        };
+    }
+}

@@ -1,0 +1,123 @@
+//! Images as texels, converted once.
+
+use bevy::{asset::AssetId, platform::collections::HashMap, prelude::*};
+
+use super::{
+    colour::{Rgba, SRGB},
+    error::Undrawable,
+};
+
+/// How much of what lies behind an image shows through it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cover {
+    /// Nothing: all texels are opaque.
+    Opaque,
+    /// Each texel is there or not.
+    Cutout,
+    /// Some texels are half transparent.
+    Blended,
+}
+
+/// An image, top row first.
+#[derive(Clone, Debug)]
+pub(super) struct Texture {
+    pub width: u32,
+    pub height: u32,
+    pub texels: Vec<Rgba>,
+    pub cover: Cover,
+}
+
+impl Texture {
+    /// A single white texel: the image of rectangles of one colour.
+    fn white() -> Self {
+        Self { width: 1, height: 1, texels: vec![[255; 4]], cover: Cover::Opaque }
+    }
+
+    fn of(image: &Image) -> Result<Self, Undrawable> {
+        let bytes = image.data.as_ref().ok_or(Undrawable::NoPixels)?;
+        let (width, height) = (image.width(), image.height());
+        // The type of the format has no name in a program without a renderer.
+        let format = format!("{:?}", image.texture_descriptor.format);
+        let convert: fn([u8; 4]) -> Rgba = match format.as_str() {
+            "Rgba8UnormSrgb" => |texel| texel,
+            "Bgra8UnormSrgb" => |[blue, green, red, alpha]| [red, green, blue, alpha],
+            "Rgba8Unorm" => |[red, green, blue, alpha]| {
+                let [red, green, blue] = [red, green, blue].map(|light| SRGB.encode(f32::from(light) / 255.0));
+                [red, green, blue, alpha]
+            },
+            _ => return Err(Undrawable::Format(format)),
+        };
+        if bytes.len() != 4 * width as usize * height as usize {
+            return Err(Undrawable::Bytes { bytes: bytes.len(), width, height });
+        }
+        let texels: Vec<Rgba> = bytes.as_chunks().0.iter().map(|texel| convert(*texel)).collect();
+        let cover = cover(&texels);
+        Ok(Self { width, height, texels, cover })
+    }
+}
+
+fn cover(texels: &[Rgba]) -> Cover {
+    if texels.iter().all(|texel| texel[3] == 255) {
+        Cover::Opaque
+    } else if texels.iter().all(|texel| matches!(texel[3], 0 | 255)) {
+        Cover::Cutout
+    } else {
+        Cover::Blended
+    }
+}
+
+/// Number of a texture in [`Textures`].
+pub(super) type TextureId = usize;
+
+/// Textures of the images that were drawn so far.
+#[derive(Debug, Default)]
+pub(super) struct Textures {
+    known: HashMap<AssetId<Image>, TextureId>,
+    all: Vec<Texture>,
+    /// What was asked for last, which is often asked for again.
+    last: Option<(AssetId<Image>, TextureId)>,
+}
+
+impl Textures {
+    /// Forgets everything if an image has changed, come or gone.
+    pub fn refresh(&mut self, images: &Res<Assets<Image>>) {
+        if images.is_changed() {
+            self.known.clear();
+            self.all.clear();
+            self.last = None;
+        }
+    }
+
+    /// The texture of an image.
+    pub fn find(&mut self, handle: &Handle<Image>, images: &Assets<Image>) -> Result<TextureId, Undrawable> {
+        let asset = handle.id();
+        if let Some((last, id)) = self.last
+            && last == asset
+        {
+            return Ok(id);
+        }
+        let id = match self.known.get(&asset) {
+            Some(id) => *id,
+            None => self.add(asset, images)?,
+        };
+        self.last = Some((asset, id));
+        Ok(id)
+    }
+
+    fn add(&mut self, asset: AssetId<Image>, images: &Assets<Image>) -> Result<TextureId, Undrawable> {
+        let texture = match images.get(asset) {
+            Some(image) => Texture::of(image)?,
+            // Bevy's renderer brings this one along.
+            None if asset == AssetId::default() => Texture::white(),
+            None => return Err(Undrawable::NotLoaded),
+        };
+        self.all.push(texture);
+        self.known.insert(asset, self.all.len() - 1);
+        Ok(self.all.len() - 1)
+    }
+
+    /// A texture that was found.
+    pub fn get(&self, id: TextureId) -> &Texture {
+        &self.all[id]
+    }
+}
