@@ -58,10 +58,12 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
     }
     let (plain, with_physics) = (registry::game("coinrun")?, &CoinRun { physics: true });
-    let cases: [Case; 4] = [
+    let cases: &[Case] = &[
         ("sim/coinrun/vector", plain, see_vectors),
         ("sim/coinrun/physics", with_physics, see_vectors),
         ("sim/coinrun/raster", plain, see_raster),
+        #[cfg(feature = "camera")]
+        ("sim/coinrun/camera", plain, see_camera),
         ("train/coinrun/vector", plain, train),
     ];
     let wanted: Vec<_> = cases.iter().filter(|(name, ..)| name.contains(&args.case)).collect();
@@ -69,7 +71,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         return Err(CliError::Usage(format!(
             "no case is called `{}`; cases: {}",
             args.case,
-            cases.map(|(name, ..)| name).join(", ")
+            cases.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ")
         )));
     }
     for (name, game, measure) in wanted {
@@ -114,6 +116,11 @@ fn see_vectors(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
 
 fn see_raster(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
     simulate(game, ObservationKind::Raster, args)
+}
+
+#[cfg(feature = "camera")]
+fn see_camera(game: &dyn Game, args: &Args) -> Result<Measure, CliError> {
+    simulate(game, ObservationKind::Camera, args)
 }
 
 /// Random actions on hard levels, observations filled every tick.
