@@ -33,7 +33,7 @@ fn restart(event: On<StartEpisode>, mut cells: Query<&mut Cell>) {
     }
 }
 
-fn see(mut agents: Query<(&Cell, &Episode, &mut Observation)>, poison: Option<Res<PoisonAt>>) {
+fn see(mut agents: Query<(&Cell, &Episode, &mut Observation), With<VectorSensor>>, poison: Option<Res<PoisonAt>>) {
     for (cell, episode, mut observation) in &mut agents {
         let poisoned = poison.as_ref().is_some_and(|poison| poison.0 == episode.tick);
         let x = if poisoned { f32::NAN } else { cell.0 as f32 / 3.0 - 1.0 };

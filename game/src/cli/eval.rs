@@ -215,7 +215,12 @@ pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSourc
     SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
 }
 
-fn check_fit(game: &dyn Game, name: &str, sight: &Sight, policy: &Policy) -> Result<(), CliError> {
+/// Checks that a policy reads what the game shows it, and acts as the game does.
+///
+/// # Errors
+///
+/// What differs, in words.
+pub fn check_fit(game: &dyn Game, name: &str, sight: &Sight, policy: &Policy) -> Result<(), CliError> {
     sight.check(game)?;
     let (seen, acts) = (sight.obs_kind(game), game.actions());
     if (policy.observation(), policy.action_space()) == (seen, acts) {

@@ -7,6 +7,7 @@ mod demo;
 mod error;
 mod eval;
 mod experiment;
+mod eyes;
 mod interrupt;
 mod learn_skills;
 mod level;
@@ -81,6 +82,8 @@ enum Verb {
     Config(config::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
+    /// Compare what the camera and the raster see.
+    Eyes(eyes::Args),
     /// Make and look at policy files.
     Policy(policy::Args),
     /// List, show and compare trainings.
@@ -134,6 +137,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Study(args) => study::run(args),
         Verb::Config(args) => config::run(args),
         Verb::Eval(args) => eval::run(args),
+        Verb::Eyes(args) => eyes::run(args),
         Verb::Policy(args) => policy::run(args),
         Verb::Runs(args) => runs::run(args),
         Verb::Level(args) => level::run(args),
@@ -144,7 +148,8 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
 }
 
 fn init_tracing(verbose: u8) {
-    let level = ["warn", "info", "debug"][usize::from(verbose.min(2))];
+    // A window manager without settings and a renderer in software are nothing to warn of.
+    let level = ["warn,winit=error,bevy_render::renderer=error", "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();

@@ -7,12 +7,13 @@ use bevy::{
     winit::{UpdateMode, WinitSettings},
 };
 use bevy_playbot::{
+    camera::TileLayerPlugin,
     demo::{file::DemoWriter, recorder::Recorder},
     game::{furnish_app, spawn_agents},
     headless::set_fixed_step,
     keyboard::KeyboardPlugin,
     prelude::*,
-    vision::{ObservationKind, Sight, VisionError},
+    vision::{Sight, VisionError},
 };
 
 use super::{
@@ -63,10 +64,10 @@ impl GameWindow {
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         sight.check(game)?;
         let mut app = bevy_app(game.name())?;
-        app.add_plugins((PlaybotPlugin, KeyboardPlugin));
+        app.add_plugins((PlaybotPlugin, KeyboardPlugin, TileLayerPlugin));
         set_fixed_step(&mut app, game.tick_hz());
         furnish_app(game, &mut app, playlist.mode(), &sight, seed)?;
-        if sight.kind == ObservationKind::Vector {
+        if !sight.is_image() {
             // Those who see pictures have brought it already.
             game.build_picture(&mut app);
         }

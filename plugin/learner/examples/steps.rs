@@ -1,5 +1,5 @@
 //! How long one training step takes at the sizes of the paper: the skill model, a small tanh network, and one
-//! minibatch of PPO on CoinRun.
+//! minibatch of PPO on CoinRun; and both image encoders on 64×64 RGB, from bytes to features alone and as a step.
 //!
 //! `cargo run --release -p playbot_learner --example steps`. Each step is forward, backward and Adam; every line has
 //! the best and the median time in milliseconds, and the number of steps timed. `--json` prints one object per line;
@@ -8,12 +8,15 @@
 #![allow(clippy::print_stdout)]
 
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionRows, Activation, Adam, AdamConfig, Mlp, NamedGrads, tracked};
+use playbot_learner::nn::{
+    ActionRows, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, ObsRows, tracked,
+};
 use playbot_learner::policy::{Actor, Critic, NetShape};
 use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, gradient_step};
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal, unit};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, PpoConfig, SkillConfig, SkillTrainer, StdKind,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, PpoConfig, SkillConfig,
+    SkillTrainer, StdKind,
 };
 use std::time::Instant;
 
@@ -24,7 +27,12 @@ fn main() -> Result<(), LearnError> {
     for batch in [64, 512] {
         mlp(batch, 400)?;
     }
-    ppo(60)
+    ppo(60)?;
+    for (batch, rounds) in [(64, 30), (250, 12), (2048, 3)] {
+        cnn("Nature", &CnnKind::Nature { feature: 512 }, batch, rounds)?;
+        cnn("IMPALA", &CnnKind::default(), batch, rounds.div_ceil(3))?;
+    }
+    Ok(())
 }
 
 /// The paper's skill model on vectors of AntMaze's size.
@@ -91,6 +99,36 @@ fn ppo(rounds: usize) -> Result<(), LearnError> {
     let mut adam = Adam::new(AdamConfig::default());
     time("PPO 563-200-200-15 relu, batch 2048", rounds, || {
         Ok(gradient_step(&mut nets, &mut adam, &batch, &config, None, 3e-4)?.grad_norm)
+    })
+}
+
+/// The features of a batch of images, and a step towards others.
+fn cnn(name: &str, kind: &CnnKind, batch: usize, rounds: usize) -> Result<(), LearnError> {
+    let mut rng = Streams::new(1).stream("cnn", 0);
+    let device = DEVICE.plain();
+    let image = ImageShape { channels: 3, height: 64, width: 64 };
+    let frozen = ImageNet::new(kind, image, &mut rng, &device)?;
+    let mut net = tracked(&frozen);
+    let pixels: Vec<u8> = (0..batch * image.numbers()).map(|_| (unit(&mut rng) * 256.0) as u8).collect();
+    let target = normals(batch * kind.features(), &mut rng);
+    let target = Tensor::<2>::from_data(TensorData::new(target, [batch, kind.features()]), &device);
+    let features = |net: &ImageNet| {
+        let shape = [batch, image.channels, image.height, image.width];
+        match ObsRows::pixels(pixels.clone(), shape, &device) {
+            ObsRows::Image(x) => Ok(net.forward(x)),
+            ObsRows::Vector(_) => Err(LearnError::Config("pixels are images".to_owned())),
+        }
+    };
+    time(&format!("{name} 64x64x3, batch {batch}, features alone"), rounds, || {
+        let sum = features(&frozen)?.sum().into_scalar::<f32>();
+        Ok(f64::from(sum))
+    })?;
+    let mut adam = Adam::new(AdamConfig::default());
+    time(&format!("{name} 64x64x3, batch {batch}"), rounds, || {
+        let loss = (features(&net)? - target.clone()).square().mean();
+        let grads = NamedGrads::take(&mut net, "", loss.backward())?;
+        adam.step(&mut net, "", &grads, 3e-4, 1.0)?;
+        Ok(grads.norm())
     })
 }
 

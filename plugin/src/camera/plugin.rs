@@ -38,6 +38,15 @@ impl CameraSensorPlugin {
         adapter::check()?;
         Ok(Self { headless: true })
     }
+
+    /// For an app with or without a window, whichever it is: only one without a renderer gets one.
+    ///
+    /// # Errors
+    ///
+    /// [`VisionError::NoAdapter`].
+    pub fn for_app(app: &App) -> Result<Self, VisionError> {
+        if app.get_sub_app(RenderApp).is_some() { Ok(Self::default()) } else { Self::headless() }
+    }
 }
 
 impl Plugin for CameraSensorPlugin {
@@ -64,6 +73,7 @@ impl Plugin for CameraSensorPlugin {
     }
 
     fn cleanup(&self, app: &mut App) {
+        adapter::keep_memory();
         if let Some(renderer) = Renderer::take(app, !self.headless) {
             app.insert_resource(renderer);
         }

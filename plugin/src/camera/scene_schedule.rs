@@ -2,7 +2,7 @@
 
 use bevy::{
     app::TaskPoolPlugin,
-    asset::AssetPlugin,
+    asset::{AssetEventSystems, AssetPlugin},
     camera::CameraPlugin,
     core_pipeline::CorePipelinePlugin,
     diagnostic::FrameCountPlugin,
@@ -57,7 +57,7 @@ impl SceneSchedule {
     pub(super) fn new() -> Self {
         let mut app = App::new();
         add_renderer(&mut app, adapter::none());
-        app.add_systems(PostUpdate, images::note_missing_images);
+        app.add_systems(PostUpdate, images::note_missing_images.after(AssetEventSystems));
         let mut schedules = app.world_mut().resource_mut::<Schedules>();
         let mut take = |label: bevy::ecs::schedule::InternedScheduleLabel| {
             let mut schedule = schedules.remove(label).unwrap_or_else(|| Schedule::new(label));

@@ -11,7 +11,7 @@ use bevy_playbot::{
     game::{Game, check_mode},
     learner::PolicyFile,
     policy::ActionDraw,
-    policy_file::check_policy,
+    policy_file::{check_policy, policy_sight},
     skill_prior::SkillPrior,
     split::LevelSplit,
     train::{Learner, run_dir::RunDir},
@@ -23,6 +23,7 @@ use crate::{
     cli::{
         demo::deciders,
         error::{CliError, Outcome},
+        eval::check_fit,
         interrupt, methods,
     },
     registry,
@@ -35,10 +36,9 @@ const LAST_LEVEL: u64 = u32::MAX as u64;
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     let playlist = playlist(game, &args)?;
-    let partner = partner(game, &args)?;
+    let (partner, sight) = partner(game, &args)?;
     let header = header(game, playlist.mode(), &args);
     let seed = args.seed.unwrap_or(0);
-    let sight = Sight::default();
     let mut window = GameWindow::open(WindowSetup { game, playlist, partner, sight, seed, stop: interrupt::asked })?;
     // Not before there is a window: a recording without one would only be in the way.
     if let Some(path) = &args.record {
@@ -70,28 +70,31 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
     Ok(Playlist::new(levels, first))
 }
 
-/// Whoever takes over with Tab.
-fn partner(game: &dyn Game, args: &Args) -> Result<Option<Partner>, CliError> {
-    let draw = if args.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+/// Whoever takes over with Tab, and what it sees.
+fn partner(game: &dyn Game, args: &Args) -> Result<(Option<Partner>, Sight), CliError> {
     if let Some(name) = &args.bot {
-        return Ok(Some(Partner { name: name.clone(), player: methods::bot(game, name)? }));
+        let partner = Partner { name: name.clone(), player: methods::bot(game, name)? };
+        return Ok((Some(partner), Sight::default()));
     }
-    if let Some(path) = &args.policy {
+    let (name, policy, prior, sight) = if let Some(path) = &args.policy {
         let file = PolicyFile::load(path, args.device)?;
         check_policy(game, &file)?;
-        let prior = file.skills.as_ref().map(SkillPrior::from);
-        let player = Player::Policy { policy: file.policy, prior, draw };
-        return Ok(Some(Partner { name: file.card.algorithm, player }));
-    }
-    let Some(path) = &args.run else { return Ok(None) };
-    let (run, experiment, info) = RunDir::open(path)?;
-    if experiment.game != game.name() {
-        return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
-    }
-    let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
-    let prior = learner.skills().as_ref().map(SkillPrior::from);
-    let player = Player::Policy { policy: learner.policy(), prior, draw };
-    Ok(Some(Partner { name: info.algorithm.name().to_owned(), player }))
+        let sight = policy_sight(&file)?;
+        (file.card.algorithm, file.policy, file.skills, sight)
+    } else if let Some(path) = &args.run {
+        let (run, experiment, info) = RunDir::open(path)?;
+        if experiment.game != game.name() {
+            return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
+        }
+        let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
+        (info.algorithm.name().to_owned(), learner.policy(), learner.skills(), experiment.sight())
+    } else {
+        return Ok((None, Sight::default()));
+    };
+    check_fit(game, &name, &sight, &policy)?;
+    let draw = if args.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    let player = Player::Policy { policy, prior: prior.as_ref().map(SkillPrior::from), draw };
+    Ok((Some(Partner { name, player }), sight))
 }
 
 fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {

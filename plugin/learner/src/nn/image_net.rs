@@ -118,7 +118,8 @@ impl ImageNet {
         features
     }
 
-    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`.
+    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`. Gradients reach the parameters, not
+    /// the pixels.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
         match self {
             Self::Impala(net) => net.forward(pixels),
@@ -134,9 +135,8 @@ impl ImageNet {
     }
 }
 
-/// ReLU of `fc` over the channels, rows and columns of `x`, in this order.
-pub(super) fn last_layer(fc: &Linear, x: Tensor<4>) -> Tensor<2> {
-    let flat: Tensor<2> = x.flatten(1, 3);
+/// ReLU of `fc` over the channels, rows and columns of images, in this order.
+pub(super) fn last_layer(fc: &Linear, flat: Tensor<2>) -> Tensor<2> {
     let [n, _] = flat.dims();
     // Matrix libraries sum a single row in another order than the rows of a matrix; an image's features shall not
     // depend on the others in the batch.

@@ -3,6 +3,7 @@
 use super::conv::{Conv2d, max_pool, window_places};
 use super::image_net::last_layer;
 use super::params::{ParamVisitor, Parameters, path};
+use super::trunk::{self, Stage};
 use super::{Activation, Linear};
 use crate::ImageShape;
 use burn::tensor::{Device, Tensor};
@@ -60,8 +61,12 @@ impl Impala {
 
     /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        let x = self.stages.iter().fold(pixels, |x, stage| stage.forward(x));
-        last_layer(&self.fc, Activation::Relu.forward(x))
+        let stages: Vec<Stage<'_>> = self.stages.iter().flat_map(ImpalaStage::of_trunk).collect();
+        let flat = trunk::forward(&pixels, &stages).unwrap_or_else(|| {
+            let x = self.stages.iter().fold(pixels, |x, stage| stage.forward(x));
+            Activation::Relu.forward(x).flatten(1, 3)
+        });
+        last_layer(&self.fc, flat)
     }
 }
 
@@ -71,6 +76,12 @@ impl ImpalaStage {
         let first = conv(inputs);
         let mut block = || ResidualBlock { conv0: conv(outputs), conv1: conv(outputs) };
         Self { conv: first, blocks: [block(), block()] }
+    }
+
+    fn of_trunk(&self) -> [Stage<'_>; 3] {
+        let [block0, block1] = &self.blocks;
+        let [second, third] = [block0, block1].map(|block| Stage::Residual(&block.conv0, &block.conv1));
+        [Stage::Pool(&self.conv), second, third]
     }
 
     /// `[n, inputs, height, width]` to `[n, outputs, ⌈height/2⌉, ⌈width/2⌉]`.

@@ -24,6 +24,7 @@ mod params;
 mod sample;
 mod squash;
 mod tensors;
+mod trunk;
 
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};

@@ -3,6 +3,7 @@
 use super::conv::{Conv2d, window_places};
 use super::image_net::last_layer;
 use super::params::{ParamVisitor, Parameters, path};
+use super::trunk::{self, Stage};
 use super::{Activation, Linear};
 use crate::ImageShape;
 use burn::tensor::{Device, Tensor};
@@ -37,8 +38,12 @@ impl Nature {
 
     /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        let x = self.convs.iter().fold(pixels, |x, conv| Activation::Relu.forward(conv.forward(x)));
-        last_layer(&self.fc, x)
+        let stages: Vec<Stage<'_>> = self.convs.iter().map(Stage::Relu).collect();
+        let flat = trunk::forward(&pixels, &stages).unwrap_or_else(|| {
+            let x = self.convs.iter().fold(pixels, |x, conv| Activation::Relu.forward(conv.forward(x)));
+            x.flatten(1, 3)
+        });
+        last_layer(&self.fc, flat)
     }
 }
 

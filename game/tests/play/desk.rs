@@ -1,0 +1,181 @@
+//! A display of a test's own, with hands and eyes.
+
+use std::{
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Child, Command, ExitStatus, Output, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+/// Nothing takes longer, not even on a machine that draws in software and has other things to do.
+const PATIENCE: Duration = Duration::from_secs(60);
+const NEEDS: &str = "this test opens a window on a display of its own and needs Xvfb, xdotool and a Vulkan driver: \
+                     `apt-get install xvfb xdotool mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0`";
+
+/// An X server without a screen.
+pub struct Desk {
+    server: Child,
+    display: String,
+    folder: tempfile::TempDir,
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+impl Desk {
+    /// Starts a server with a free number. Its screen is a file.
+    pub fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-noreset", "-nolisten", "tcp", "-fbdir"])
+            .arg(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect(NEEDS);
+        let mut number = String::new();
+        let said = BufReader::new(server.stdout.take().expect("piped")).read_line(&mut number);
+        assert!(said.is_ok() && !number.is_empty(), "Xvfb does not start");
+        Self { server, display: format!(":{}", number.trim()), folder }
+    }
+
+    /// The program with these arguments, on this display.
+    pub fn playbot(&self, folder: &Path, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        command.args(args).current_dir(folder).env("DISPLAY", &self.display);
+        command
+    }
+
+    /// Starts the program and waits for its window.
+    pub fn open(&self, folder: &Path, args: &[&str]) -> Seat<'_> {
+        // Out of the way of the window, which would otherwise have the keyboard before it is given it.
+        self.xdotool(&["mousemove", "1000", "760"]);
+        let mut command = self.playbot(folder, args);
+        let program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+        let mut seat = Seat { desk: self, program, window: String::new() };
+        seat.wait("a window", |seat| {
+            // Only the words for people begin like this: the window has started to play.
+            let found = seat.desk.xdotool(&["search", "--name", "^coinrun .* tick"]);
+            seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
+            !seat.window.is_empty()
+        });
+        seat.wait("keyboard", |seat| {
+            // Refused until the window is on the screen; keys pressed before would be lost.
+            seat.desk.xdotool(&["windowfocus", &seat.window]);
+            let focus = seat.desk.xdotool(&["getwindowfocus", "-f"]);
+            String::from_utf8_lossy(&focus.stdout).trim() == seat.window
+        });
+        // Without a window manager the keyboard changes hands twice, and Bevy lets go of all keys in between.
+        seat.pass_ticks(8);
+        seat
+    }
+
+    fn xdotool(&self, args: &[&str]) -> Output {
+        Command::new("xdotool").args(args).env("DISPLAY", &self.display).output().expect(NEEDS)
+    }
+
+    /// The pixels of the screen's upper left square, `side` × `side`.
+    pub fn pixels(&self, side: usize) -> Vec<u32> {
+        let bytes = std::fs::read(self.folder.path().join("Xvfb_screen0")).expect("Xvfb keeps its screen there");
+        // An X window dump: a header of big-endian numbers, colours of 12 bytes, rows.
+        let field = |index: usize| {
+            let bytes = bytes[4 * index..].first_chunk().expect("a header");
+            u32::from_be_bytes(*bytes) as usize
+        };
+        let (start, row_bytes) = (field(0) + 12 * field(19), field(12));
+        let row = |y: usize| bytes[start + y * row_bytes..][..4 * side].chunks_exact(4);
+        let pixel = |bytes: &[u8]| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], 0]);
+        (0..side).flat_map(|y| row(y).map(pixel).collect::<Vec<_>>()).collect()
+    }
+}
+
+/// A running program, seen from the chair.
+pub struct Seat<'a> {
+    desk: &'a Desk,
+    program: Child,
+    window: String,
+}
+
+impl Drop for Seat<'_> {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+impl Seat<'_> {
+    fn xdotool(&self, args: &[&str]) {
+        let output = self.desk.xdotool(args);
+        assert!(output.status.success(), "xdotool {args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+
+    /// Presses and releases a key.
+    pub fn tap(&self, key: &str) {
+        self.xdotool(&["key", "--delay", "1", key]);
+    }
+
+    /// Presses keys and does not let go.
+    pub fn hold(&self, keys: &[&str]) {
+        keys.iter().for_each(|key| self.xdotool(&["keydown", key]));
+    }
+
+    /// Lets go.
+    pub fn release(&self, keys: &[&str]) {
+        keys.iter().for_each(|key| self.xdotool(&["keyup", key]));
+    }
+
+    /// The title of the window.
+    pub fn title(&self) -> String {
+        let output = self.desk.xdotool(&["getwindowname", &self.window]);
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    }
+
+    /// Waits until the title says this.
+    pub fn read(&mut self, words: &str) -> String {
+        self.wait(words, |seat| seat.title().contains(words));
+        self.title()
+    }
+
+    /// Waits a number of ticks.
+    pub fn pass_ticks(&self, ticks: u32) {
+        sleep(Duration::from_secs(1) * ticks / 15);
+    }
+
+    fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+        let start = Instant::now();
+        while !done(self) {
+            let gone = self.program.try_wait().expect("a child of this test");
+            assert!(gone.is_none(), "the program has ended ({gone:?}) before {what}: {}", self.errors());
+            assert!(start.elapsed() < PATIENCE, "no {what} in {PATIENCE:?}; the title is `{}`", self.title());
+            sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Waits for the program's own end, and returns its exit status and what it said to people.
+    pub fn leave(mut self) -> (ExitStatus, String) {
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            if let Some(status) = self.program.try_wait().expect("a child of this test") {
+                return (status, self.errors());
+            }
+            sleep(Duration::from_millis(50));
+        }
+        panic!("the program does not end; the title is `{}`", self.title());
+    }
+
+    /// Ends the program as a crash would.
+    pub fn kill(mut self) {
+        self.program.kill().expect("it runs");
+        self.program.wait().expect("it has ended");
+    }
+
+    fn errors(&mut self) -> String {
+        let stderr = self.program.stderr.take().expect("piped, and read once");
+        std::io::read_to_string(stderr).unwrap_or_default()
+    }
+}

@@ -1,0 +1,149 @@
+//! `playbot play` as a person uses it: a window, a keyboard, and what is left on disk.
+#![cfg(feature = "window")]
+
+mod desk;
+
+use std::{
+    collections::BTreeSet,
+    path::Path,
+    process::{Command, Output},
+};
+
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader, EpisodeActions};
+use desk::Desk;
+
+/// Side of the window.
+const SIDE: usize = 704;
+/// CoinRun's action "right".
+const RIGHT: u32 = 7;
+
+fn episodes(folder: &Path, file: &str) -> Vec<DemoEpisode> {
+    DemoReader::open(folder.join(file)).and_then(DemoReader::read_all).expect("a sound recording")
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Replays a recording without a display, and returns what `demo ls` says of it.
+fn verified(folder: &Path, file: &str) -> String {
+    let playbot = |verb: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        let output = command.args(["demo", verb, file]).current_dir(folder).env_remove("DISPLAY").output();
+        let output = output.expect("the program starts");
+        assert_eq!(output.status.code(), Some(0), "demo {verb}: {}", errors(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    assert!(playbot("verify").contains("all as recorded"));
+    playbot("ls")
+}
+
+#[test]
+fn a_person_wins_hands_over_and_takes_over() {
+    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let args = ["play", "coinrun", "--mode", "hard", "--levels", "0..2", "--bot", "search", "--record", "a.demo"];
+    let mut seat = desk.open(folder.path(), &args);
+    assert!(seat.title().contains("you play"), "{}", seat.title());
+
+    seat.hold(&["Right", "Up"]);
+    seat.read("level 0 won");
+    seat.release(&["Right", "Up"]);
+    seat.read("coinrun hard 1 · tick");
+    let picture = desk.pixels(SIDE);
+    let colours = picture.iter().collect::<BTreeSet<_>>().len();
+    assert!(colours > 6, "a level has more than {colours} colours");
+    assert_eq!(episodes(folder.path(), "a.demo").len(), 1, "a finished episode is on disk at once");
+
+    for _ in 0..5 {
+        seat.tap("d");
+        seat.pass_ticks(4);
+    }
+    seat.tap("Tab");
+    seat.read("search plays");
+    seat.pass_ticks(15);
+    seat.tap("Tab");
+    seat.read("you play");
+    assert_ne!(desk.pixels(SIDE), picture, "something has moved");
+    seat.tap("p");
+    let paused = seat.read("PAUSED");
+    seat.pass_ticks(8);
+    assert_eq!(seat.title(), paused, "nothing goes on in a pause");
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+    assert!(said.contains("playbot demo verify a.demo"), "{said}");
+
+    let listed = verified(folder.path(), "a.demo");
+    assert!(listed.contains("human ") && listed.contains("bot "), "{listed}");
+    let episodes = episodes(folder.path(), "a.demo");
+    let (won, left) = (&episodes[0], &episodes[1]);
+    assert!(won.is_success() && won.deciders.iter().all(|who| *who == Decider::Human));
+    assert_eq!((left.level_seed, left.end, episodes.len()), (1, DemoEnd::Aborted, 2));
+    let runs = left.deciders.chunk_by(|a, b| a == b).map(|run| run[0]).collect::<Vec<_>>();
+    assert_eq!(runs, [Decider::Human, Decider::Bot, Decider::Human]);
+    let EpisodeActions::Discrete(actions) = &left.actions else { panic!("CoinRun's actions are discrete") };
+    let by_hand = left.deciders.iter().take_while(|who| **who == Decider::Human).count();
+    let taps = actions[..by_hand].iter().filter(|action| **action == RIGHT).count();
+    assert!((5..=10).contains(&taps), "five taps made {taps} steps");
+}
+
+#[test]
+fn a_crash_costs_the_running_episode_only() {
+    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let args = ["play", "coinrun", "--seed", "0", "--record", "a.demo"];
+    let mut seat = desk.open(folder.path(), &args);
+    seat.tap("Tab");
+    seat.read("nobody to hand over to");
+    seat.hold(&["Right", "Up"]);
+    seat.read("level 0 won");
+    seat.read("coinrun hard 1 · tick 1");
+    seat.kill();
+    verified(folder.path(), "a.demo");
+    let before = episodes(folder.path(), "a.demo");
+    assert!(before.last().is_some_and(DemoEpisode::is_success));
+
+    let again = desk.playbot(folder.path(), &args).output().expect("the program starts");
+    assert_eq!(again.status.code(), Some(3));
+    assert!(errors(&again).contains("exists already"), "{}", errors(&again));
+
+    let mut seat = desk.open(folder.path(), &[&args[..], &["--append"]].concat());
+    seat.read("tick 3");
+    seat.tap("n");
+    seat.read("coinrun hard 1 · tick 3");
+    seat.tap("r");
+    seat.pass_ticks(8);
+    seat.hold(&["Control_L", "q"]);
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+    verified(folder.path(), "a.demo");
+    let levels: Vec<_> =
+        episodes(folder.path(), "a.demo")[before.len()..].iter().map(|left| (left.level_seed, left.end)).collect();
+    assert_eq!(levels, [(0, DemoEnd::Aborted), (1, DemoEnd::Aborted), (1, DemoEnd::Aborted)]);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let play = ["play", "coinrun", "--record", "a.demo"];
+    let refuse = |command: &mut Command, words: &str| {
+        let output = command.output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
+        assert!(errors(&output).contains(words), "{}", errors(&output));
+        assert!(!folder.path().join("a.demo").exists(), "no recording without a window");
+    };
+    refuse(desk.playbot(folder.path(), &play).env_remove("DISPLAY"), "DISPLAY is not set");
+    refuse(desk.playbot(folder.path(), &play).env("DISPLAY", ":9999"), "no X server answers at DISPLAY=:9999");
+    let no_driver = [("VK_DRIVER_FILES", "none"), ("VK_ICD_FILENAMES", "none"), ("WGPU_BACKEND", "vulkan")];
+    refuse(desk.playbot(folder.path(), &play).envs(no_driver), "mesa-vulkan-drivers");
+    for (args, words) in [
+        (&["--mode", "hrad"][..], "did you mean `hard`?"),
+        (&["--bot", "serch"], "did you mean `search`?"),
+        (&["--mode", "easy", "--levels", "hard:0..3"], "different modes"),
+        (&["--levels", "0..3", "--seed", "4"], "none of the levels hard:0..3"),
+        (&["--policy", "not-there"], "not-there"),
+        (&["--run", "not-there"], "not-there"),
+        (&["--bot", "search", "--policy", "b"], "cannot be used with"),
+    ] {
+        refuse(&mut desk.playbot(folder.path(), &[&play[..], args].concat()), words);
+    }
+}

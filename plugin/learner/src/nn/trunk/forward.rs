@@ -1,0 +1,105 @@
+//! From images to features.
+
+use super::layer::{Weights, put};
+use super::plan::{Layout, Plan, Step};
+use super::pool;
+use super::relu;
+use rayon::prelude::*;
+
+/// Images that a thread takes at a time, at least.
+const IMAGES: usize = 4;
+
+/// What the backward pass needs of all images.
+#[derive(Debug)]
+pub(super) struct Kept {
+    /// [`Plan::kept`] of each image.
+    pub(super) values: Vec<f32>,
+    /// The marks of each image.
+    pub(super) marks: Vec<u8>,
+}
+
+/// Features `[n, Plan::features]` of the images `[n, channels, height, width]`, and nothing else.
+pub(super) fn features(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<f32> {
+    let mut out = vec![0.0; images.len() / image_len(plan) * plan.features()];
+    let work = out.par_chunks_mut(plan.features()).zip(images.par_chunks(image_len(plan))).with_min_len(IMAGES);
+    let scratch = || (wides(plan), vec![0.0; plan.lean.len], vec![0; plan.marks]);
+    work.for_each_init(scratch, |(wides, values, marks), (out, image)| {
+        forward(plan, &plan.lean, weights, image, wides, values, marks);
+        write(plan, &plan.lean, values, out);
+    });
+    out
+}
+
+/// As [`features`], and keeps what the backward pass needs.
+pub(super) fn features_kept(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<f32>, Kept) {
+    let n = images.len() / image_len(plan);
+    let mut out = vec![0.0; n * plan.features()];
+    let mut kept = Kept { values: vec![0.0; n * plan.kept.len], marks: vec![0; n * plan.marks] };
+    let images = images.par_chunks(image_len(plan)).with_min_len(IMAGES);
+    let work = out.par_chunks_mut(plan.features()).zip(images);
+    let work = work.zip(kept.values.par_chunks_mut(plan.kept.len).zip(kept.marks.par_chunks_mut(plan.marks)));
+    work.for_each_init(
+        || wides(plan),
+        |wides, ((out, image), (values, marks))| {
+            forward(plan, &plan.kept, weights, image, wides, values, marks);
+            write(plan, &plan.kept, values, out);
+        },
+    );
+    (out, kept)
+}
+
+fn image_len(plan: &Plan) -> usize {
+    plan.slots[0].numbers()
+}
+
+/// Memory for the stages before their pooling.
+pub(super) fn wides(plan: &Plan) -> Vec<Vec<f32>> {
+    plan.wides.iter().map(|grid| vec![0.0; grid.len()]).collect()
+}
+
+fn write(plan: &Plan, layout: &Layout, values: &[f32], out: &mut [f32]) {
+    plan.slots[plan.last].write(layout.read(plan.last, values), out, relu);
+}
+
+/// All steps for one image. `values` has zeros in the borders.
+fn forward(
+    plan: &Plan,
+    layout: &Layout,
+    weights: &[Weights],
+    image: &[f32],
+    wides: &mut [Vec<f32>],
+    values: &mut [f32],
+    marks: &mut [u8],
+) {
+    plan.slots[0].read(image, layout.write(0, values));
+    for step in &plan.steps {
+        match *step {
+            Step::Relu { layer, input, output } => {
+                let (x, y) = layout.two(input, output, values);
+                plan.layers[layer].forward(x, &weights[layer], |at, count, sums| {
+                    put(y, at, count, sums, |y, sum| *y = relu(sum));
+                });
+            }
+            Step::Pool { layer, input, output, wide, marks: from } => {
+                let (x, y) = layout.two(input, output, values);
+                let (buffer, grid, to) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
+                plan.layers[layer].forward(x, &weights[layer], |at, count, sums| {
+                    put(buffer, at, count, sums, |y, sum| *y = sum);
+                });
+                pool::forward(buffer, grid, y, to, &mut marks[from..][..to.numbers()]);
+            }
+            Step::Residual { layers: [layer0, layer1], x, relu: slot, inner } => {
+                let (from, to) = layout.two(x, slot, values);
+                from.iter().zip(to).for_each(|(x, y)| *y = relu(*x));
+                let (from, to) = layout.two(slot, inner, values);
+                plan.layers[layer0].forward(from, &weights[layer0], |at, count, sums| {
+                    put(to, at, count, sums, |y, sum| *y = relu(sum));
+                });
+                let (to, from) = layout.two(x, inner, values);
+                plan.layers[layer1].forward(from, &weights[layer1], |at, count, sums| {
+                    put(to, at, count, sums, |y, sum| *y += sum);
+                });
+            }
+        }
+    }
+}

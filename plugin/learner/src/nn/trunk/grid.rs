@@ -1,0 +1,93 @@
+//! How the pixels of one image lie in memory.
+
+/// Numbers that every image has after its last: vectors and tiles may read, never use, what follows a row.
+const SLACK: usize = 16;
+
+/// An image with its channels last, in a border of zeros.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grid {
+    pub(super) channels: usize,
+    pub(super) height: usize,
+    pub(super) width: usize,
+    pub(super) border: usize,
+}
+
+impl Grid {
+    /// Numbers from one row to the next.
+    pub(super) fn row(self) -> usize {
+        (self.width + 2 * self.border) * self.channels
+    }
+
+    /// Numbers of the image with its border and what may be read behind it.
+    pub(super) fn len(self) -> usize {
+        (self.height + 2 * self.border) * self.row() + SLACK
+    }
+
+    /// Numbers without the border.
+    pub(super) fn numbers(self) -> usize {
+        self.channels * self.height * self.width
+    }
+
+    /// Where a pixel begins.
+    pub(super) fn at(self, y: usize, x: usize) -> usize {
+        (y + self.border) * self.row() + (x + self.border) * self.channels
+    }
+
+    /// Where each pixel begins, row by row.
+    pub(super) fn places(self) -> Vec<usize> {
+        (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.at(y, x))).collect()
+    }
+
+    /// The rows without the border.
+    pub(super) fn rows(self, values: &[f32]) -> impl Iterator<Item = &[f32]> {
+        (0..self.height).map(move |y| &values[self.at(y, 0)..][..self.width * self.channels])
+    }
+
+    /// The rows without the border.
+    pub(super) fn rows_mut(self, values: &mut [f32]) -> impl Iterator<Item = &mut [f32]> {
+        let from = self.border * (self.row() + self.channels);
+        let rows = values[from..].chunks_mut(self.row().max(1)).take(self.height);
+        rows.map(move |row| &mut row[..self.width * self.channels])
+    }
+
+    /// Reads an image `[channels, height, width]`; the border is left alone.
+    pub(super) fn read(self, image: &[f32], values: &mut [f32]) {
+        for (y, row) in self.rows_mut(values).enumerate() {
+            for c in 0..self.channels {
+                let from = &image[(c * self.height + y) * self.width..][..self.width];
+                row.iter_mut().skip(c).step_by(self.channels).zip(from).for_each(|(to, from)| *to = *from);
+            }
+        }
+    }
+
+    /// The image as `[channels, height, width]`, each number after `change`.
+    pub(super) fn write(self, values: &[f32], image: &mut [f32], change: impl Fn(f32) -> f32) {
+        for (y, row) in self.rows(values).enumerate() {
+            for c in 0..self.channels {
+                let to = &mut image[(c * self.height + y) * self.width..][..self.width];
+                to.iter_mut().zip(row.iter().skip(c).step_by(self.channels)).for_each(|(to, from)| *to = change(*from));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_comes_back_and_its_border_stays() {
+        let grid = Grid { channels: 2, height: 3, width: 4, border: 1 };
+        let image: Vec<f32> = (1..=24).map(|i| i as f32).collect();
+        let mut values = vec![0.0; grid.len()];
+        grid.read(&image, &mut values);
+        assert_eq!(values.iter().sum::<f32>(), 300.0);
+        // The second channel of the pixel in row 1, column 2.
+        assert_eq!(values[grid.at(1, 2) + 1], 19.0);
+        let inside: f32 = grid.places().iter().map(|&at| values[at] + values[at + 1]).sum();
+        assert_eq!(inside, 300.0);
+        let mut back = vec![0.0; 24];
+        grid.write(&values, &mut back, |x| x);
+        assert_eq!(back, image);
+    }
+}

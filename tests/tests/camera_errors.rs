@@ -1,0 +1,142 @@
+//! What cannot be seen is said clearly.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    camera::{BlankEpisodes, CameraSensorPlugin},
+    prelude::*,
+    vision::{TileLayer, VisionError},
+};
+use playbot_tests::scene::{camera_world, image, spawn_eye};
+
+/// Set for a copy of this program that finds no adapter.
+const CHILD: &str = "PLAYBOT_TEST_WITHOUT_ADAPTER";
+
+#[test]
+fn without_an_adapter_the_raster_is_offered() {
+    if std::env::var_os(CHILD).is_some() {
+        let error = CameraSensorPlugin::headless().expect_err("there is no driver");
+        assert_eq!(error, VisionError::NoAdapter);
+        assert!(error.to_string().contains("observation: Raster"), "{error}");
+        return;
+    }
+    let this = std::env::current_exe().expect("a test program");
+    let output = std::process::Command::new(this)
+        .args(["--exact", "without_an_adapter_the_raster_is_offered"])
+        .envs([("VK_DRIVER_FILES", "/nowhere.json"), ("VK_ICD_FILENAMES", "/nowhere.json"), (CHILD, "1")])
+        .output()
+        .expect("a copy");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[track_caller]
+fn fault(world: &mut World) -> String {
+    world.tick().expect_err("something is wrong").to_string()
+}
+
+#[test]
+fn sizes_that_cannot_be_are_refused() {
+    let mut world = camera_world(|_| {});
+    let target = world.spawn(Transform::default()).id();
+    for (size, word) in [([0, 64], "width is 0"), ([64, 0], "height is 0"), ([64, 100_000], "height is 100000")] {
+        let agent = spawn_eye(&mut world, 3, target, 4.0, size);
+        let fault = fault(&mut world);
+        assert!(fault.starts_with("agent 3, tick ") && fault.contains(word), "{fault}");
+        world.despawn(agent);
+    }
+    for width in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        let agent = spawn_eye(&mut world, 3, target, width, [8, 8]);
+        let fault = fault(&mut world);
+        assert!(fault.contains("world units wide"), "{fault}");
+        world.despawn(agent);
+    }
+    spawn_eye(&mut world, 3, target, 4.0, [64, 64]);
+    world.tick().expect("sound");
+}
+
+#[test]
+fn more_than_the_adapter_can_hold_is_refused() {
+    let mut world = camera_world(|_| {});
+    let target = world.spawn(Transform::default()).id();
+    // A picture may have 1,024 pixels a side; adapters hold 8,192 or 16,384, or 32,768.
+    for i in 0..1100 {
+        spawn_eye(&mut world, i, target, 4.0, [1024, 1024]);
+    }
+    let fault = fault(&mut world);
+    assert!(fault.contains("pictures together are over the graphics adapter's limit"), "{fault}");
+}
+
+#[test]
+fn a_target_that_is_gone_is_named() {
+    let mut world = camera_world(|_| {});
+    let (gone, there) = (world.spawn(Transform::default()).id(), world.spawn(Transform::default()).id());
+    spawn_eye(&mut world, 6, gone, 4.0, [8, 8]);
+    let other = spawn_eye(&mut world, 7, there, 4.0, [8, 8]);
+    world.tick().expect("sound");
+    world.despawn(gone);
+    let fault = fault(&mut world);
+    assert!(fault.contains("agent 6") && fault.contains(&format!("the target {gone}")), "{fault}");
+    let frame = world.get::<bevy_playbot::vision::Frame>(other).expect("a frame");
+    assert_eq!(frame.tick, Some(world.resource::<bevy_playbot::headless::Tick>().0), "others go on seeing");
+}
+
+#[test]
+fn things_without_an_image_are_named() {
+    let mut world = camera_world(|_| {});
+    let target = world.spawn(Transform::default()).id();
+    spawn_eye(&mut world, 0, target, 4.0, [8, 8]);
+    world.tick().expect("sound");
+    let lost = world.resource::<AssetServer>().load("no/such/file.png");
+    let sprite = world.spawn((Name::new("ghost"), Sprite::from_image(lost), Transform::default())).id();
+    let told = fault(&mut world);
+    assert!(
+        told.contains("`ghost`") && told.contains(&sprite.to_string()) && told.contains("no/such/file.png"),
+        "{told}"
+    );
+    assert!(fault(&mut world).contains("`ghost`"), "as long as it is so");
+    world.despawn(sprite);
+    world.tick().expect("sound again");
+    let soon_gone = world.resource_mut::<Assets<Image>>().add(image(1, &[[1, 2, 3, 255]]));
+    let layer = TileLayer { tileset: soon_gone.clone(), columns: 1, rows: 1, cells: vec![0], outside: 0 };
+    let layer = world.spawn((layer, Transform::default())).id();
+    world.tick().expect("sound");
+    world.resource_mut::<Assets<Image>>().remove(&soon_gone);
+    let told = fault(&mut world);
+    assert!(told.contains(&format!("tile layer {layer} has no image")), "{told}");
+    world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 2, rows: 2, cells: vec![0], outside: 0 });
+    let told = fault(&mut world);
+    assert!(told.contains("has 1 cells; with 2 columns and 2 rows"), "{told}");
+}
+
+fn five_ticks(mut agents: Query<&mut Episode>) {
+    for mut episode in &mut agents {
+        if episode.tick >= 4 {
+            episode.truncate();
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_sees_nothing_is_counted() {
+    let mut world = camera_world(|app| {
+        app.add_systems(FixedUpdate, five_ticks);
+    });
+    let red = world.resource_mut::<Assets<Image>>().add(image(1, &[[255, 0, 0, 255]]));
+    world.spawn((Sprite { image: red, custom_size: Some(Vec2::ONE), ..default() }, Transform::default()));
+    let here = world.spawn(Transform::default()).id();
+    let far = world.spawn(Transform::from_xyz(1000.0, 0.0, 0.0)).id();
+    let play = (Control::Bot, BlindBot::Uniform);
+    let [seeing, blind] = [(0, here), (1, far)].map(|(i, target)| {
+        let agent = spawn_eye(&mut world, i, target, 4.0, [8, 8]);
+        world.entity_mut(agent).insert(play.clone());
+        agent
+    });
+    world.ticks(15).expect("sound");
+    let count = |world: &World, agent| world.get::<BlankEpisodes>(agent).expect("it has a sensor").episodes;
+    assert_eq!((count(&world, seeing), count(&world, blind)), (0, 3));
+    // It comes into view in the middle of an episode: that one is not blank.
+    world.ticks(2).expect("sound");
+    world.entity_mut(far).insert(Transform::default());
+    world.ticks(8).expect("sound");
+    assert_eq!(count(&world, blind), 3);
+}
