@@ -42,7 +42,8 @@ pub(super) fn correlate<S: Simd, F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &
         for (block, weights) in weights.chunks_exact(window.count * window.len).enumerate() {
             let first = first(block);
             for (tile, starts) in starts.chunks(ROWS).enumerate() {
-                let at: [usize; ROWS] = std::array::from_fn(|p| starts[p.min(starts.len() - 1)]);
+                let mut at = [starts[0]; ROWS];
+                at[..starts.len()].copy_from_slice(starts);
                 let sums = tile_sums::<S>(x, at, window, weights, first);
                 for (p, sums) in sums.iter().enumerate() {
                     if p < starts.len() {
@@ -63,7 +64,10 @@ fn fused<S: Simd>(x: f32, y: f32, z: f32) -> f32 {
 fn tile_sums<S: Simd>(x: &[f32], at: [usize; ROWS], window: Window, weights: &[Lanes], first: Lanes) -> [Lanes; ROWS] {
     let mut sums = [first; ROWS];
     for (piece, weights) in weights.chunks_exact(window.len).enumerate() {
-        let rows = at.map(|at| &x[at + piece * window.step..][..window.len]);
+        let mut rows = [&x[..0]; ROWS];
+        for p in 0..ROWS {
+            rows[p] = &x[at[p] + piece * window.step..][..weights.len()];
+        }
         for (k, weights) in weights.iter().enumerate() {
             for p in 0..ROWS {
                 let x = rows[p][k];
