@@ -2,7 +2,11 @@
 
 use super::matrix;
 use crate::{ObsKind, Observations};
-use burn::tensor::{DType, Device, Int, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
+
+/// Pixels that one thread takes at a time.
+const CHUNK: usize = 1 << 14;
 
 /// A batch of observations on a device, one per row.
 #[derive(Clone, Debug)]
@@ -14,7 +18,7 @@ pub enum ObsRows {
 }
 
 impl ObsRows {
-    /// Moves whole observations of `kind` to `device`. Pixels go over as bytes and become numbers there.
+    /// Moves whole observations of `kind` to `device`. Pixels become numbers on the way.
     pub(crate) fn new(observations: Observations, kind: &ObsKind, device: &Device) -> Self {
         let rows = observations.numbers() / kind.numbers().max(1);
         match (observations, kind) {
@@ -38,8 +42,12 @@ impl ObsRows {
 
     /// The tensor of [`Self::pixels`].
     pub(crate) fn scaled(pixels: Vec<u8>, shape: [usize; 4], device: &Device) -> Tensor<4> {
-        let bytes: Tensor<4, Int> = Tensor::from_data(TensorData::new(pixels, shape), (device, DType::U8));
-        bytes.float() / 255.0
+        let mut values = vec![0.0; pixels.len()];
+        let chunks = values.par_chunks_mut(CHUNK).zip(pixels.par_chunks(CHUNK));
+        chunks.for_each(|(values, pixels)| {
+            values.iter_mut().zip(pixels).for_each(|(value, &pixel)| *value = f32::from(pixel) / 255.0);
+        });
+        Tensor::from_data(TensorData::new(values, shape), device)
     }
 
     /// Number of observations.
