@@ -9,10 +9,9 @@ use bevy_playbot::{
     camera::{CameraSensor, CameraSensorPlugin},
     headless::Tick,
     plugin::PlaybotPlugin,
-    prelude::*,
     vision::{Frame, ImageOptions, TileLayer},
 };
-use playbot_tests::scene::image;
+use playbot_tests::scene::{image, player};
 
 #[derive(Component)]
 struct Walker;
@@ -46,7 +45,7 @@ fn build(mut commands: Commands, mut images: ResMut<Assets<Image>>) {
     let body = Sprite { image: body, custom_size: Some(Vec2::ONE), ..default() };
     let walker = commands.spawn((Walker, body, Transform::from_xyz(-9.0, -2.5, 2.0))).id();
     let sensor = CameraSensor::following(walker, 13.0, ImageOptions::default());
-    commands.entity(walker).insert((Agent::new(0, ActionSpace::Discrete(2)), sensor));
+    commands.entity(walker).insert((player(0), sensor));
 }
 
 fn walk(mut walkers: Query<&mut Transform, With<Walker>>) {

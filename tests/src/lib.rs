@@ -3,6 +3,7 @@
 pub mod memory;
 mod painted;
 pub mod scene;
+pub mod side_by_side;
 
 pub use painted::PaintedCorridor;
 

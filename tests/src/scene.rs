@@ -37,10 +37,15 @@ pub fn camera_world(build: impl FnOnce(&mut App)) -> World {
     into_world(app)
 }
 
+/// An agent for whom a person decides, who does nothing.
+pub fn player(index: u32) -> impl Bundle {
+    (Agent::new(index, ActionSpace::Discrete(2)), Control::Human, LevelQueue::Always(0))
+}
+
 /// An agent that sees `width` world units around an entity in a picture of `size` pixels.
 pub fn spawn_eye(world: &mut World, index: u32, target: Entity, width: f32, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
-    world.spawn((Agent::new(index, ActionSpace::Discrete(2)), CameraSensor::following(target, width, options))).id()
+    world.spawn((player(index), CameraSensor::following(target, width, options))).id()
 }
 
 /// The pixel of an agent's frame in column `x` from the left and row `y` from the top.
@@ -102,13 +107,7 @@ fn spawn_arena(
     }
     let options = ImageOptions::default();
     let agent = world
-        .spawn((
-            Agent::new(index, ActionSpace::Discrete(2)),
-            thing(atlas, 30),
-            Transform::from_xyz(32.0, 32.0, 3.0),
-            ChildOf(stage),
-            Mover,
-        ))
+        .spawn((player(index), thing(atlas, 30), Transform::from_xyz(32.0, 32.0, 3.0), ChildOf(stage), Mover))
         .id();
     world.entity_mut(agent).insert(CameraSensor::following(agent, 13.0, options));
     agent

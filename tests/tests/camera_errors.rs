@@ -2,9 +2,9 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    camera::{BlankEpisodes, CameraSensorPlugin},
+    camera::CameraSensorPlugin,
     prelude::*,
-    vision::{TileLayer, VisionError},
+    vision::{BlankEpisodes, TileLayer, VisionError},
 };
 use playbot_tests::scene::{camera_world, image, spawn_eye};
 
@@ -41,7 +41,7 @@ fn sizes_that_cannot_be_are_refused() {
     for (size, word) in [([0, 64], "width is 0"), ([64, 0], "height is 0"), ([64, 100_000], "height is 100000")] {
         let agent = spawn_eye(&mut world, 3, target, 4.0, size);
         let fault = fault(&mut world);
-        assert!(fault.starts_with("agent 3, tick ") && fault.contains(word), "{fault}");
+        assert!(fault.starts_with("agent 3, level 0, tick ") && fault.contains(word), "{fault}");
         world.despawn(agent);
     }
     for width in [0.0, -1.0, f32::NAN, f32::INFINITY] {
@@ -131,7 +131,12 @@ fn a_camera_that_sees_nothing_is_counted() {
         world.entity_mut(agent).insert(play.clone());
         agent
     });
-    world.ticks(15).expect("sound");
+    let mut told = Vec::new();
+    for _ in 0..15 {
+        told.extend(world.tick().err().map(|fault| fault.to_string()));
+    }
+    assert!(told.iter().all(|told| told.starts_with("agent 1,") && told.contains("a single colour")), "{told:?}");
+    assert_eq!(told.len(), 3, "once for each episode: {told:?}");
     let count = |world: &World, agent| world.get::<BlankEpisodes>(agent).expect("it has a sensor").episodes;
     assert_eq!((count(&world, seeing), count(&world, blind)), (0, 3));
     // It comes into view in the middle of an episode: that one is not blank.

@@ -5,11 +5,11 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{camera::CameraSensor, prelude::*, vision::ImageOptions};
-use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
+use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
 
 fn agent(world: &mut World, index: u32, camera: Entity, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
-    world.spawn((Agent::new(index, ActionSpace::Discrete(2)), CameraSensor::of(camera, options))).id()
+    world.spawn((player(index), CameraSensor::of(camera, options))).id()
 }
 
 /// Red left of the middle, green right of it, 4 units wide each, between -2 and 2 in height.

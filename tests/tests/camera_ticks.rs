@@ -7,7 +7,7 @@ use bevy_playbot::{
     prelude::*,
     vision::{Frame, ImageOptions, Stage, TileLayer, VisionSystems},
 };
-use playbot_tests::scene::{camera_world, draw, image, pixel, spawn_eye};
+use playbot_tests::scene::{camera_world, draw, image, pixel, player, spawn_eye};
 
 /// The one that walks, and where it stood when agents looked.
 #[derive(Resource)]
@@ -80,8 +80,8 @@ fn a_late_readback_is_reported_and_not_handed_out() {
     for _ in 0..3 {
         let fault = world.tick().expect_err("late").to_string();
         let now = world.resource::<Tick>().0;
-        assert!(fault.contains(&format!("agent 4, tick {now}:")), "{fault}");
-        assert!(fault.contains(&format!("picture is of tick {}:", now - 2)), "{fault}");
+        assert!(fault.contains(&format!("agent 4, level 0, tick {}:", now - 1)), "{fault}");
+        assert!(fault.contains(&format!("of the World's tick {}, not {now},", now - 2)), "{fault}");
         assert_eq!(*world.get::<Frame>(agent).expect("a frame"), good, "an old picture must not be handed out");
     }
     world.resource_mut::<ReadbackDelay>().0 = 0;
@@ -126,7 +126,7 @@ fn each_of_many_sees_its_own_arena() {
             world.spawn((wall, Transform::default(), ChildOf(stage)));
             let agent = world.spawn((Transform::default(), ChildOf(stage))).id();
             let sensor = CameraSensor::following(agent, 13.0, ImageOptions::default());
-            world.entity_mut(agent).insert((Agent::new(i, ActionSpace::Discrete(2)), sensor));
+            world.entity_mut(agent).insert((player(i), sensor));
             agent
         })
         .collect();

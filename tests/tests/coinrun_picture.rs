@@ -127,7 +127,10 @@ fn a_player_stands_walks_jumps_and_turns() {
         let size = sprite(world, agent).custom_size.expect("set");
         assert_eq!((size.x, at.translation.x), (1.0, body.x));
         assert!((size.y - 1.7415 * 1.1574).abs() < 1e-4, "taller than the body");
-        assert!((at.translation.y - size.y / 2.0 - (body.y - body.ry)).abs() < 1e-5, "the feet are on the ground");
+        let anchor = world.get::<Anchor>(agent).expect("dressed").0;
+        let feet = at.translation.y - (anchor.y + 0.5) * size.y;
+        assert_eq!(at.translation.y, body.y, "the eye is on the middle of the body");
+        assert!((feet - (body.y - body.ry)).abs() < 1e-5, "the feet are on the ground");
     };
     feet(world);
     press(world, agent, RIGHT, 2);

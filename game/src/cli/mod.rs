@@ -7,6 +7,7 @@ mod demo;
 mod error;
 mod eval;
 mod experiment;
+mod eyes;
 mod interrupt;
 mod learn_skills;
 mod level;
@@ -81,6 +82,8 @@ enum Verb {
     Config(config::Args),
     /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
+    /// Compare what the camera and the raster see.
+    Eyes(eyes::Args),
     /// Make and look at policy files.
     Policy(policy::Args),
     /// List, show and compare trainings.
@@ -134,6 +137,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Study(args) => study::run(args),
         Verb::Config(args) => config::run(args),
         Verb::Eval(args) => eval::run(args),
+        Verb::Eyes(args) => eyes::run(args),
         Verb::Policy(args) => policy::run(args),
         Verb::Runs(args) => runs::run(args),
         Verb::Level(args) => level::run(args),

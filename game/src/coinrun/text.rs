@@ -37,8 +37,7 @@ impl Level {
     /// A picture of the used part of the level: all columns up to the rock behind the coin, and
     /// the rows up to a little above the highest thing.
     pub fn to_text(&self) -> String {
-        let width = (self.coin[0] + 3).min(SIZE);
-        let height = self.used_height(width);
+        let [width, height] = self.used_size();
         let mut rows: Vec<Vec<char>> =
             (0..height).map(|y| (0..width).map(|x| self.tiles.get(x, y).to_char()).collect()).collect();
         let bodies = self.spawns.iter().map(|spawn| (spawn.cell(), spawn.letter()));
@@ -53,6 +52,12 @@ impl Level {
             text.push('\n');
         }
         text
+    }
+
+    /// Columns and rows of the part of the level that is used.
+    pub fn used_size(&self) -> [i32; 2] {
+        let width = (self.coin[0] + 3).min(SIZE);
+        [width, self.used_height(width)]
     }
 
     fn used_height(&self, width: i32) -> i32 {

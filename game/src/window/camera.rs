@@ -7,6 +7,8 @@ use bevy::{
     window::PrimaryWindow,
 };
 
+use bevy_playbot::camera::TileBorder;
+
 use super::seats::Seats;
 
 /// How far the view widens and narrows with each key, and how often.
@@ -14,7 +16,9 @@ const ZOOM_STEP: f32 = 1.25;
 const MOST_STEPS: i32 = 8;
 
 pub(super) fn build(app: &mut App, width: f32) {
-    app.insert_resource(Zoom { width, steps: 0 })
+    // What lies outside a level is drawn as far as anybody can see it.
+    app.insert_resource(TileBorder(Zoom { width, steps: MOST_STEPS }.side() / 2.0))
+        .insert_resource(Zoom { width, steps: 0 })
         .insert_resource(ClearColor(Color::BLACK))
         .add_systems(Startup, spawn_camera)
         .add_systems(PostUpdate, (follow, zoom, keep_square).before(TransformSystems::Propagate));
@@ -40,8 +44,13 @@ impl Zoom {
         self.steps = (self.steps - 1).max(0);
     }
 
+    /// World units from left to right.
+    fn side(&self) -> f32 {
+        (0..self.steps).fold(self.width, |side, _| side * ZOOM_STEP)
+    }
+
     fn scaling(&self) -> ScalingMode {
-        let side = self.width * ZOOM_STEP.powi(self.steps);
+        let side = self.side();
         ScalingMode::AutoMin { min_width: side, min_height: side }
     }
 }

@@ -53,6 +53,8 @@ impl Desk {
 
     /// Starts the program and waits for its window.
     pub fn open(&self, folder: &Path, args: &[&str]) -> Seat<'_> {
+        // Out of the way of the window, which would otherwise have the keyboard before it is given it.
+        self.xdotool(&["mousemove", "1000", "760"]);
         let mut command = self.playbot(folder, args);
         let program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
         let mut seat = Seat { desk: self, program, window: String::new() };
@@ -68,6 +70,8 @@ impl Desk {
             let focus = seat.desk.xdotool(&["getwindowfocus", "-f"]);
             String::from_utf8_lossy(&focus.stdout).trim() == seat.window
         });
+        // Without a window manager the keyboard changes hands twice, and Bevy lets go of all keys in between.
+        seat.pass_ticks(8);
         seat
     }
 

@@ -45,8 +45,13 @@ pub enum CameraError {
     #[error("another agent looks through the same camera {0} in another size; give them the same size")]
     CameraShared(Entity),
     /// The picture that came back is an older one.
-    #[error("its picture is of tick {0}: the readback is late, and no picture was handed out")]
-    Stale(u64),
+    #[error("the readback is late: its picture is of the World's tick {got}, not {wanted}, and was not handed out")]
+    Stale {
+        /// Tick of the World in which it looks.
+        wanted: u64,
+        /// Tick of the picture.
+        got: u64,
+    },
     /// No picture came back.
     #[error("no picture came back: {0}")]
     Missing(String),

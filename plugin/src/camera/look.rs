@@ -148,7 +148,11 @@ fn hand_out(world: &mut World, asked: &Asked, arrived: &Arrived, now: Stamp) {
             frame.pixels.extend(row.chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2], 255]));
         }
     });
-    for (agent, tick) in late {
-        report(world, asked.iter().filter(|request| request.agent == agent), &CameraError::Stale(tick));
+    for (agent, got) in late {
+        report(
+            world,
+            asked.iter().filter(|request| request.agent == agent),
+            &CameraError::Stale { wanted: now.tick, got },
+        );
     }
 }

@@ -1,6 +1,9 @@
 //! The plugin.
 
-use bevy::{prelude::*, render::RenderApp};
+use bevy::{
+    prelude::*,
+    render::{RenderApp, RenderPlugin},
+};
 
 use super::{
     ReadbackDelay, TileLayerPlugin, adapter,
@@ -19,14 +22,18 @@ use crate::{
 
 /// Adds [`CameraSensor`](super::CameraSensor)s to a game.
 ///
-/// In an app without a window, [`headless`](Self::headless) brings Bevy's renderer along. In a game with a window, add
-/// `CameraSensorPlugin::default()` after `DefaultPlugins`, whose `PipelinedRenderingPlugin` must be disabled where it
-/// exists (Bevy's feature `multi_threaded`): the plugin runs the renderer itself, for sensors in the middle of a tick
-/// and for windows in `Last`.
+/// In an app without a renderer, [`headless`](Self::headless) brings Bevy's along. In a game with a window, add the
+/// plugin, either way, after `DefaultPlugins`, whose `PipelinedRenderingPlugin` must be disabled where it exists (Bevy's
+/// feature `multi_threaded`): the plugin runs the renderer itself, for sensors in the middle of a tick and for windows in
+/// `Last`.
 #[derive(Clone, Debug, Default)]
 pub struct CameraSensorPlugin {
     headless: bool,
 }
+
+/// The app has a renderer of its own, and windows that it draws.
+#[derive(Resource)]
+struct ShowsWindows;
 
 impl CameraSensorPlugin {
     /// For an app without a window: brings along what the renderer needs, as far as the app does not have it.
@@ -38,10 +45,23 @@ impl CameraSensorPlugin {
         adapter::check()?;
         Ok(Self { headless: true })
     }
+
+    /// For an app with or without a window, whichever it is: only one without a renderer gets one.
+    ///
+    /// # Errors
+    ///
+    /// [`VisionError::NoAdapter`].
+    pub fn for_app(app: &App) -> Result<Self, VisionError> {
+        if app.get_sub_app(RenderApp).is_some() { Ok(Self::default()) } else { Self::headless() }
+    }
 }
 
 impl Plugin for CameraSensorPlugin {
     fn build(&self, app: &mut App) {
+        if app.is_plugin_added::<RenderPlugin>() {
+            app.add_systems(Last, renderer::draw_windows);
+            app.insert_resource(ShowsWindows);
+        }
         if self.headless {
             add_renderer(app, adapter::creation());
         } else if !app.is_plugin_added::<TileLayerPlugin>() && app.get_sub_app(RenderApp).is_some() {
@@ -58,14 +78,12 @@ impl Plugin for CameraSensorPlugin {
             .init_resource::<images::MissingImages>()
             // It reads whatever can be drawn; what a game changes in `Dress` or before is seen.
             .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Look).ambiguous_with_all());
-        if !self.headless {
-            app.add_systems(Last, renderer::draw_windows);
-        }
     }
 
     fn cleanup(&self, app: &mut App) {
         adapter::keep_memory();
-        if let Some(renderer) = Renderer::take(app, !self.headless) {
+        let shows_windows = app.world().contains_resource::<ShowsWindows>();
+        if let Some(renderer) = Renderer::take(app, shows_windows) {
             app.insert_resource(renderer);
         }
     }

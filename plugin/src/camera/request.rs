@@ -4,18 +4,21 @@ use bevy::{prelude::*, render::renderer::RenderDevice};
 
 use super::{CameraError, CameraSensor, CameraSource};
 use crate::{
-    agent::Agent,
+    agent::{Agent, AgentOrder},
+    control::Control,
+    episode::Episode,
     fault::Faults,
-    headless::Tick,
-    vision::{ImageOptions, ImageSensor},
+    vision::{ImageOptions, ImageSensor, is_observed},
 };
 
 /// One agent's picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Request {
     pub(super) agent: Entity,
-    /// The agent's number, for messages.
+    /// The agent's number, its level and the tick of its episode, for messages.
     index: u32,
+    level: u64,
+    tick: u32,
     /// Columns and rows of pixels.
     pub(super) size: UVec2,
 }
@@ -42,28 +45,28 @@ impl Asked {
 
 /// Reports an error for some agents.
 pub(super) fn report<'a>(world: &mut World, requests: impl Iterator<Item = &'a Request>, error: &CameraError) {
-    let tick = world.resource::<Tick>().0;
     let mut faults = world.resource_mut::<Faults>();
-    for request in requests {
-        faults.report(format!("agent {}, tick {tick}: {error}", request.index));
+    for Request { index, level, tick, .. } in requests {
+        faults.report(format!("agent {index}, level {level}, tick {tick}: {error}"));
     }
 }
 
-/// Gathers what is asked for; what is impossible is reported.
+/// Gathers what is asked for by agents that are observed; what is impossible is reported.
 pub(super) fn requests(world: &mut World) -> Asked {
-    let limit = world.get_resource::<RenderDevice>().map(|device| device.limits().max_texture_dimension_2d);
-    let mut sensors = world.query::<(Entity, &CameraSensor, &ImageSensor, Option<&Agent>)>();
-    let mut all: Vec<_> = sensors
-        .iter(world)
-        .map(|(agent, sensor, image, identity)| {
-            let size = UVec2::new(image.0.width, image.0.height);
-            (Request { agent, index: identity.map_or(0, |agent| agent.index), size }, sensor.source, image.0)
-        })
-        .collect();
-    all.sort_by_key(|(request, ..)| (request.index, request.agent));
+    let limit =
+        world.get_resource::<RenderDevice>().map_or(u32::MAX, |device| device.limits().max_texture_dimension_2d);
+    let mut sensors = world.query::<((&Agent, &Control, &Episode), (&CameraSensor, &ImageSensor))>();
     let mut asked = Asked::default();
-    for (request, source, options) in all {
-        let result = check_size(&options, limit.unwrap_or(u32::MAX)).and_then(|()| match source {
+    let mut refused = Vec::new();
+    for &entity in world.resource::<AgentOrder>().entities() {
+        let Ok(((agent, control, episode), (sensor, image))) = sensors.get(world, entity) else { continue };
+        if !is_observed(control, episode) {
+            continue;
+        }
+        let size = UVec2::new(image.0.width, image.0.height);
+        let (level, tick) = (episode.level, episode.tick);
+        let request = Request { agent: entity, index: agent.index, level, tick, size };
+        let result = check_size(&image.0, limit).and_then(|()| match sensor.source {
             CameraSource::Following { target, width } => {
                 check_target(world, target, width).map(|()| asked.following.push((request, target, width)))
             }
@@ -71,9 +74,10 @@ pub(super) fn requests(world: &mut World) -> Asked {
                 check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
             }
         });
-        if let Err(error) = result {
-            report(world, [&request].into_iter(), &error);
-        }
+        refused.extend(result.err().map(|error| (request, error)));
+    }
+    for (request, error) in &refused {
+        report(world, [request].into_iter(), error);
     }
     asked
 }

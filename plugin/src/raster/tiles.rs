@@ -126,11 +126,12 @@ fn find_runs(
 ) {
     runs.clear();
     texels.clear();
-    if length == 0.0 || !(1.0 / length).is_finite() {
+    let cells_per_pixel = 1.0 / length;
+    if !cells_per_pixel.is_finite() {
         return;
     }
     for pixel in 0..pixels {
-        let at = (centre(pixel) - corner) / length;
+        let at = (centre(pixel) - corner) * cells_per_pixel;
         let cell = floor(at);
         let within = at - cell as f32;
         texels.push(texel_in(if flip { 1.0 - within } else { within }, side));

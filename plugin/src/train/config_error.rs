@@ -66,17 +66,22 @@ pub(super) fn unknown_key(key: &str) -> String {
     }
 }
 
-/// The key nearest to `name`: in this section, otherwise the same name elsewhere, otherwise in a section whose name is
-/// near.
+/// The key nearest to `name`: the same name elsewhere, otherwise one like it in this section, otherwise one in a section
+/// whose name is near.
 fn neighbour(section: &str, name: &str) -> Option<String> {
     let join = |section: &str, name: &str| if section.is_empty() { name.into() } else { format!("{section}.{name}") };
+    let near_section = nearest(section, &names(""));
+    let same_name = |path: &&str| path.rsplit('.').next() == Some(name);
+    // Of several, the one whose section looks like this one.
+    let of_near_section = |path: &&str| near_section.is_some_and(|near| **path == join(near, name));
+    let elsewhere = || Keys::all().paths().filter(same_name);
+    if let Some(elsewhere) = elsewhere().find(of_near_section).or_else(|| elsewhere().next()) {
+        return Some(elsewhere.to_owned());
+    }
     if let Some(near) = nearest(name, &names(section)) {
         return Some(join(section, near));
     }
-    if let Some(elsewhere) = Keys::all().paths().find(|path| path.rsplit('.').next() == Some(name)) {
-        return Some(elsewhere.to_owned());
-    }
-    let near = nearest(section, &names(""))?;
+    let near = near_section?;
     Some(join(near, nearest(name, &names(near))?))
 }
 

@@ -54,10 +54,16 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
 mod tests {
     use std::path::Path;
 
-    use playbot_learner::{AlphaKind, EntropyCoef, StdKind, nn::Activation};
+    use playbot_learner::{
+        AlphaKind, EntropyCoef, StdKind,
+        nn::{Activation, CnnKind},
+    };
 
     use super::*;
-    use crate::train::{Algorithm, config_file::parse_experiment};
+    use crate::{
+        train::{Algorithm, config_file::parse_experiment},
+        vision::{ImageOptions, ObservationKind},
+    };
 
     fn experiment() -> Experiment {
         let text = r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos/coinrun", steps: 1000,
@@ -86,6 +92,11 @@ mod tests {
             "train=hard:0..31",
             "test=\"hard:70..80\"",
             "demos=my recordings/a",
+            "demo_steps=5000",
+            "observation=Raster",
+            "image.stack=4",
+            "image=(grayscale: true, width: 84)",
+            "ppo.cnn=Nature(feature: 64)",
             "algorithm=bc",
             "seeds=[4, 5]",
             "variants=[(name: \"a\", set: [\"score.kl=true\"])]",
@@ -105,6 +116,10 @@ mod tests {
         expected.train = "hard:0..31".parse().expect("a split");
         expected.test = "hard:70..80".parse().expect("a split");
         expected.demos = "my recordings/a".into();
+        expected.demo_steps = Some(5000);
+        expected.observation = ObservationKind::Raster;
+        expected.image = ImageOptions { stack: 4, grayscale: true, width: 84, ..ImageOptions::default() };
+        expected.ppo.cnn = CnnKind::Nature { feature: 64 };
         expected.algorithm = Algorithm::BehaviourCloning;
         expected.seeds = vec![4, 5];
         expected.variants = vec![crate::train::config::Variant { name: "a".into(), set: vec!["score.kl=true".into()] }];
@@ -127,6 +142,13 @@ mod tests {
             ("ppo.lr", "write key=value"),
             ("ppo.gama=1", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
             ("kl_coef=1", "did you mean `score.kl_coef`?"),
+            ("image.stak=2", "did you mean `image.stack`?"),
+            ("stack=2", "did you mean `image.stack`?"),
+            ("imag.width=32", "did you mean `image.width`?"),
+            ("image=(stack: 2, gray: true)", "unknown key `image.gray`; did you mean `image.grayscale`?"),
+            ("image.stack=-1", "`image.stack` must be a whole number such as 1, not -1"),
+            ("observation=raster", "did you mean `Raster`?"),
+            ("ppo.cnn=Natur", "did you mean `Nature`?"),
             ("pop.lr=1", "did you mean `ppo.lr`?"),
             ("ppo.qqq=1", "valid keys in `ppo`: activation"),
             ("steps.more=1", "`steps` has no keys"),

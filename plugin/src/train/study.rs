@@ -158,10 +158,13 @@ mod tests {
     #[test]
     fn every_variant_runs_with_every_seed_and_shares_skills_where_it_can() {
         let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false"]),
-            (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"])"#;
+            (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"]),
+            (name: "eyes", set: ["observation=Raster"]), (name: "grey", set: ["observation=Raster", "image.grayscale=true"]),
+            (name: "idle", set: ["image.grayscale=true"]), (name: "few", set: ["demo_steps=9"])"#;
         let runs = study_runs(&experiment(variants)).expect("valid");
         let ids: Vec<String> = runs.iter().map(StudyRun::id).collect();
-        let expected = ["full", "no-kl", "short", "ppo"].map(|name| [3, 5].map(|seed| format!("{name}-seed{seed}")));
+        let names = ["full", "no-kl", "short", "ppo", "eyes", "grey", "idle", "few"];
+        let expected = names.map(|name| [3, 5].map(|seed| format!("{name}-seed{seed}")));
         assert_eq!(ids, expected.concat());
         assert!(runs.iter().all(|run| run.experiment.variants.is_empty() && run.experiment.seeds.is_empty()));
         assert!(!runs[2].experiment.score.kl && runs[0].experiment.score.kl);
@@ -170,6 +173,9 @@ mod tests {
         assert_eq!((&skills[0], &skills[1]), (&skills[2], &skills[3]), "the same skill settings");
         assert_ne!(skills[0], skills[1], "other seeds");
         assert_ne!(skills[0], skills[4], "other windows");
+        assert!(skills[0] != skills[8] && skills[8] != skills[10], "other eyes");
+        assert_eq!(skills[0], skills[12], "nobody looks at pictures");
+        assert_ne!(skills[0], skills[14], "fewer demonstrations");
     }
 
     #[test]

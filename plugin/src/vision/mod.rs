@@ -14,6 +14,7 @@
 mod blank;
 mod card;
 mod compose;
+mod difference;
 mod frame;
 mod options;
 mod planes;
@@ -26,6 +27,7 @@ mod velocity;
 
 pub use blank::BlankEpisodes;
 pub use card::UnknownSight;
+pub use difference::{CLOSE, Difference};
 pub use frame::Frame;
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
 pub use plugin::VisionPlugin;

@@ -132,7 +132,7 @@ impl Sight {
             ObservationKind::Vector => return Ok(()),
             ObservationKind::Raster => app.add_plugins(crate::raster::RasterPlugin),
             #[cfg(feature = "camera")]
-            ObservationKind::Camera => app.add_plugins(crate::camera::CameraSensorPlugin::headless()?),
+            ObservationKind::Camera => app.add_plugins(crate::camera::CameraSensorPlugin::for_app(app)?),
             #[cfg(not(feature = "camera"))]
             ObservationKind::Camera => return Err(VisionError::NoCamera),
         };

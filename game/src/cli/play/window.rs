@@ -123,7 +123,7 @@ fn conclude(path: &Path) -> Result<Outcome, CliError> {
         summary.steps,
         deciders(&summary.steps_by_decider)
     );
-    eprintln!("  playbot demo verify {file}         proves that it replays");
-    eprintln!("  playbot learn-skills --set 'demos=\"{file}\"' --out skills.safetensors   learns from it");
+    eprintln!("  playbot demo verify {file}   proves that it replays");
+    eprintln!("  playbot learn-skills --set demos={file} --out skills.safetensors   learns from it");
     Ok(Outcome::Pass)
 }

@@ -28,22 +28,16 @@ impl Film {
         Self { options, scale: scale as usize, tick_hz }
     }
 
-    /// One observation and nothing else; stacked pictures side by side, the oldest on the left.
+    /// One observation ([`Observation::image`](bevy_playbot::observation::Observation::image)) and nothing else; stacked pictures side by side, the oldest on the left.
     ///
     /// # Errors
     ///
     /// The picture is too large for a PNG.
-    pub fn still(&self, shot: &Shot) -> Result<Png, CliError> {
+    pub fn still(&self, image: &[u8]) -> Result<Png, CliError> {
         let [width, height] = self.size();
         let mut screen = Screen::new(width, height, BACKGROUND);
-        self.draw(&mut screen, shot);
-        let mut bytes = Vec::new();
-        let written = encoder(&mut bytes, &screen).write_header().and_then(|mut writer| {
-            writer.write_image_data(screen.bytes())?;
-            writer.finish()
-        });
-        written.map_err(too_large)?;
-        Ok((bytes, [width, height]))
+        self.draw(&mut screen, image);
+        Ok((to_png(&screen)?, [width, height]))
     }
 
     /// All shots one after the other, again and again, each with its caption. `drawn` hears each that is done.
@@ -78,7 +72,7 @@ impl Film {
         let mut writer = encoder.write_header()?;
         for shot in shots {
             screen.block(0, 0, screen.width, screen.height, BACKGROUND);
-            self.draw(screen, shot);
+            self.draw(screen, &shot.image);
             caption.draw(screen, top, shot);
             writer.write_image_data(screen.bytes())?;
             drawn();
@@ -102,14 +96,29 @@ impl Film {
         [stack as usize * width as usize * self.scale + gaps, height as usize * self.scale]
     }
 
-    fn draw(&self, screen: &mut Screen, shot: &Shot) {
+    fn draw(&self, screen: &mut Screen, image: &[u8]) {
         let (width, height) = (self.options.width as usize, self.options.height as usize);
         let picture = width * height * self.options.colours() as usize;
-        for (number, planes) in shot.image.chunks_exact(picture).enumerate() {
+        for (number, planes) in image.chunks_exact(picture).enumerate() {
             let x = number * (width + 1) * self.scale;
             screen.planes(planes, width, height, self.scale, (x, 0));
         }
     }
+}
+
+/// The bytes of a PNG file.
+///
+/// # Errors
+///
+/// The picture is too large for a PNG.
+pub fn to_png(screen: &Screen) -> Result<Vec<u8>, CliError> {
+    let mut bytes = Vec::new();
+    let written = encoder(&mut bytes, screen).write_header().and_then(|mut writer| {
+        writer.write_image_data(screen.bytes())?;
+        writer.finish()
+    });
+    written.map_err(too_large)?;
+    Ok(bytes)
 }
 
 fn encoder<'a>(bytes: &'a mut Vec<u8>, screen: &Screen) -> Encoder<'static, &'a mut Vec<u8>> {

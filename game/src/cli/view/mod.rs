@@ -1,10 +1,10 @@
 //! `playbot view`.
 
 mod caption;
-mod film;
+pub mod film;
 mod font;
 mod options;
-mod screen;
+pub mod screen;
 mod stage;
 
 use std::path::{Path, PathBuf};
@@ -27,7 +27,6 @@ use super::{
 };
 use crate::registry;
 use film::Film;
-use screen::Screen;
 use stage::{Shot, Stage};
 
 /// Writes what a bot sees as a PNG: one observation, or with --episode a whole episode as an animated PNG with tick,
@@ -49,7 +48,7 @@ pub struct Args {
     mode: Option<String>,
     /// Seed of the level.
     #[arg(long, default_value_t = 0, conflicts_with = "demo")]
-    seed: u64,
+    seed: u32,
     /// Tick of the episode, from 0, whose observation is written.
     #[arg(long, default_value_t = 0, conflicts_with = "episode")]
     tick: u32,
@@ -93,7 +92,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         bar.finish_and_clear();
         drawn?
     } else {
-        film.still(&shots[0])?
+        film.still(&shots[0].image)?
     };
     write(&args.out, &bytes)?;
     let written = Written { player: &name, frames: shots.len(), bytes: bytes.len(), size };
@@ -118,7 +117,7 @@ fn open_stage(game: &'static dyn Game, args: &Args) -> Result<(Stage, Sight, Str
         None => usual_player(game)?,
     };
     let sight = sight(game, args, Some(&chosen))?;
-    Ok((Stage::playing(game, mode, &sight, args.seed, &chosen.player)?, sight, chosen.name))
+    Ok((Stage::playing(game, mode, &sight, args.seed.into(), &chosen.player)?, sight, chosen.name))
 }
 
 /// The demonstrator, or else the first of the game's bots.
@@ -188,7 +187,12 @@ fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
     Ok(shots)
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+/// Writes a file, and makes the folder it lies in.
+///
+/// # Errors
+///
+/// The folder or the file cannot be written.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)
             .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;

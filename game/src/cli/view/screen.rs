@@ -44,4 +44,11 @@ impl Screen {
             }
         }
     }
+
+    /// Draws a frame of a sensor, enlarged, with the upper left corner at (x, y).
+    pub fn frame(&mut self, pixels: &[[u8; 4]], width: usize, scale: usize, (x, y): (usize, usize)) {
+        for (at, &[red, green, blue, _]) in pixels.iter().enumerate() {
+            self.block(x + at % width * scale, y + at / width * scale, scale, scale, [red, green, blue]);
+        }
+    }
 }

@@ -18,7 +18,7 @@ const STEP_TICKS: u32 = 5;
 /// A player slower than this stands, tiles per tick.
 const STANDING: f32 = 0.01;
 /// Height of a player's picture in heights of its body; its feet are at the body's.
-const PLAYER_HEIGHT: f32 = 1.7415;
+pub(super) const PLAYER_HEIGHT: f32 = 1.7415;
 
 /// Player, and the clock of its arena.
 pub(super) fn players(
@@ -42,7 +42,7 @@ pub(super) fn players(
         let ax = if episode.tick == 0 { 0 } else { horizontal(action) };
         let height = 2.0 * body.ry * PLAYER_HEIGHT;
         transform.translation.x = body.x;
-        transform.translation.y = body.y - body.ry + height / 2.0;
+        transform.translation.y = body.y;
         sprite.custom_size = Some(Vec2::new(2.0 * body.rx, height));
         sprite.rect = Some(Art::player(arena.level.agent_theme, pose(body, memory, ax, episode.tick)));
         sprite.flip_x = memory.faces_left;

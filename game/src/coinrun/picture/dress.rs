@@ -1,9 +1,12 @@
 //! Gives arenas and everything in them what is drawn.
 
-use bevy::prelude::*;
+use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer};
 
-use super::art::{Art, Pose};
+use super::{
+    animate::PLAYER_HEIGHT,
+    art::{Art, Pose},
+};
 use crate::coinrun::{
     SIZE, TileGrid,
     components::{Arena, ArenaBody, Crate, Enemy, InArena, Inhabitants, PlayerBody, PlaysIn, Saw, Tiles},
@@ -52,9 +55,10 @@ pub(super) fn players(
         let scenery = Scenery { backdrop, ground, dressed: 0, tick: 0 };
         commands.entity(plays_in.0).insert((Stage, Transform::from_translation(place), scenery));
         let sprite = Sprite { rect: Some(Art::player(0, Pose::Stand)), ..Sprite::from_image(art.figures.clone()) };
-        let components =
-            (ChildOf(plays_in.0), sprite, Transform::from_xyz(0.0, 0.0, ACTORS), PaintedVelocity::default());
-        commands.entity(player).insert(components);
+        // The eye is on the middle of the body; the picture stands on the body's feet.
+        let feet = Anchor(Vec2::new(0.0, 0.5 / PLAYER_HEIGHT - 0.5));
+        let place = Transform::from_xyz(0.0, 0.0, ACTORS);
+        commands.entity(player).insert((ChildOf(plays_in.0), sprite, feet, place, PaintedVelocity::default()));
     }
 }
 

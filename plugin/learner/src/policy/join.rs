@@ -7,6 +7,7 @@ use burn::tensor::{Device, Tensor};
 
 /// What actor and critic read of many states, on a device.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per batch, and it is never stored")]
 pub enum NetInput {
     /// Skills joined with vectors: `[z, s]`, `[n, latent + obs_dim]`.
     Joined(Tensor<2>),

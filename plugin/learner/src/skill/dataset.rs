@@ -4,6 +4,7 @@ use super::Window;
 use crate::rng::fnv1a;
 use crate::{ActionSpace, Actions, LearnError, ObsKind, Observations};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// One recorded episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,12 +15,12 @@ pub struct DemoEpisode {
     pub actions: Actions,
 }
 
-/// Demonstrations of one game.
+/// Demonstrations of one game. Clones share the memory, of which images need much.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     pub(super) observation: ObsKind,
     pub(super) space: ActionSpace,
-    pub(super) episodes: Vec<DemoEpisode>,
+    pub(super) episodes: Arc<[DemoEpisode]>,
 }
 
 impl Dataset {
@@ -43,7 +44,7 @@ impl Dataset {
             episode.observations.as_slice().check(&what, &observation, episode.actions.len())?;
             space.check(&episode.actions)?;
         }
-        Ok(Self { observation, space, episodes })
+        Ok(Self { observation, space, episodes: episodes.into() })
     }
 
     /// What an observation is.

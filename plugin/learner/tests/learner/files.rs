@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-type Load = fn(&Path) -> Result<(), FileError>;
+pub type Load = fn(&Path) -> Result<(), FileError>;
 
 /// A file of each kind, what reads it, and the name of a tensor in it.
 fn files(folder: &Path) -> Vec<(PathBuf, Load, &'static str)> {
@@ -38,13 +38,13 @@ fn files(folder: &Path) -> Vec<(PathBuf, Load, &'static str)> {
 }
 
 /// A file's header and tensors, to be changed.
-struct Contents {
-    description: String,
-    tensors: BTreeMap<String, (Vec<usize>, Dtype, Vec<u8>)>,
+pub struct Contents {
+    pub description: String,
+    pub tensors: BTreeMap<String, (Vec<usize>, Dtype, Vec<u8>)>,
 }
 
 impl Contents {
-    fn read(path: &Path) -> Self {
+    pub fn read(path: &Path) -> Self {
         let bytes = std::fs::read(path).expect("readable");
         let (_, header) = SafeTensors::read_metadata(&bytes).expect("safetensors");
         let description = header.metadata().as_ref().expect("a description")["playbot"].clone();
@@ -56,7 +56,7 @@ impl Contents {
         Self { description, tensors }
     }
 
-    fn write(&self, path: &Path) {
+    pub fn write(&self, path: &Path) {
         let views = self.tensors.iter().map(|(name, (shape, dtype, bytes))| {
             (name, TensorView::new(*dtype, shape.clone(), bytes).expect("as many bytes as numbers"))
         });
@@ -66,14 +66,14 @@ impl Contents {
 }
 
 /// Puts `value` at `pointer` in the JSON of a file's header.
-fn describe(contents: &mut Contents, pointer: &str, value: Value) {
+pub fn describe(contents: &mut Contents, pointer: &str, value: Value) {
     let mut json: Value = serde_json::from_str(&contents.description).expect("JSON");
     *json.pointer_mut(pointer).expect(pointer) = value;
     contents.description = json.to_string();
 }
 
 /// What reading the file says after `change`.
-fn after(path: &Path, load: Load, change: impl Fn(&mut Contents)) -> FileError {
+pub fn after(path: &Path, load: Load, change: impl Fn(&mut Contents)) -> FileError {
     let mut contents = Contents::read(path);
     change(&mut contents);
     let changed = path.with_extension("changed");
@@ -158,7 +158,7 @@ fn a_training_does_not_go_on_with_other_demonstrations() {
 }
 
 /// More than any machine has.
-const HUGE: u64 = 1 << 40;
+pub const HUGE: u64 = 1 << 40;
 
 #[test]
 fn sizes_that_the_file_does_not_hold_are_refused_before_anything_is_made() {
@@ -187,7 +187,7 @@ fn sizes_that_the_file_does_not_hold_are_refused_before_anything_is_made() {
 }
 
 /// A policy file of an untrained policy with skills.
-fn policy_file(path: &Path, condition: bool) {
+pub fn policy_file(path: &Path, condition: bool) {
     let score = ScoreConfig { condition, init_from_decoder: condition, ..ScoreConfig::default() };
     let learner = PpoLearner::with_skill(ppo_config(), score, &model(1), 1, DeviceKind::Flex).expect("good settings");
     let file = PolicyFile { card: PolicyCard::default(), policy: learner.policy(), skills: learner.skills() };
@@ -196,7 +196,7 @@ fn policy_file(path: &Path, condition: bool) {
     file.save(path, &obs, &z, 3).expect("written");
 }
 
-fn load_policy(path: &Path) -> Result<(), FileError> {
+pub fn load_policy(path: &Path) -> Result<(), FileError> {
     PolicyFile::load(path, DeviceKind::Flex).map(drop)
 }
 

@@ -1,6 +1,9 @@
 //! What was played since the last update.
 
-use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations, Policy, PolicySpec};
+mod bootstrap;
+mod join;
+
+use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations, PolicySpec};
 
 /// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
 #[derive(Clone, Debug, PartialEq)]
@@ -170,108 +173,6 @@ impl Rollout {
         self.truncated.extend_from_slice(step.truncated);
         self.final_values.extend_from_slice(step.final_values);
         self.steps += 1;
-        Ok(())
-    }
-
-    /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ... A
-    /// single one stays as it is.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] for no parts; [`LearnError::Shape`], [`LearnError::Config`] or [`LearnError::Action`] if they
-    /// do not fit together.
-    pub fn join(mut parts: Vec<Self>) -> Result<Self, LearnError> {
-        for part in &parts {
-            part.check()?;
-        }
-        if parts.len() == 1 {
-            return Ok(parts.remove(0));
-        }
-        let Some(first) = parts.first() else {
-            return Err(LearnError::Config("no rollouts to join".to_owned()));
-        };
-        let (kind, width) = (first.obs_kind, first.obs_kind.numbers());
-        let mut all =
-            Self { actions: first.actions.clone(), ..Self::new(0, kind, first.latent, &ActionSpace::Discrete(0)) };
-        all.actions.clear();
-        all.obs = Observations::with_capacity(&kind, parts.iter().map(Self::rows).sum());
-        all.steps = first.steps;
-        for part in &parts {
-            LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
-            kind.same_as(&part.obs_kind, "a joined rollout")?;
-            LearnError::check("latent of a joined rollout", first.latent, part.latent)?;
-            all.envs += part.envs;
-            all.next_values.extend_from_slice(&part.next_values);
-            all.ends.next_obs.push(&part.ends.next_obs)?;
-            all.ends.next_z.extend_from_slice(&part.ends.next_z);
-        }
-        for t in 0..first.steps {
-            for part in &parts {
-                let rows = t * part.envs..(t + 1) * part.envs;
-                all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
-                all.obs.push(part.obs.rows(rows.clone(), width))?;
-                all.z.extend_from_slice(&part.z[rows.start * part.latent..rows.end * part.latent]);
-                all.log_probs.extend_from_slice(&part.log_probs[rows.clone()]);
-                all.values.extend_from_slice(&part.values[rows.clone()]);
-                all.rewards.extend_from_slice(&part.rewards[rows.clone()]);
-                all.terminated.extend_from_slice(&part.terminated[rows.clone()]);
-                all.truncated.extend_from_slice(&part.truncated[rows.clone()]);
-                all.final_values.extend_from_slice(&part.final_values[rows]);
-            }
-        }
-        all.join_cuts(&parts)?;
-        Ok(all)
-    }
-
-    /// The cut episodes of all parts, in ascending order of their joined rows.
-    fn join_cuts(&mut self, parts: &[Self]) -> Result<(), LearnError> {
-        let mut cuts = Vec::new();
-        let mut offset = 0;
-        for part in parts {
-            for (i, &row) in part.ends.cut_rows.iter().enumerate() {
-                let joined = row / part.envs * self.envs + offset + row % part.envs;
-                cuts.push((joined, part, i));
-            }
-            offset += part.envs;
-        }
-        cuts.sort_by_key(|(row, ..)| *row);
-        for (row, part, i) in cuts {
-            self.ends.cut_rows.push(row);
-            self.ends.cut_obs.push(part.ends.cut_obs.row(i, self.obs_kind.numbers()))?;
-            self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * self.latent..(i + 1) * self.latent]);
-        }
-        Ok(())
-    }
-
-    /// Fills [`Self::final_values`] and [`Self::next_values`] with what `policy` says of the [`Self::ends`], all in one
-    /// batch: the alternative to asking it tick by tick. Values that are never read become 0.
-    ///
-    /// # Errors
-    /// As [`Self::check`]; [`LearnError::Shape`] or [`LearnError::Config`] if the states do not fit the policy.
-    pub fn bootstrap(&mut self, policy: &Policy) -> Result<(), LearnError> {
-        let rows = self.rows();
-        self.final_values = vec![0.0; rows];
-        self.next_values = vec![0.0; self.envs];
-        self.check()?;
-        let (width, latent) = (self.obs_kind.numbers(), self.latent);
-        let done = self.done();
-        let going_on = |&env: &usize| rows == 0 || !done[rows - self.envs + env];
-        let running: Vec<usize> = (0..self.envs).filter(going_on).collect();
-        let ends = &self.ends;
-        ends.next_obs.as_slice().check_size("rollout ends next_obs", &self.obs_kind, self.envs)?;
-        LearnError::check("rollout ends next_z", self.envs * latent, ends.next_z.len())?;
-        let (mut obs, mut z) = (ends.cut_obs.clone(), ends.cut_z.clone());
-        for &env in &running {
-            obs.push(ends.next_obs.row(env, width))?;
-            z.extend_from_slice(&ends.next_z[env * latent..(env + 1) * latent]);
-        }
-        let cuts = ends.cut_rows.len();
-        let values = policy.values(&z, &obs, cuts + running.len())?;
-        for (&row, &value) in ends.cut_rows.iter().zip(&values) {
-            self.final_values[row] = value;
-        }
-        for (&env, &value) in running.iter().zip(&values[cuts..]) {
-            self.next_values[env] = value;
-        }
         Ok(())
     }
 

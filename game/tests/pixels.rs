@@ -1,0 +1,105 @@
+//! Learning from pictures by the program, and the experiments that come with it.
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+use bevy_playbot::train::config_file::read_experiment;
+use serde_json::Value;
+
+const EXPERIMENT: &str = r#"(
+    game: "coinrun", train: "hard:0..3", test: "hard:64..67", demos: "walk.demo", steps: 256, arenas: 4,
+    observation: Raster, image: (width: 16, height: 16, stack: 2, paint_velocity: true),
+    skills: (epochs: 1, batch: 16, hidden: [16], gru_hidden: 8, latent: 2, cnn: Impala(channels: [4], feature: 16)),
+    ppo: (num_steps: 32, minibatches: 2),
+    eval: (episodes_per_level: 1),
+)"#;
+
+fn playbot(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
+}
+
+/// What a call that works writes: data and messages.
+fn done(folder: &Path, args: &[&str]) -> (String, String) {
+    let output = playbot(folder, args);
+    let messages = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {messages}");
+    (String::from_utf8_lossy(&output.stdout).into_owned(), messages)
+}
+
+#[test]
+fn the_program_learns_from_pixels_and_knows_its_eyes_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::write(folder.join("small.ron"), EXPERIMENT).expect("writable");
+    let from = ["--experiment", "small.ron"];
+    done(folder, &["record", "coinrun", "--levels", "hard:4..13", "--noise", "0.2", "--out", "walk.demo"]);
+    let learn = ["learn-skills", "--out", "s.safetensors", "--max-steps", "300"];
+    let (_, messages) = done(folder, &[&learn[..], &from].concat());
+    assert!(
+        messages.contains("16×16 colour pictures of the raster, 2 in a stack, with painted velocity"),
+        "{messages}"
+    );
+    let train = ["train", "--skills", "s.safetensors", "--run", "run"];
+    done(folder, &[&train[..], &from].concat());
+    done(folder, &["policy", "export", "--run", "run", "--out", "eyes.policy"]);
+    let shown = done(folder, &["policy", "show", "eyes.policy"]).0;
+    assert!(shown.contains("observation   16×16 colour pictures of the raster, 2 in a stack"), "{shown}");
+    let card: Value =
+        serde_json::from_str(&done(folder, &["policy", "show", "eyes.policy", "--json"]).0).expect("JSON");
+    assert_eq!((&card["card"]["picture"]["sensor"], &card["card"]["picture"]["stack"]), (&"raster".into(), &2.into()));
+
+    // An experiment of vectors says the levels here; what is seen is the policy's own affair.
+    std::fs::write(folder.join("vectors.ron"), EXPERIMENT.replace("Raster", "Vector")).expect("writable");
+    let measure = |args: &[&str]| {
+        let text = done(folder, &[&["eval", "--levels", "hard:64..67", "--json"], args].concat()).0;
+        let rows = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        rows.map(|row| (row["return_mean"].clone(), row["length_mean"].clone())).collect::<Vec<_>>()
+    };
+    let own = measure(&["--run", "run"]);
+    assert_eq!(measure(&["--policy", "eyes.policy", "--experiment", "vectors.ron"]), own);
+    assert_eq!(measure(&["--policy", "eyes.policy", "--observation", "raster", "--experiment", "vectors.ron"]), own);
+    assert_eq!(measure(&["--skills", "s.safetensors", "--bot", "random", "--experiment", "vectors.ron"]).len(), 2);
+
+    for (args, words) in [
+        (&["eval", "--run", "run", "--observation", "vector"][..], "--observation vector gives vectors"),
+        (&["eval", "--run", "run", "--observation", "sonar"], "valid: vector, raster, camera"),
+        (&["eval", "--run", "run", "--set", "image.stack=4"], "--observation camera"),
+        (&["train", "--skills", "s.safetensors", "--run", "r", "--experiment", "vectors.ron"], "say vectors"),
+        (
+            &[
+                "train",
+                "--skills",
+                "s.safetensors",
+                "--run",
+                "r",
+                "--experiment",
+                "small.ron",
+                "--set",
+                "image.stack=4",
+            ],
+            "4 in a stack",
+        ),
+        (&["learn-skills", "--out", "t", "--experiment", "small.ron", "--set", "image.width=0"], "width is 0"),
+    ] {
+        let output = playbot(folder, args);
+        let messages = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{args:?}: {messages}");
+        assert!(messages.contains(words), "{args:?}: {messages}");
+    }
+    assert!(!folder.join("r").exists(), "nothing is begun that cannot work");
+}
+
+#[test]
+fn the_experiments_of_the_repository_are_sound() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments");
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("there").flatten() {
+        let experiment = read_experiment(&entry.path()).unwrap_or_else(|error| panic!("{error}"));
+        experiment.check().unwrap_or_else(|error| panic!("{}: {error}", entry.path().display()));
+        names.push((entry.file_name().to_string_lossy().into_owned(), experiment.sight().is_image()));
+    }
+    names.sort();
+    assert!(names.contains(&("coinrun-pixels.ron".to_owned(), true)) && names.len() >= 4, "{names:?}");
+}
