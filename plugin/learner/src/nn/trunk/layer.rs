@@ -42,7 +42,7 @@ impl ConvShape {
         }
     }
 
-    /// Rows and lane of a weight in [`Weights::forward`].
+    /// Row and lane of a weight in [`Weights::forward`].
     fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
         let rows = self.kernel * self.kernel * self.inputs;
         (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
