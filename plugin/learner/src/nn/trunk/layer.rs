@@ -26,7 +26,7 @@ impl ConvShape {
         self.stride == 1 && 2 * self.padding + 1 == self.kernel
     }
 
-    /// Shows each weight's number and its output, input, row and column, in the order `[outputs, inputs, kernel, kernel]`.
+    /// Shows each weight's number and place, in the order `[outputs, inputs, kernel, kernel]`.
     fn each_weight(self, mut visit: impl FnMut(usize, Place)) {
         let side = self.kernel;
         let mut number = 0;
