@@ -26,7 +26,7 @@ impl ConvShape {
         self.stride == 1 && 2 * self.padding + 1 == self.kernel
     }
 
-    /// Shows each weight's number and its output, input, row and column, in the order `[outputs, inputs, kernel, kernel]`.
+    /// Shows each weight's number and place, in the order `[outputs, inputs, kernel, kernel]`.
     fn each_weight(self, mut visit: impl FnMut(usize, Place)) {
         let side = self.kernel;
         let mut number = 0;
@@ -42,7 +42,7 @@ impl ConvShape {
         }
     }
 
-    /// Rows and lane of a weight in [`Weights::forward`].
+    /// Row and lane of a weight in [`Weights::forward`].
     fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
         let rows = self.kernel * self.kernel * self.inputs;
         (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
