@@ -47,6 +47,7 @@ impl Layout {
 pub(super) fn target_image(size: UVec2) -> Image {
     let mut image = Image::new_target_texture(size.x, size.y, TextureFormat::Rgba8UnormSrgb, None);
     image.data = None;
+    image.copy_on_resize = false;
     image.sampler = ImageSampler::nearest();
     image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
     image.asset_usage = RenderAssetUsages::MAIN_WORLD | RenderAssetUsages::RENDER_WORLD;

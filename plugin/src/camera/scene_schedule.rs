@@ -10,7 +10,7 @@ use bevy::{
     image::ImagePlugin,
     mesh::MeshPlugin,
     prelude::*,
-    render::{RenderPlugin, settings::RenderCreation},
+    render::{RenderPlugin, extract_plugin::ExtractPlugin, settings::RenderCreation},
     sprite::SpritePlugin,
     sprite_render::SpriteRenderPlugin,
     transform::TransformPlugin,
@@ -56,6 +56,8 @@ pub(super) struct SceneSchedule {
 impl SceneSchedule {
     pub(super) fn new() -> Self {
         let mut app = App::new();
+        // Bevy complains about plugins whose renderer is nowhere. This one never runs.
+        app.add_plugins(ExtractPlugin::default());
         add_renderer(&mut app, adapter::none());
         app.add_systems(PostUpdate, images::note_missing_images.after(AssetEventSystems));
         let mut schedules = app.world_mut().resource_mut::<Schedules>();
