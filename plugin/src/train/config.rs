@@ -40,7 +40,7 @@ pub struct Experiment {
     pub test: LevelSplit,
     /// File or folder of demonstrations.
     pub demos: PathBuf,
-    /// Learn skills from at most so many recorded steps: whole episodes, spread evenly over the recordings. From all of
+    /// Learn skills from at most so many recorded steps: whole episodes, drawn evenly over the recordings. From all of
     /// them if none is named.
     #[serde(default)]
     pub demo_steps: Option<u64>,
