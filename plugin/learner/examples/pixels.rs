@@ -77,8 +77,14 @@ fn split(name: &str, cnn: &CnnKind) -> Result<(), LearnError> {
         let batch = Minibatch { inputs, ppo: ppo.clone(), decoder: None };
         best(5, || gradient_step(&mut nets, &mut adam, &batch, &PpoConfig::default(), None, 1e-4).map(drop))
     };
-    let to_numbers = best(5, || Ok(drop(images())))?;
-    let forward = best(5, || Ok(drop(trunk.forward(x.clone()))))?;
+    let to_numbers = best(5, || {
+        images();
+        Ok(())
+    })?;
+    let forward = best(5, || {
+        trunk.forward(x.clone());
+        Ok(())
+    })?;
     let heads = step(&heads, features.into())?;
     let whole = step(&whole, NetInput::Images { z: None, pixels: x.clone() })?;
     println!(

@@ -22,7 +22,6 @@ pub struct Scene {
 }
 
 /// One kind of thing, many of it. Heights are texels above the bottom, sizes are texels, colours `0xRRGGBB`.
-#[allow(clippy::enum_variant_names, reason = "`Hills` and its like are what they are")]
 pub enum Layer {
     /// Round hills up to `height`, `swing` high and about `length` long.
     Hills { height: i32, swing: i32, length: i32, colour: u32 },

@@ -22,7 +22,7 @@ pub struct Shot {
     pub image: Vec<u8>,
     /// What it did, in words.
     pub action: String,
-    /// Return that its policy expected.
+    /// Return that its policy expected, if it has a critic.
     pub value: Option<f32>,
     /// The skill it followed; empty if there is none.
     pub skill: Vec<f32>,
@@ -101,11 +101,13 @@ impl Stage {
     fn shot(&self) -> Shot {
         let agent = self.world.entity(self.agent);
         let by_policy = agent.get::<Control>() == Some(&Control::Policy);
+        let decided = agent.get::<Decision>().filter(|_| by_policy);
         Shot {
             tick: self.ticks,
             image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
             action: agent.get::<Action>().map(|action| self.in_words(&action.0)).unwrap_or_default(),
-            value: agent.get::<Decision>().filter(|_| by_policy).map(|decision| decision.value),
+            // A policy without a critic says 0 to everything.
+            value: decided.map(|decision| decision.value).filter(|value| *value != 0.0),
             skill: agent.get::<ActiveSkill>().map(|skill| skill.z.clone()).unwrap_or_default(),
             reward: agent.get::<Reward>().map_or(0.0, Reward::get),
         }

@@ -39,8 +39,15 @@ pub(crate) fn uniform<R: Rng + ?Sized>(len: usize, bound: f64, rng: &mut R) -> V
     (0..len).map(|_| ((2.0 * unit(rng) - 1.0) * bound) as f32).collect()
 }
 
+/// Over eight lanes, so that the compiler can vectorise it.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let mut lanes = [0.0; 8];
+    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+    for (a, b) in a.zip(b) {
+        lanes.iter_mut().zip(a.iter().zip(b)).for_each(|(lane, (x, y))| *lane += x * y);
+    }
+    lanes.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

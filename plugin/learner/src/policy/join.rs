@@ -41,21 +41,20 @@ pub(crate) struct HostStates<'a> {
 }
 
 impl HostStates<'_> {
-    /// The given rows on `device`. Of images only their own bytes go there.
-    pub(crate) fn input(&self, rows: impl ExactSizeIterator<Item = usize> + Clone, device: &Device) -> NetInput {
+    /// The given rows on `device`. Of images only these become numbers.
+    pub(crate) fn input(&self, rows: &[usize], device: &Device) -> NetInput {
         let (n, width) = (rows.len(), self.kind.numbers());
+        let rows_of = rows.iter().copied();
         match (self.obs, self.kind) {
             (ObsSlice::Image(pixels), ObsKind::Image(shape)) => {
-                let mut gathered = Vec::with_capacity(n * width);
-                rows.clone().for_each(|row| gathered.extend_from_slice(&pixels[row * width..(row + 1) * width]));
-                let skills = || matrix(joined_rows(&[], 0, self.z, self.latent, None, rows), n, self.latent, device);
+                let skills = || matrix(joined_rows(&[], 0, self.z, self.latent, None, rows_of), n, self.latent, device);
                 NetInput::Images {
                     z: (self.latent > 0).then(skills),
-                    pixels: ObsRows::scaled(gathered, [n, shape.channels, shape.height, shape.width], device),
+                    pixels: ObsRows::gather(pixels, [shape.channels, shape.height, shape.width], rows, device),
                 }
             }
             (ObsSlice::Vector(values), _) => {
-                let joined = joined_rows(self.z, self.latent, values, width, self.stats, rows);
+                let joined = joined_rows(self.z, self.latent, values, width, self.stats, rows_of);
                 NetInput::Joined(matrix(joined, n, self.latent + width, device))
             }
             (ObsSlice::Image(_), ObsKind::Vector(_)) => unreachable!("observations are checked to be of their kind"),

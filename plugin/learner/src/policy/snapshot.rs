@@ -147,9 +147,9 @@ impl Policy {
             ObsKind::Image(_) => IMAGES_AT_A_TIME,
         };
         for start in (0..n).step_by(chunk) {
-            let rows = start..(start + chunk).min(n);
+            let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
             let len = rows.len();
-            let x = self.actor.join(&states.input(rows, &self.device))?;
+            let x = self.actor.join(&states.input(&rows, &self.device))?;
             show(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
         }
         Ok(())

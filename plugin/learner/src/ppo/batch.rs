@@ -49,7 +49,7 @@ impl Prepared<'_> {
         }
         let actions: Actions = rollout.actions.gather(rows);
         Minibatch {
-            inputs: states.input(rows.iter().copied(), device),
+            inputs: states.input(rows, device),
             ppo: PpoBatch {
                 actions: ActionRows::new(&actions, device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

@@ -77,7 +77,7 @@ impl Prior {
                 let obs = obs.into();
                 obs.check("observations of the prior", kind, n)?;
                 let states = HostStates { z: &[], latent: 0, obs, kind, stats: None };
-                let mut x = net.join(&states.input(0..n, device))?;
+                let mut x = net.join(&states.input(&(0..n).collect::<Vec<_>>(), device))?;
                 if n == 1 {
                     // As in `Policy`: a single row would be summed in another order.
                     x = x.repeat_dim(0, 2);

@@ -71,13 +71,13 @@ fn backward(
     sums: &mut [Vec<Lanes>],
 ) {
     let (kept, lean, layers) = (&plan.kept, &plan.lean, &plan.layers);
-    for step in plan.steps.iter().rev() {
+    for (number, step) in plan.steps.iter().enumerate().rev() {
         match *step {
             Step::Relu { layer, input, output } => {
                 mask(lean.write(output, grads), kept.read(output, values));
                 let (to, grad) = lean.two(input, output, grads);
                 layers[layer].add_gradients(kept.read(input, values), grad, &mut sums[layer]);
-                if input > 0 {
+                if number > 0 {
                     layers[layer].backward(grad, &weights[layer], to);
                 }
             }
@@ -86,7 +86,7 @@ fn backward(
                 let (buffer, grid, of) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
                 pool::backward(grad, of, &marks[from..][..of.numbers()], buffer, grid);
                 layers[layer].add_gradients(kept.read(input, values), buffer, &mut sums[layer]);
-                if input > 0 {
+                if number > 0 {
                     layers[layer].backward(buffer, &weights[layer], to);
                 }
             }

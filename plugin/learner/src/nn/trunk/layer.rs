@@ -25,6 +25,63 @@ impl ConvShape {
     pub(super) fn same(self) -> bool {
         self.stride == 1 && 2 * self.padding + 1 == self.kernel
     }
+
+    /// Shows each weight's number and place, in the order `[outputs, inputs, kernel, kernel]`.
+    fn each_weight(self, mut visit: impl FnMut(usize, Place)) {
+        let side = self.kernel;
+        let mut number = 0;
+        for o in 0..self.outputs {
+            for i in 0..self.inputs {
+                for y in 0..side {
+                    for x in 0..side {
+                        visit(number, Place { o, i, y, x });
+                        number += 1;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Row and lane of a weight in [`Weights::forward`].
+    fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
+        let rows = self.kernel * self.kernel * self.inputs;
+        (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
+    }
+
+    /// Rows in [`Weights::forward`].
+    fn forward_rows(self) -> usize {
+        self.outputs.div_ceil(LANES) * self.kernel * self.kernel * self.inputs
+    }
+
+    /// Row and lane of a weight in [`Weights::backward`].
+    fn backward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
+        if self.same() {
+            let rows = self.kernel * self.kernel * self.outputs;
+            let turned = (self.kernel - 1 - y) * self.kernel + self.kernel - 1 - x;
+            (i / LANES * rows + turned * self.outputs + o, i % LANES)
+        } else {
+            let (tiles, at) = ((self.kernel * self.inputs).div_ceil(LANES), x * self.inputs + i);
+            ((y * tiles + at / LANES) * self.outputs + o, at % LANES)
+        }
+    }
+
+    /// Rows in [`Weights::backward`].
+    fn backward_rows(self) -> usize {
+        if self.same() {
+            self.inputs.div_ceil(LANES) * self.kernel * self.kernel * self.outputs
+        } else {
+            (self.kernel * self.inputs).div_ceil(LANES) * self.kernel * self.outputs
+        }
+    }
+}
+
+/// A weight's output and input channel, row and column.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    o: usize,
+    i: usize,
+    y: usize,
+    x: usize,
 }
 
 /// A convolution between two grids.
@@ -85,38 +142,26 @@ impl Layer {
     /// The layer's weights from its parameters: `[outputs, inputs, kernel, kernel]`, then the biases. Without the
     /// order for the gradient of the input if nobody asks for it.
     pub(super) fn weights(&self, params: &[f32], backward: bool) -> Weights {
-        let ConvShape { inputs, outputs, kernel, .. } = self.shape;
-        let (weights, bias) = params.split_at(params.len() - outputs);
-        let at = |o: usize, i: usize, y: usize, x: usize| weights[((o * inputs + i) * kernel + y) * kernel + x];
-        let mut packed = Vec::with_capacity(outputs.div_ceil(LANES) * kernel * kernel * inputs);
-        for first in (0..outputs).step_by(LANES) {
-            each_weight(kernel, inputs, |y, x, i| packed.push(lanes(outputs - first, |o| at(first + o, i, y, x))));
-        }
-        let mut turned = Vec::new();
-        if backward && self.shape.same() {
-            for first in (0..inputs).step_by(LANES) {
-                each_weight(kernel, outputs, |y, x, o| {
-                    let (y, x) = (kernel - 1 - y, kernel - 1 - x);
-                    turned.push(lanes(inputs - first, |i| at(o, first + i, y, x)));
-                });
+        let shape = self.shape;
+        let (weights, biases) = params.split_at(params.len() - shape.outputs);
+        let mut packed = vec![[0.0; LANES]; shape.forward_rows()];
+        let mut turned = vec![[0.0; LANES]; if backward { shape.backward_rows() } else { 0 }];
+        shape.each_weight(|number, place| {
+            let (row, lane) = shape.forward_at(place);
+            packed[row][lane] = weights[number];
+            if backward {
+                let (row, lane) = shape.backward_at(place);
+                turned[row][lane] = weights[number];
             }
-        } else if backward {
-            let row = kernel * inputs;
-            for y in 0..kernel {
-                for first in (0..row).step_by(LANES) {
-                    let of = |o| lanes(row - first, |k| at(o, (first + k) % inputs, y, (first + k) / inputs));
-                    turned.extend((0..outputs).map(of));
-                }
-            }
-        }
-        let bias = (0..outputs).step_by(LANES).map(|first| lanes(outputs - first, |o| bias[first + o]));
-        Weights { forward: packed, bias: bias.collect(), backward: turned }
+        });
+        let mut bias = vec![[0.0; LANES]; shape.outputs.div_ceil(LANES)];
+        bias.iter_mut().flatten().zip(biases).for_each(|(to, from)| *to = *from);
+        Weights { forward: packed, bias, backward: turned }
     }
 
-    /// Numbers that [`Self::add_gradients`] adds to.
+    /// Rows of sums that [`Self::add_gradients`] adds to.
     pub(super) fn sums(&self) -> usize {
-        let ConvShape { inputs, outputs, kernel, .. } = self.shape;
-        outputs.div_ceil(LANES) * (kernel * kernel * inputs + 1)
+        self.shape.forward_rows() + self.shape.outputs.div_ceil(LANES)
     }
 
     /// Parameters as in [`Self::weights`].
@@ -143,24 +188,19 @@ impl Layer {
 
     /// Adds the gradients of weights and biases, for an input and the gradient of the output.
     pub(super) fn add_gradients(&self, x: &[f32], grad: &[f32], sums: &mut [Lanes]) {
-        let (weights, bias) = sums.split_at_mut(sums.len() - self.shape.outputs.div_ceil(LANES));
+        let (weights, bias) = sums.split_at_mut(self.shape.forward_rows());
         outer(x, &self.starts, self.window(), grad, &self.outputs, weights);
         column_sums(grad, &self.outputs, bias);
     }
 
     /// The gradients of the parameters, in their order, from sums over all images.
     pub(super) fn gradients(&self, sums: &[Lanes], params: &mut [f32]) {
-        let ConvShape { inputs, outputs, kernel, .. } = self.shape;
-        let (sums, bias) = sums.split_at(sums.len() - outputs.div_ceil(LANES));
-        let (weights, biases) = params.split_at_mut(params.len() - outputs);
-        let mut rows = sums.iter();
-        for first in (0..outputs).step_by(LANES) {
-            each_weight(kernel, inputs, |y, x, i| {
-                for (o, &sum) in (first..outputs).zip(rows.next().into_iter().flatten()) {
-                    weights[((o * inputs + i) * kernel + y) * kernel + x] = sum;
-                }
-            });
-        }
+        let (sums, bias) = sums.split_at(self.shape.forward_rows());
+        let (weights, biases) = params.split_at_mut(params.len() - self.shape.outputs);
+        self.shape.each_weight(|number, place| {
+            let (row, lane) = self.shape.forward_at(place);
+            weights[number] = sums[row][lane];
+        });
         biases.iter_mut().zip(bias.iter().flatten()).for_each(|(to, sum)| *to = *sum);
     }
 
@@ -239,22 +279,6 @@ pub(super) fn add_where(to: &mut [f32], at: usize, count: usize, lanes: &Lanes, 
         _ => {
             let pairs = to[..count.min(LANES)].iter_mut().zip(mask).zip(lanes);
             pairs.for_each(|((to, &mask), &x)| *to += relu_backward(mask, x));
-        }
-    }
-}
-
-/// The first `count` lanes by `value`, the others 0.
-fn lanes(count: usize, value: impl Fn(usize) -> f32) -> Lanes {
-    std::array::from_fn(|j| if j < count { value(j) } else { 0.0 })
-}
-
-/// Row, column and channel of each weight, in the order in which a window is read.
-fn each_weight(kernel: usize, channels: usize, mut visit: impl FnMut(usize, usize, usize)) {
-    for y in 0..kernel {
-        for x in 0..kernel {
-            for i in 0..channels {
-                visit(y, x, i);
-            }
         }
     }
 }

@@ -14,6 +14,8 @@ mod layer;
 mod op;
 mod plan;
 mod pool;
+#[cfg(test)]
+mod tests;
 mod tile;
 
 use super::Conv2d;

@@ -23,6 +23,7 @@ fn inside(place: usize, side: usize) -> Range<usize> {
 
 /// Pools `x`; `marks` gets for each channel of each pixel which of the nine was the (first) largest.
 #[macerator::with_simd]
+#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
 pub(super) fn forward<S: Simd>(x: &[f32], from: Grid, y: &mut [f32], to: Grid, marks: &mut [u8]) {
     {
         let channels = from.channels;

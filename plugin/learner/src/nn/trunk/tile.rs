@@ -68,7 +68,7 @@ fn tile_sums<S: Simd>(x: &[f32], at: [usize; ROWS], window: Window, weights: &[L
         for p in 0..ROWS {
             rows[p] = &x[at[p] + piece * window.step..][..weights.len()];
         }
-        for (k, weights) in weights.iter().enumerate() {
+        for (k, &weights) in weights.iter().enumerate() {
             for p in 0..ROWS {
                 let x = rows[p][k];
                 for j in 0..LANES {
@@ -132,6 +132,7 @@ fn tile_outer<S: Simd>(x: &[f32], starts: &[usize], y: &[f32], places: &[usize],
 
 /// Adds the `channels` numbers at each of `places` to `sums`.
 #[macerator::with_simd]
+#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
 pub(super) fn column_sums<S: Simd>(y: &[f32], places: &[usize], sums: &mut [Lanes]) {
     {
         for (block, sums) in sums.iter_mut().enumerate() {
