@@ -30,7 +30,7 @@ Examples:
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; `hard` unless the levels name one.
+    /// Mode of the game, such as hard; the game's last one unless the levels name one.
     #[arg(long)]
     mode: Option<String>,
     /// Level to begin with; the first of the levels if none is named.

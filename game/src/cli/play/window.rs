@@ -52,10 +52,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 
 fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
     let named = args.mode.as_deref();
+    let mode = named.or(game.modes().last().copied()).unwrap_or_default();
     let levels = match args.levels.as_deref() {
         Some(text) if text.contains(':') => text.parse()?,
-        Some(text) => format!("{}:{text}", named.unwrap_or("hard")).parse()?,
-        None => LevelSplit { mode: named.unwrap_or("hard").to_owned(), first: 0, last: LAST_LEVEL },
+        Some(text) => format!("{mode}:{text}").parse()?,
+        None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL },
     };
     check_mode(game, &levels.mode)?;
     if named.is_some_and(|mode| mode != levels.mode) {
