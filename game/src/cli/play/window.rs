@@ -108,9 +108,10 @@ fn announce(game: &dyn Game, args: &Args) {
     if let Some(keys) = game.input_map() {
         eprintln!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
     }
-    match [args.policy.is_some(), args.run.is_some(), args.bot.is_some()].contains(&true) {
-        true => eprintln!("Tab hands over and takes over again"),
-        false => eprintln!("there is nobody to hand over to: name a --policy, a --run or a --bot"),
+    if args.policy.is_some() || args.run.is_some() || args.bot.is_some() {
+        eprintln!("Tab hands over and takes over again");
+    } else {
+        eprintln!("there is nobody to hand over to: name a --policy, a --run or a --bot");
     }
 }
 
