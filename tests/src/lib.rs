@@ -3,7 +3,6 @@
 pub mod memory;
 mod painted;
 pub mod scene;
-pub mod side_by_side;
 
 pub use painted::PaintedCorridor;
 

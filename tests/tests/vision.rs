@@ -186,7 +186,7 @@ fn images_that_somebody_spoils_are_reported() {
     let (mut world, _) = seeing(stacked(1), 2, Wrong::Nothing);
     world.schedule_scope(ObserveSchedule, |_, schedule| {
         let spoil = |mut agents: Query<&mut Observation>| agents.iter_mut().for_each(|mut seen| seen.image.truncate(5));
-        schedule.add_systems(spoil.after(VisionSystems::Compose));
+        schedule.add_systems(spoil.after(VisionSystems::Compose).ambiguous_with_all());
     });
     let fault = world.tick().expect_err("spoiled").to_string();
     assert!(fault.contains("5 bytes, its sensor makes 6") && fault.contains("agent 0, level 7, tick 0"), "{fault}");
