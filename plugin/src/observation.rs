@@ -64,7 +64,7 @@ pub struct Observation {
     /// Values in the order of the sensor's names; empty without a [`VectorSensor`].
     pub vector: Vec<f32>,
     /// Pixels `[channels, height, width]` of 0 to 255, top row first; empty without an
-    /// [`ImageSensor`](crate::vision::ImageSensor). With stacked pictures the oldest comes first.
+    /// [`ImageSensor`]. With stacked pictures the oldest comes first.
     pub image: Vec<u8>,
 }
 

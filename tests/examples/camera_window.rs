@@ -59,7 +59,7 @@ fn check(frames: Query<&Frame>, tick: Res<Tick>, mut faults: ResMut<bevy_playbot
     let Ok(frame) = frames.single() else { return };
     let seen = frame.pixels.get(32 * 64 + 32);
     let sound = frame.tick == Some(tick.0) && seen == Some(&[230, 40, 40, 255]);
-    if tick.0 > 0 && (tick.0 % 60 == 0 || !sound) {
+    if tick.0 > 0 && (tick.0.is_multiple_of(60) || !sound) {
         println!("tick {}: frame of {:?}, middle {seen:?}, fault {:?}", tick.0, frame.tick, faults.take().err());
     }
 }

@@ -194,13 +194,12 @@ fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {
         let parts = [19, 45].map(|steps| collector.collect(&policy, 0, steps).expect("sound").0);
         let rows = parts.map(|part| {
             let width = part.obs_kind.numbers();
-            let of = move |agent: usize| {
+            move |agent: usize| {
                 let row = |t: usize| part.obs.row(t * part.envs + agent, width);
                 let mut rows = Observations::empty(&part.obs_kind);
                 (0..part.steps).for_each(|t| rows.push(row(t)).expect("one kind"));
                 (rows, part.truncated.iter().any(|cut| *cut))
-            };
-            of
+            }
         });
         move |agent: usize| rows.each_ref().map(|of| of(agent))
     };

@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo run --release --example draw_coinrun
 //! ```
+#![allow(clippy::print_stdout, reason = "it says what it has drawn")]
 
 mod art;
 

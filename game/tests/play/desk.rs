@@ -1,4 +1,5 @@
 //! A display of a test's own, with hands and eyes.
+#![allow(clippy::disallowed_methods, reason = "a window lives by the clock")]
 
 use std::{
     io::{BufRead, BufReader},

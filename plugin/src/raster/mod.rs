@@ -6,7 +6,7 @@
 //! - [`Sprite`] with image or atlas, tint, flips, rectangle, `custom_size`, [`Anchor`](bevy::sprite::Anchor) and the image
 //!   modes `Auto` and `Scale`, and [`TileLayer`](crate::vision::TileLayer);
 //! - whatever [`Transform`] and [`Visibility`] say, with those of the parents; the
-//!   [`GlobalTransform`](bevy::prelude::GlobalTransform) is not read and need not be kept;
+//!   [`GlobalTransform`] is not read and need not be kept;
 //! - the farthest z first. Things of equal z are drawn parents first and then in the order of their
 //!   [`Children`]. Bevy leaves that to the order in which its tables hold them, so give what overlaps different z.
 //!
