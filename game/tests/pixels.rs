@@ -103,3 +103,19 @@ fn the_experiments_of_the_repository_are_sound() {
     names.sort();
     assert!(names.contains(&("coinrun-pixels.ron".to_owned(), true)) && names.len() >= 4, "{names:?}");
 }
+
+#[test]
+fn the_two_eyes_are_compared_and_the_worst_frame_is_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let eyes = ["eyes", "coinrun", "--levels", "hard:0..3", "--frames", "4", "--size", "48"];
+    let (json, _) = done(folder, &[&eyes[..], &["--out", "eyes", "--json"]].concat());
+    let result: Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(result["frames"], 16);
+    assert!(result["close"].as_f64().is_some_and(|share| share >= 0.97), "{result}");
+    let table = std::fs::read_to_string(folder.join("eyes/table.md")).expect("written");
+    assert!(table.contains("--levels hard:0..3 --frames 4 --out eyes"), "{table}");
+    assert!(folder.join("eyes/worst.png").is_file() && folder.join("eyes/results.json").is_file());
+    let strict = playbot(folder, &[&eyes[..], &["--least-close", "1.1"]].concat());
+    assert_eq!(strict.status.code(), Some(1), "no picture is that close");
+}

@@ -92,7 +92,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let compared = compare(game, &args)?;
     let summary = sum_up(game, &args, &compared)?;
     if let Some(folder) = &args.out {
-        write_report(folder, &summary, args.size as usize)?;
+        write_report(folder, &summary, &args)?;
     }
     if args.json {
         print_line(json!(summary))?;
@@ -205,9 +205,10 @@ fn table(summary: &Summary) -> String {
     )
 }
 
-fn write_report(folder: &Path, summary: &Summary, side: usize) -> Result<(), CliError> {
+fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), CliError> {
     let fail = |error: std::io::Error| CliError::Io(format!("cannot write to {}: {error}", folder.display()));
     std::fs::create_dir_all(folder).map_err(fail)?;
+    let side = args.size as usize;
     let [raster, camera] = &summary.worst.pictures;
     let apart: Vec<[u8; 4]> = raster
         .iter()
@@ -224,9 +225,13 @@ fn write_report(folder: &Path, summary: &Summary, side: usize) -> Result<(), Cli
     }
     let text = format!(
         "# Camera and raster, {}\n\n{}\n\nThe worst frame, by the raster, by the camera, and their difference times \
-         four:\n\n![the worst frame](worst.png)\n",
+         four:\n\n![the worst frame](worst.png)\n\n```sh\nplaybot eyes {} --levels {} --frames {} --out {}\n```\n",
         summary.game,
-        table(summary)
+        table(summary),
+        summary.game,
+        summary.levels,
+        args.frames,
+        folder.display(),
     );
     let json = format!("{}\n", json!(summary));
     for (name, bytes) in
