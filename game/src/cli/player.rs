@@ -13,7 +13,7 @@ use bevy_playbot::{
     vision::Sight,
 };
 
-use super::{error::CliError, methods};
+use super::{error::CliError, eval::check_fit, methods};
 
 /// A policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
@@ -73,8 +73,15 @@ impl PlayerArgs {
             return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
         }
         let learner = Learner::load(info.algorithm, &run.checkpoint(self.checkpoint)?.learner_file(), self.device)?;
+        let (name, policy, sight) = (info.algorithm.name().to_owned(), learner.policy(), experiment.sight());
+        check_fit(game, &name, &sight, &policy)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let player = Player::Policy { policy: learner.policy(), prior, draw };
-        Ok(Some(Chosen { name: info.algorithm.name().to_owned(), player, sight: experiment.sight() }))
+        Ok(Some(Chosen { name, player: Player::Policy { policy, prior, draw }, sight }))
+    }
+
+    /// Whether somebody is named.
+    #[cfg(feature = "window")]
+    pub fn is_named(&self) -> bool {
+        self.policy.is_some() || self.run.is_some() || self.bot.is_some()
     }
 }

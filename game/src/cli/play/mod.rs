@@ -5,9 +5,7 @@ mod window;
 
 use std::path::PathBuf;
 
-use bevy_playbot::{learner::DeviceKind, train::checkpoint::Which};
-
-use super::recording::Existing;
+use super::{player::PlayerArgs, recording::Existing};
 
 /// Opens a window in which a person plays, records what is played, and hands over to a policy or a bot and back.
 #[derive(clap::Args)]
@@ -47,24 +45,9 @@ pub struct Args {
     /// Who plays, for the recording.
     #[arg(long, default_value = "human")]
     name: String,
-    /// Policy file that takes over with Tab.
-    #[arg(long, value_name = "FILE", group = "partner")]
-    policy: Option<PathBuf>,
-    /// Folder of a run whose policy takes over with Tab.
-    #[arg(long, value_name = "DIR", group = "partner")]
-    run: Option<PathBuf>,
-    /// Bot that takes over with Tab, such as search, right-jump or random.
-    #[arg(long, value_name = "NAME", group = "partner")]
-    bot: Option<String>,
-    /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
-    #[arg(long, default_value = "last", requires = "run")]
-    checkpoint: Which,
-    /// The policy takes its most probable action instead of drawing one.
-    #[arg(long)]
-    greedy: bool,
-    /// Where the policy computes: flex or ndarray.
-    #[arg(long, default_value_t)]
-    device: DeviceKind,
+    /// Who takes over with Tab.
+    #[command(flatten)]
+    partner: PlayerArgs,
 }
 
 #[cfg(feature = "window")]

@@ -7,14 +7,8 @@ use bevy_playbot::{
         file::{DemoHeader, DemoSummary},
         recorder::demo_actions,
     },
-    eval::Player,
     game::{Game, check_mode},
-    learner::PolicyFile,
-    policy::ActionDraw,
-    policy_file::{check_policy, policy_sight},
-    skill_prior::SkillPrior,
     split::LevelSplit,
-    train::{Learner, run_dir::RunDir},
     vision::Sight,
 };
 
@@ -23,8 +17,8 @@ use crate::{
     cli::{
         demo::deciders,
         error::{CliError, Outcome},
-        eval::check_fit,
-        interrupt, methods,
+        interrupt,
+        player::Chosen,
     },
     registry,
     window::{GameWindow, Partner, Playlist, WindowSetup},
@@ -73,29 +67,10 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
 
 /// Whoever takes over with Tab, and what it sees.
 fn partner(game: &dyn Game, args: &Args) -> Result<(Option<Partner>, Sight), CliError> {
-    if let Some(name) = &args.bot {
-        let partner = Partner { name: name.clone(), player: methods::bot(game, name)? };
-        return Ok((Some(partner), Sight::default()));
-    }
-    let (name, policy, prior, sight) = if let Some(path) = &args.policy {
-        let file = PolicyFile::load(path, args.device)?;
-        check_policy(game, &file)?;
-        let sight = policy_sight(&file)?;
-        (file.card.algorithm, file.policy, file.skills, sight)
-    } else if let Some(path) = &args.run {
-        let (run, experiment, info) = RunDir::open(path)?;
-        if experiment.game != game.name() {
-            return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
-        }
-        let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
-        (info.algorithm.name().to_owned(), learner.policy(), learner.skills(), experiment.sight())
-    } else {
-        return Ok((None, Sight::default()));
-    };
-    check_fit(game, &name, &sight, &policy)?;
-    let draw = if args.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
-    let player = Player::Policy { policy, prior: prior.as_ref().map(SkillPrior::from), draw };
-    Ok((Some(Partner { name, player }), sight))
+    Ok(match args.partner.load(game)? {
+        Some(Chosen { name, player, sight }) => (Some(Partner { name, player }), sight),
+        None => (None, Sight::default()),
+    })
 }
 
 fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
@@ -108,7 +83,7 @@ fn announce(game: &dyn Game, args: &Args) {
     if let Some(keys) = game.input_map() {
         eprintln!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
     }
-    if args.policy.is_some() || args.run.is_some() || args.bot.is_some() {
+    if args.partner.is_named() {
         eprintln!("Tab hands over and takes over again");
     } else {
         eprintln!("there is nobody to hand over to: name a --policy, a --run or a --bot");
