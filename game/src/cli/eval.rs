@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     eval::{EvalPlan, Player},
     game::{Game, check_mode},
-    learner::{DeviceKind, Policy, PolicyFile, SkillModel, SkillSource},
-    policy::{ActionDraw, in_words},
-    policy_file::{check_policy, policy_sight},
+    learner::{DeviceKind, SkillModel, SkillSource},
+    policy::ActionDraw,
     report::to_text_table,
     skill_prior::SkillPrior,
     split::LevelSplit,
-    train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
+    train::{Experiment, checkpoint::Which, run_dir::RunDir, worlds::default_threads},
     vision::{ObservationKind, Sight},
 };
 
@@ -19,6 +18,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
     methods,
+    player::Chosen,
 };
 use crate::registry;
 
@@ -89,7 +89,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let mut rows = Vec::new();
     for split in &splits {
         check_mode(game, &split.mode)?;
-        for (name, player, sight) in &players {
+        for Chosen { name, player, sight } in &players {
             let plan = EvalPlan { sight: *sight, ..methods::plan(&experiment, split, episodes, args.threads) };
             let measured = methods::measure(game, name, player, &plan)?;
             if args.json {
@@ -123,43 +123,33 @@ fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
     }
 }
 
-/// Name, player and what it sees.
-type Contender = (String, Player, Sight);
-
-fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<Contender>, CliError> {
+fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<Chosen>, CliError> {
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut players = Vec::new();
     for path in &args.run {
         let (run, own, info) = RunDir::open(path)?;
         check_run(path, &own, experiment, args)?;
-        let learner = Learner::load(info.algorithm, &run.checkpoint(args.checkpoint)?.learner_file(), args.device)?;
-        let prior = learner.skills().as_ref().map(SkillPrior::from);
-        players.push((
-            named(info.algorithm.name(), path, args.run.len()),
-            Player::Policy { policy: learner.policy(), prior, draw },
-            own.sight(),
-        ));
+        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.device)?;
+        players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
         let sight = Sight::from_card(model.picture(), &model.observation())?;
-        players.push((named("bc", path, args.skills.len()), cloning(&model, experiment, draw), sight));
+        let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), sight };
+        players.push(named(chosen, path, args.skills.len()));
     }
     for path in &args.policy {
-        let file = PolicyFile::load(path, args.device)?;
-        check_policy(game, &file)?;
-        let prior = file.skills.as_ref().map(SkillPrior::from);
-        let (name, sight) = (named(&file.card.algorithm, path, args.policy.len()), policy_sight(&file)?);
-        players.push((name, Player::Policy { policy: file.policy, prior, draw }, sight));
+        let chosen = Chosen::policy_file(game, path, draw, args.device)?;
+        players.push(named(chosen, path, args.policy.len()));
     }
     for name in &args.bot {
-        players.push((name.clone(), methods::bot(game, name)?, Sight::default()));
+        players.push(Chosen::bot(game, name)?);
     }
-    for (name, player, sight) in &mut players {
-        if let Player::Policy { policy, .. } = player {
-            look_through(sight, args.observation, name)?;
-            check_fit(game, name, sight, policy)?;
+    for chosen in &mut players {
+        if matches!(chosen.player, Player::Policy { .. }) {
+            look_through(&mut chosen.sight, args.observation, &chosen.name)?;
         }
+        chosen.check_fit(game)?;
     }
     Ok(players)
 }
@@ -198,9 +188,9 @@ fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) 
     Ok(())
 }
 
-/// A method's name; with its path where there are several of its kind.
-fn named(method: &str, path: &Path, of: usize) -> String {
-    if of > 1 { format!("{method} {}", path.display()) } else { method.to_owned() }
+/// A player, with its path in its name where there are several of its kind.
+fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
+    if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
 }
 
 /// Behaviour cloning: the decoder under the prior, without any reinforcement learning.
@@ -213,24 +203,4 @@ pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) ->
 pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
     let (horizon, draw) = (experiment.score.horizon, experiment.score.skill_draw);
     SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
-}
-
-/// Checks that a policy reads what the game shows it, and acts as the game does.
-///
-/// # Errors
-///
-/// What differs, in words.
-pub fn check_fit(game: &dyn Game, name: &str, sight: &Sight, policy: &Policy) -> Result<(), CliError> {
-    sight.check(game)?;
-    let (seen, acts) = (sight.obs_kind(game), game.actions());
-    if (policy.observation(), policy.action_space()) == (seen, acts) {
-        return Ok(());
-    }
-    let (reads, made_for) = (in_words(&policy.observation()), policy.action_space());
-    Err(CliError::Usage(format!(
-        "the policy {name} was made for {reads} and {made_for:?}, but `{}` has {} and {acts:?}: use one that was \
-         trained for this game and this version",
-        game.name(),
-        in_words(&seen)
-    )))
 }

@@ -6,7 +6,6 @@ use bevy::prelude::*;
 use bevy_playbot::{
     game::{Game, build_seeing_world, check_mode},
     headless::tick_world,
-    learner::write_atomically,
     prelude::*,
     vision::{CLOSE, Difference, Frame, ImageOptions, ObservationKind, Sight},
 };
@@ -15,8 +14,9 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
+    player::Chosen,
     progress,
-    view::{film::to_png, screen::Screen},
+    view::{self, film::to_png, screen::Screen},
 };
 use crate::registry;
 
@@ -155,8 +155,8 @@ impl Looker {
         let sight = Sight { kind, image: ImageOptions { width: args.size, height: args.size, ..default() } };
         let (mut world, agents) = build_seeing_world(game, &args.levels.mode, &sight, 1, 0, 1)?;
         let agent = agents[0];
-        game.arm_demonstrator(&mut world, agent, 0.0);
-        world.entity_mut(agent).insert((Control::Bot, LevelQueue::list(args.levels.levels().collect::<Vec<_>>())));
+        let control = Chosen::usual(game)?.player.seat(game, &mut world, agent);
+        world.entity_mut(agent).insert((control, LevelQueue::list(args.levels.levels().collect::<Vec<_>>())));
         Ok(Self { world, agent })
     }
 
@@ -206,8 +206,6 @@ fn table(summary: &Summary) -> String {
 }
 
 fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), CliError> {
-    let fail = |error: std::io::Error| CliError::Io(format!("cannot write to {}: {error}", folder.display()));
-    std::fs::create_dir_all(folder).map_err(fail)?;
     let side = args.size as usize;
     let [raster, camera] = &summary.worst.pictures;
     let apart: Vec<[u8; 4]> = raster
@@ -237,7 +235,7 @@ fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), Cli
     for (name, bytes) in
         [("worst.png", to_png(&screen)?), ("table.md", text.into_bytes()), ("results.json", json.into_bytes())]
     {
-        write_atomically(&folder.join(name), &bytes).map_err(fail)?;
+        view::write(&folder.join(name), &bytes)?;
     }
     Ok(())
 }

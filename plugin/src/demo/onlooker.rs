@@ -12,12 +12,9 @@ use super::{
 };
 use crate::{
     control::Control,
-    episode::Episode,
     game::{Game, build_seeing_world},
     headless::tick_world,
-    level::LevelQueue,
     observation::Observation,
-    policy::AgentStreams,
     train::worlds::on_threads,
     vision::Sight,
 };
@@ -105,16 +102,12 @@ impl Onlookers {
     /// Hands an agent the next episode; it stands still if there is none.
     fn begin(&mut self, agent: usize, job: Option<Job>) {
         let mut entity = self.world.entity_mut(self.agents[agent]);
-        if let Some(mut running) = entity.get_mut::<Episode>() {
-            running.abandon();
-        }
         let Some((id, episode)) = job else {
             entity.insert(Control::Idle);
             return;
         };
         let observations = Observations::with_capacity(&self.kind, episode.len());
-        let queue = LevelQueue::Always(episode.level_seed);
-        entity.insert((Control::Replay, queue, Replay::new(episode), AgentStreams::new(0, 0)));
+        Replay::begin(episode, &mut entity);
         self.watching[agent] = Some(Watched { id, observations, divergence: None });
     }
 

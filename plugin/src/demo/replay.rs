@@ -10,6 +10,8 @@ use crate::{
     action::{Action, ActionValue},
     control::Control,
     episode::{Episode, EpisodeEnd},
+    level::LevelQueue,
+    policy::AgentStreams,
     reward::Reward,
     state_hash::StateHash,
 };
@@ -38,6 +40,15 @@ impl Replay {
     /// A replay of this episode. The agent's level queue must give the episode's level.
     pub fn new(episode: Arc<DemoEpisode>) -> Self {
         Self { episode, divergence: None, finished: false }
+    }
+
+    /// Hands an agent over to this recording, from its first tick on: whatever it was playing is left at once.
+    pub(crate) fn begin(episode: Arc<DemoEpisode>, agent: &mut EntityWorldMut) {
+        if let Some(mut running) = agent.get_mut::<Episode>() {
+            running.abandon();
+        }
+        let queue = LevelQueue::Always(episode.level_seed);
+        agent.insert((Control::Replay, queue, Self::new(episode), AgentStreams::new(0, 0)));
     }
 
     /// The first difference between the recording and the game, if one has been met.

@@ -15,13 +15,9 @@ use super::{
     replay::{Divergence, Replay},
 };
 use crate::{
-    control::Control,
-    episode::Episode,
     fault::Fault,
     game::{Game, UnknownName, build_world, check_mode},
     headless::tick_world,
-    level::LevelQueue,
-    policy::AgentStreams,
     split::LevelSplit,
     vision::{Sight, VisionError},
 };
@@ -152,12 +148,7 @@ impl ReplayStage {
         if episode.is_empty() {
             return Ok(None);
         }
-        let mut agent = self.world.entity_mut(self.agent);
-        agent.insert((Control::Replay, LevelQueue::Always(episode.level_seed), Replay::new(episode)));
-        if let Some(mut running) = agent.get_mut::<Episode>() {
-            running.abandon();
-        }
-        agent.insert(AgentStreams::new(0, 0));
+        Replay::begin(episode, &mut self.world.entity_mut(self.agent));
         loop {
             tick_world(&mut self.world)?;
             after_tick(&self.world, self.agent);

@@ -21,7 +21,7 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    interrupt, methods,
+    interrupt,
     player::{Chosen, PlayerArgs},
     progress,
 };
@@ -114,18 +114,10 @@ fn open_stage(game: &'static dyn Game, args: &Args) -> Result<(Stage, Sight, Str
     check_mode(game, mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,
-        None => usual_player(game)?,
+        None => Chosen::usual(game)?,
     };
     let sight = sight(game, args, Some(&chosen))?;
     Ok((Stage::playing(game, mode, &sight, args.seed.into(), &chosen.player)?, sight, chosen.name))
-}
-
-/// The demonstrator, or else the first of the game's bots.
-fn usual_player(game: &dyn Game) -> Result<Chosen, CliError> {
-    let bots = methods::bot_names(game);
-    let name = game.demonstrator().or(bots.first().copied());
-    let name = name.ok_or(CliError::Usage("the game has no bot: name a --policy or a --run".to_owned()))?;
-    Ok(Chosen { name: name.to_owned(), player: methods::bot(game, name)?, sight: Sight::default() })
 }
 
 /// The pictures that are shown: those that the policy reads, or those that were asked for.

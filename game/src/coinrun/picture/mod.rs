@@ -25,25 +25,19 @@ impl Plugin for CoinRunPicturePlugin {
     fn build(&self, app: &mut App) {
         let mut images = app.world_mut().get_resource_or_init::<Assets<Image>>();
         let art = Art::add_to(&mut images);
-        app.insert_resource(art)
-            .init_resource::<dress::Stages>()
-            .configure_sets(
-                ObserveSchedule,
-                (VisionSystems::Dress, VisionSystems::Look, VisionSystems::Compose).chain(),
+        app.insert_resource(art).init_resource::<dress::Stages>().add_systems(
+            ObserveSchedule,
+            (
+                dress::players,
+                dress::levels,
+                dress::inhabitants,
+                animate::players,
+                animate::enemies,
+                animate::saws,
+                animate::moved_blocks,
             )
-            .add_systems(
-                ObserveSchedule,
-                (
-                    dress::players,
-                    dress::levels,
-                    dress::inhabitants,
-                    animate::players,
-                    animate::enemies,
-                    animate::saws,
-                    animate::moved_blocks,
-                )
-                    .chain()
-                    .in_set(VisionSystems::Dress),
-            );
+                .chain()
+                .in_set(VisionSystems::Dress),
+        );
     }
 }
