@@ -142,9 +142,22 @@ impl Seat<'_> {
         self.title()
     }
 
-    /// Waits a number of ticks.
-    pub fn pass_ticks(&self, ticks: u32) {
+    /// Waits until the game has played a number of ticks; a busy machine takes longer than the clock says.
+    pub fn pass_ticks(&mut self, ticks: u32) {
+        let until = self.tick() + ticks;
+        self.wait("ticks", |seat| seat.tick() >= until);
+    }
+
+    /// Waits as long as a number of ticks takes, in a game that stands still.
+    pub fn sit_out(&self, ticks: u32) {
         sleep(Duration::from_secs(1) * ticks / 15);
+    }
+
+    /// The tick in the window's title.
+    fn tick(&self) -> u32 {
+        let title = self.title();
+        let tick = title.split(" · ").find_map(|part| part.strip_prefix("tick "));
+        tick.and_then(|tick| tick.parse().ok()).unwrap_or_else(|| panic!("no tick in the title `{title}`"))
     }
 
     fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {

@@ -66,7 +66,7 @@ fn a_person_wins_hands_over_and_takes_over() {
     assert_ne!(desk.pixels(SIDE), picture, "something has moved");
     seat.tap("p");
     let paused = seat.read("PAUSED");
-    seat.pass_ticks(8);
+    seat.sit_out(8);
     assert_eq!(seat.title(), paused, "nothing goes on in a pause");
     seat.tap("Escape");
     let (status, said) = seat.leave();
