@@ -1,12 +1,14 @@
 //! The games of `bevy_playbot` and its command line.
 //!
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
+//! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
 //! - `window`, with the feature of that name: a person plays.
 
 pub mod cli;
 pub mod coinrun;
+pub mod maze;
 pub mod registry;
 #[cfg(feature = "window")]
 pub mod window;
