@@ -2,10 +2,15 @@
 //!
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
+//! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
+//! - [`antview`]: what ants look like.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
 //! - `window`, with the feature of that name: a person plays.
 
+pub mod ant;
+pub mod antmaze;
+pub mod antview;
 pub mod cli;
 pub mod coinrun;
 pub mod maze;
