@@ -1,12 +1,14 @@
 //! The games of `bevy_playbot` and its command line.
 //!
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
+//! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
 //! - `window`, with the feature of that name: a person plays.
 
 pub mod cli;
 pub mod coinrun;
+pub mod maze2d;
 pub mod registry;
 #[cfg(feature = "window")]
 pub mod window;
