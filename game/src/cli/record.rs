@@ -7,7 +7,7 @@ use bevy_playbot::{
         file::{DemoHeader, DemoWriter},
         recorder::{Recorder, Recording, demo_actions, flush_unfinished},
     },
-    game::{Game, build_world, check_mode},
+    game::{Game, build_world},
     prelude::*,
 };
 
@@ -50,7 +50,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
-    check_mode(game, &args.levels.mode)?;
+    game.check_mode(&args.levels.mode)?;
     if !(0.0..=1.0).contains(&args.noise) {
         return Err(CliError::Usage(format!("--noise is {}; a probability lies between 0 and 1", args.noise)));
     }

@@ -3,11 +3,7 @@
 use std::path::PathBuf;
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    action::misfit,
-    game::{build_world, check_mode},
-    prelude::*,
-};
+use bevy_playbot::{action::misfit, game::build_world, prelude::*};
 
 use super::error::{CliError, Outcome, print_line};
 use crate::{coinrun::components::PlayerBody, registry};
@@ -41,7 +37,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
-    check_mode(game, &args.mode)?;
+    game.check_mode(&args.mode)?;
     let actions = read_actions(&args)?;
     let space = game.actions();
     if let Some(why) = actions.iter().find_map(|&action| misfit(&ActionValue::Discrete(action), &space)) {
