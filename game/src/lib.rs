@@ -1,6 +1,7 @@
 //! The games of `bevy_playbot` and its command line.
 //!
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
+//! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
@@ -8,6 +9,7 @@
 
 pub mod cli;
 pub mod coinrun;
+pub mod maze;
 pub mod maze2d;
 pub mod registry;
 #[cfg(feature = "window")]

@@ -7,7 +7,7 @@ use bevy_playbot::{
         file::{DemoHeader, DemoWriter},
         recorder::{Recorder, Recording, demo_actions, flush_unfinished},
     },
-    game::{Game, build_world, check_mode},
+    game::{Game, build_world},
     prelude::*,
 };
 
@@ -54,7 +54,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| usual_levels(game));
-    check_mode(game, &levels.mode)?;
+    game.check_mode(&levels.mode)?;
     check_noise(game, args.noise)?;
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));

@@ -3,7 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::Picture};
+use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
 
 use super::{
     components::{MazeBall, PlaysIn},
@@ -52,6 +52,10 @@ impl Game for Maze2d {
 
     fn modes(&self) -> &'static [&'static str] {
         &Maze2dMode::NAMES
+    }
+
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        mode.parse::<Maze2dMode>().map(drop).map_err(|error| error.of(mode))
     }
 
     fn tick_hz(&self) -> f64 {

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use bevy_playbot::game::UnknownName;
+use bevy_playbot::{game::UnknownName, mode::ModeError};
 use thiserror::Error;
 
 use super::walls::D4RL_OFFSET;
@@ -62,6 +62,16 @@ pub enum Maze2dModeError {
     /// Episodes end before the demonstrator can turn to another cell.
     #[error("`retarget` needs episodes that go on at the goal: add no-end-at-goal")]
     RetargetEnds,
+}
+
+impl Maze2dModeError {
+    /// The error as games give it: for this mode.
+    pub fn of(self, mode: &str) -> ModeError {
+        match self {
+            Self::Name(unknown) => unknown.into(),
+            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
+        }
+    }
 }
 
 /// Options of every map, each with a value it takes.

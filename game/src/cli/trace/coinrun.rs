@@ -1,11 +1,7 @@
 //! Tracing CoinRun.
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    action::misfit,
-    game::{build_world, check_mode},
-    prelude::*,
-};
+use bevy_playbot::{action::misfit, game::build_world, prelude::*};
 
 use super::{Args, plain, read};
 use crate::{
@@ -17,7 +13,7 @@ use crate::{
 pub(super) fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     let mode = args.mode.as_deref().unwrap_or("hard");
-    check_mode(game, mode)?;
+    game.check_mode(mode)?;
     if !args.start.is_empty() {
         return Err(CliError::Usage("--start is for maze2d: a level of coinrun says where the player starts".to_owned()));
     }

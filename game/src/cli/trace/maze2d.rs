@@ -6,7 +6,7 @@ use super::{Args, plain, read};
 use crate::{
     cli::error::{CliError, Outcome, print_line},
     maze2d::{
-        Ball, Maze2dLevel, Maze2dMode,
+        Ball, Maze2dLevel, Maze2dMode, Maze2dModeError,
         ball::{Vec2d, clip_action},
         sim::BallSim,
     },
@@ -18,7 +18,8 @@ pub(super) fn run(args: Args) -> Result<Outcome, CliError> {
             name it with --actions-file"
             .to_owned()));
     };
-    let mode: Maze2dMode = args.mode.as_deref().unwrap_or("medium").parse()?;
+    let name = args.mode.as_deref().unwrap_or("medium");
+    let mode: Maze2dMode = name.parse().map_err(|error: Maze2dModeError| error.of(name))?;
     let mut level = Maze2dLevel::new(&mode, args.seed).map_err(|error| CliError::Usage(error.to_string()))?;
     if !args.start.is_empty() {
         level.start = start(&args.start, &level)?;

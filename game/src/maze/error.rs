@@ -1,0 +1,122 @@
+//! What can be wrong with a maze.
+
+use thiserror::Error;
+
+use super::{
+    cell::Cell,
+    layout::{MAX_CELLS, MAX_SIDE},
+};
+
+/// The maze cannot be played or made. Rows and columns are counted from 0.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum MazeError {
+    /// There are no cells.
+    #[error("the maze is empty: write its rows, one below the other, with # for a wall and O for a free cell")]
+    Empty,
+    /// It would not fit into memory.
+    #[error(
+        "a maze of {rows} x {columns} cells is too large: at most {MAX_SIDE} cells to the side and {MAX_CELLS} in all"
+    )]
+    TooLarge {
+        /// Rows asked for.
+        rows: usize,
+        /// Columns asked for.
+        columns: usize,
+    },
+    /// The rows differ in length.
+    #[error("row {row} has {columns} cells and row 0 has {expected}: give all rows the same length")]
+    Ragged {
+        /// First row that differs.
+        row: usize,
+        /// Its length.
+        columns: usize,
+        /// Length of the first row.
+        expected: usize,
+    },
+    /// A character that means nothing.
+    #[error(
+        "row {row}, column {column}: `{character}` means nothing; write # or 1 for a wall, O or 0 for a free cell, S or r for the start, G or g for the goal"
+    )]
+    UnknownCharacter {
+        /// Row of the character.
+        row: usize,
+        /// Column of the character.
+        column: usize,
+        /// The character.
+        character: char,
+    },
+    /// No start.
+    #[error("the maze has no start: mark a free cell with S or r")]
+    NoStart,
+    /// No goal.
+    #[error("the maze has no goal: mark a free cell with G or g")]
+    NoGoal,
+    /// Two starts or two goals.
+    #[error("the maze has two {what}s, {first} and {second}: leave one of them")]
+    Twice {
+        /// `start` or `goal`.
+        what: &'static str,
+        /// The one that was read first.
+        first: Cell,
+        /// The other.
+        second: Cell,
+    },
+    /// Nothing keeps the player inside.
+    #[error("the border is open at {0}: close it with walls")]
+    Open(Cell),
+    /// A start or goal inside a wall or outside the maze.
+    #[error("{0} is not a free cell of the maze")]
+    NotFree(Cell),
+    /// Nobody can get there.
+    #[error("the goal {goal} cannot be reached from the start {start}: open a way between them")]
+    Unreachable {
+        /// The start.
+        start: Cell,
+        /// The goal.
+        goal: Cell,
+    },
+    /// Too small to hold two free cells.
+    #[error(
+        "a maze of {rows} x {columns} cells has no room for corridors {corridor} wide: it needs {least} cells or more to \
+         each side"
+    )]
+    TooSmall {
+        /// Rows asked for.
+        rows: usize,
+        /// Columns asked for.
+        columns: usize,
+        /// Width of the corridors, cells.
+        corridor: usize,
+        /// Smallest side that works.
+        least: usize,
+    },
+    /// Corridors without width.
+    #[error("corridors are at least 1 cell wide")]
+    NoCorridor,
+    /// The share of removed walls is not one.
+    #[error("loops = {0}: it is a share of the walls and lies between 0 and 1")]
+    Loops(String),
+    /// No path can be meant.
+    #[error(
+        "difficulty = {least}..{most}: write the fewest and the most moves of a shortest path, the most at least 1"
+    )]
+    NoDifficulty {
+        /// Fewest moves asked for.
+        least: usize,
+        /// Most moves asked for.
+        most: usize,
+    },
+    /// No pair of cells is so far apart.
+    #[error(
+        "no shortest path has {least} to {most} moves: the longest of this maze has {longest}; ask for less or for a \
+         larger maze"
+    )]
+    Difficulty {
+        /// Fewest moves asked for.
+        least: usize,
+        /// Most moves asked for.
+        most: usize,
+        /// Moves of the longest shortest path.
+        longest: usize,
+    },
+}

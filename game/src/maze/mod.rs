@@ -1,0 +1,30 @@
+//! Mazes on a grid, without an engine: fixed maps, a generator and a planner, for every game that is played in one.
+//!
+//! A [`Maze`] is rows of wall and free [`Cell`]s with a start and a goal that can be reached from it. What a cell measures
+//! and where its axes point is the game's own affair. [`fixed`] has the maps of the literature, [`generate`] makes mazes
+//! without end from a [`MazeSpec`] and a seed, and [`Planner`] knows the way to a goal from everywhere.
+
+mod cell;
+mod distances;
+mod draw;
+mod ends;
+mod error;
+pub mod fixed;
+mod generator;
+mod layout;
+mod map;
+mod planner;
+mod rooms;
+mod spec;
+mod spec_text;
+mod text;
+
+pub use cell::Cell;
+pub use distances::Distances;
+pub use error::MazeError;
+pub use generator::generate;
+pub use layout::{MAX_CELLS, MAX_SIDE, Maze};
+pub use map::Map;
+pub use planner::{GridMove, Planner};
+pub use spec::{HELD_OUT_SEEDS, MazeSpec, TRAIN_SEEDS};
+pub use spec_text::OptionError;

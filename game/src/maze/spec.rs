@@ -1,0 +1,63 @@
+//! What a generated maze should be like.
+
+use std::ops::RangeInclusive;
+
+use super::{error::MazeError, layout::check_size};
+
+/// Seeds of the mazes to learn from, unless somebody names others.
+pub const TRAIN_SEEDS: RangeInclusive<u64> = 0..=63;
+/// Seeds of the mazes that are held out for the test, unless somebody names others.
+pub const HELD_OUT_SEEDS: RangeInclusive<u64> = 64..=127;
+
+/// Size and shape of generated mazes.
+///
+/// Corridors join rooms of `corridor` x `corridor` cells that stand in a grid, one wall apart. Cells that a row of rooms
+/// does not fill up thicken the wall at the far side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MazeSpec {
+    /// Rows of cells, the border included.
+    pub rows: usize,
+    /// Columns of cells, the border included.
+    pub columns: usize,
+    /// Share of the walls between neighbouring rooms that is taken away once every room can be reached in exactly one
+    /// way, 0 to 1. At 0 there is one way between any two rooms, at 1 no wall is left between them.
+    pub loops: f64,
+    /// Width of the corridors, cells; at least 1.
+    pub corridor: usize,
+    /// Moves that a shortest path from start to goal may have. `None` puts start and goal as far apart as they can be.
+    pub difficulty: Option<RangeInclusive<usize>>,
+}
+
+impl Default for MazeSpec {
+    fn default() -> Self {
+        Self { rows: 11, columns: 11, loops: 0.1, corridor: 1, difficulty: None }
+    }
+}
+
+impl MazeSpec {
+    /// Checks what can be known without making a maze.
+    ///
+    /// # Errors
+    ///
+    /// [`MazeError`] names the value that cannot be.
+    pub fn check(&self) -> Result<(), MazeError> {
+        let Self { rows, columns, loops, corridor, .. } = *self;
+        check_size(rows, columns)?;
+        if corridor == 0 {
+            return Err(MazeError::NoCorridor);
+        }
+        let least = corridor.saturating_mul(2).saturating_add(3);
+        if rows < least || columns < least {
+            return Err(MazeError::TooSmall { rows, columns, corridor, least });
+        }
+        if !(0.0..=1.0).contains(&loops) {
+            return Err(MazeError::Loops(loops.to_string()));
+        }
+        match &self.difficulty {
+            Some(wanted) if wanted.is_empty() || *wanted.end() == 0 => {
+                Err(MazeError::NoDifficulty { least: *wanted.start(), most: *wanted.end() })
+            }
+            _ => Ok(()),
+        }
+    }
+}

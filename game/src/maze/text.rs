@@ -1,0 +1,106 @@
+//! Mazes as text, one character to the cell.
+
+use super::{
+    cell::Cell,
+    error::MazeError,
+    layout::{Maze, Walls},
+};
+
+impl Maze {
+    /// Reads a maze from its rows: `#` or `1` is a wall, `O` or `0` a free cell, `S` or `r` the start and `G` or `g` the
+    /// goal.
+    ///
+    /// # Errors
+    ///
+    /// [`MazeError`] says what is wrong and in which row and column.
+    pub fn parse<Row: AsRef<str>>(rows: &[Row]) -> Result<Self, MazeError> {
+        let expected = rows.first().map_or(0, |row| row.as_ref().chars().count());
+        let mut walls = Walls::solid(rows.len(), expected)?;
+        let (mut start, mut goal) = (None, None);
+        for (row, text) in rows.iter().enumerate() {
+            let columns = text.as_ref().chars().count();
+            if columns != expected {
+                return Err(MazeError::Ragged { row, columns, expected });
+            }
+            for (col, character) in text.as_ref().chars().enumerate() {
+                let cell = Cell { row, col };
+                match character {
+                    '#' | '1' => continue,
+                    'O' | '0' => {}
+                    'S' | 'r' => mark(&mut start, cell, "start")?,
+                    'G' | 'g' => mark(&mut goal, cell, "goal")?,
+                    _ => return Err(MazeError::UnknownCharacter { row, column: col, character }),
+                }
+                walls.open(cell);
+            }
+        }
+        Self::new(walls, start.ok_or(MazeError::NoStart)?, goal.ok_or(MazeError::NoGoal)?)
+    }
+
+    /// The rows as [`parse`](Self::parse) reads them, with the letters `#`, `O`, `S` and `G`.
+    ///
+    /// A maze whose start is its goal is written with `G` alone.
+    pub fn to_rows(&self) -> Vec<String> {
+        let letter = |cell| match cell {
+            cell if cell == self.goal() => 'G',
+            cell if cell == self.start() => 'S',
+            cell if self.is_free(cell) => 'O',
+            _ => '#',
+        };
+        (0..self.rows()).map(|row| (0..self.columns()).map(|col| letter(Cell { row, col })).collect()).collect()
+    }
+}
+
+fn mark(place: &mut Option<Cell>, cell: Cell, what: &'static str) -> Result<(), MazeError> {
+    match place.replace(cell) {
+        Some(first) => Err(MazeError::Twice { what, first, second: cell }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(rows: &[&str]) -> MazeError {
+        Maze::parse(rows).expect_err("the maze is wrong")
+    }
+
+    #[test]
+    fn both_alphabets_read_the_same() {
+        let letters = Maze::parse(&["#####", "#SOG#", "#####"]).expect("a maze");
+        let digits = Maze::parse(&["11111", "1r0g1", "11111"]).expect("a maze");
+        assert_eq!(letters, digits);
+        assert_eq!((letters.start(), letters.goal(), letters.difficulty()), (Cell::new(1, 1), Cell::new(1, 3), 2));
+        assert_eq!(letters.to_rows(), ["#####", "#SOG#", "#####"]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_place() {
+        assert_eq!(error(&[]), MazeError::Empty);
+        assert_eq!(error(&[""]), MazeError::Empty);
+        assert_eq!(error(&["####", "#OG#", "####"]), MazeError::NoStart);
+        assert_eq!(error(&["####", "#SO#", "####"]), MazeError::NoGoal);
+        assert_eq!(error(&["####", "#SG#", "###"]), MazeError::Ragged { row: 2, columns: 3, expected: 4 });
+        let unknown = MazeError::UnknownCharacter { row: 1, column: 2, character: '?' };
+        assert_eq!(error(&["####", "#S?#", "####"]), unknown);
+        assert_eq!(error(&["####", "#SGO", "####"]), MazeError::Open(Cell::new(1, 3)));
+        let twice = MazeError::Twice { what: "goal", first: Cell::new(1, 2), second: Cell::new(1, 3) };
+        assert_eq!(error(&["#####", "#SGG#", "#####"]), twice);
+    }
+
+    #[test]
+    fn an_unreachable_goal_is_named_with_its_start() {
+        let cut = error(&["#####", "#S#G#", "#####"]);
+        assert_eq!(cut, MazeError::Unreachable { start: Cell::new(1, 1), goal: Cell::new(1, 3) });
+        assert!(cut.to_string().contains("(1, 1)") && cut.to_string().contains("(1, 3)"), "{cut}");
+    }
+
+    #[test]
+    fn a_maze_larger_than_memory_is_refused_before_it_is_made() {
+        let long = "#".repeat(4097);
+        assert_eq!(error(&[&long]), MazeError::TooLarge { rows: 1, columns: 4097 });
+        let wide = "#".repeat(4096);
+        assert_eq!(error(&[wide.as_str(); 1025]), MazeError::TooLarge { rows: 1025, columns: 4096 });
+    }
+}
