@@ -2,6 +2,7 @@
 //!
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
+//! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
 //! - [`antview`]: what ants look like.
 //! - [`registry`]: games by name.
@@ -14,6 +15,7 @@ pub mod antview;
 pub mod cli;
 pub mod coinrun;
 pub mod maze;
+pub mod maze2d;
 pub mod registry;
 #[cfg(feature = "window")]
 pub mod window;

@@ -2,10 +2,10 @@
 
 use bevy_playbot::game::{Game, UnknownName};
 
-use crate::{antmaze::AntMaze, coinrun::CoinRun};
+use crate::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 
 /// The games, by name.
-pub const GAMES: [&str; 2] = ["coinrun", "antmaze"];
+pub const GAMES: [&str; 3] = ["coinrun", "maze2d", "antmaze"];
 
 /// The game with this name.
 ///
@@ -15,6 +15,7 @@ pub const GAMES: [&str; 2] = ["coinrun", "antmaze"];
 pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
     match name {
         "coinrun" => Ok(&CoinRun { physics: false }),
+        "maze2d" => Ok(&Maze2d { physics: false }),
         "antmaze" => Ok(&AntMaze),
         _ => Err(UnknownName::new("game", name, &GAMES)),
     }

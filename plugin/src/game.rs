@@ -7,6 +7,7 @@ use crate::{
     action::ActionSpace,
     bot::BlindBot,
     input_map::InputMap,
+    mode::ModeError,
     observation::ObservationSpace,
     vision::{Picture, Sight, VisionError},
 };
@@ -21,8 +22,18 @@ pub trait Game: Send + Sync {
     /// Version of the rules; raise it whenever an old recording would no longer replay.
     fn version(&self) -> u32;
 
-    /// Modes, such as difficulties. At least one.
+    /// Modes, such as difficulties. At least one. Where modes take options, these are the names in front of them.
     fn modes(&self) -> &'static [&'static str];
+
+    /// Checks that there is such a mode: one of [`modes`](Self::modes), unless the game reads options behind the name.
+    ///
+    /// # Errors
+    ///
+    /// [`ModeError`] with what is valid.
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        let valid = self.modes();
+        if valid.contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, valid).into()) }
+    }
 
     /// Fixed ticks per second of game time.
     fn tick_hz(&self) -> f64;
@@ -53,7 +64,7 @@ pub trait Game: Send + Sync {
     /// [`picture`](Self::picture).
     fn build_picture(&self, _app: &mut App) {}
 
-    /// Adds the game's plugins to a headless app, in a mode from [`modes`](Self::modes).
+    /// Adds the game's plugins to a headless app, in a mode that [`check_mode`](Self::check_mode) takes.
     fn build(&self, app: &mut App, mode: &str);
 
     /// Adds one arena with one agent, which must carry [`Agent`](crate::agent::Agent) with this number and its sensor,
@@ -113,15 +124,6 @@ pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
         .filter(|(likeness, _)| *likeness > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
-}
-
-/// Checks that a mode is one of the game's.
-///
-/// # Errors
-///
-/// [`UnknownName`] with the valid modes.
-pub fn check_mode(game: &dyn Game, mode: &str) -> Result<(), UnknownName> {
-    if game.modes().contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, game.modes())) }
 }
 
 /// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see vectors.

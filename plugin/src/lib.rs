@@ -93,6 +93,7 @@ pub mod headless;
 pub mod input_map;
 pub mod keyboard;
 pub mod level;
+pub mod mode;
 pub mod observation;
 pub mod plugin;
 pub mod policy;

@@ -8,6 +8,7 @@ use bevy_playbot::{
     fault::Fault,
     game::UnknownName,
     learner::{FileError, LearnError},
+    mode::ModeError,
     policy_file::{ExportError, PolicyMisfit},
     runs::RunsError,
     split::SplitError,
@@ -66,6 +67,8 @@ pub enum CliError {
     #[error(transparent)]
     Name(#[from] UnknownName),
     #[error(transparent)]
+    Mode(#[from] ModeError),
+    #[error(transparent)]
     Split(#[from] SplitError),
     #[error(transparent)]
     Config(#[from] ConfigError),
@@ -110,6 +113,7 @@ impl CliError {
         match self {
             Self::Usage(_)
             | Self::Name(_)
+            | Self::Mode(_)
             | Self::Split(_)
             | Self::Config(_)
             | Self::Experiment(_)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
     eval::{EvalPlan, Player},
-    game::{Game, check_mode},
+    game::Game,
     learner::{DeviceKind, SkillModel, SkillSource},
     policy::ActionDraw,
     report::to_text_table,
@@ -88,7 +88,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let episodes = experiment.eval.episodes_per_level;
     let mut rows = Vec::new();
     for split in &splits {
-        check_mode(game, &split.mode)?;
+        game.check_mode(&split.mode)?;
         for Chosen { name, player, sight } in &players {
             let plan = EvalPlan { sight: *sight, ..methods::plan(&experiment, split, episodes, args.threads) };
             let measured = methods::measure(game, name, player, &plan)?;

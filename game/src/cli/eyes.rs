@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    game::{Game, build_seeing_world, check_mode},
+    game::{Game, build_seeing_world},
     headless::tick_world,
     prelude::*,
     vision::{CLOSE, Difference, Frame, ImageOptions, ObservationKind, Sight},
@@ -85,7 +85,7 @@ struct Summary {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
-    check_mode(game, &args.levels.mode)?;
+    game.check_mode(&args.levels.mode)?;
     if args.frames == 0 {
         return Err(CliError::Usage("--frames is 0: compare at least one frame a level".to_owned()));
     }

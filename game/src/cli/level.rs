@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    game::{Game, build_seeing_world, check_mode},
+    game::{Game, build_seeing_world},
     prelude::*,
     raster::RasterSensor,
     vision::{ImageOptions, ObservationKind, Sight},
@@ -47,7 +47,7 @@ const LEGEND: &str =
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
-    check_mode(game, &args.mode)?;
+    game.check_mode(&args.mode)?;
     let mode: Mode = args.mode.parse().map_err(|error| CliError::Usage(format!("{error}")))?;
     let level = generate(mode, args.seed);
     if let Some(path) = &args.png {

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
-    game::check_mode,
     learner::DeviceKind,
     report::StudyReport,
     train::{
@@ -125,8 +124,8 @@ fn say(bar: &ProgressBar, line: &str) {
 fn check_games(runs: &[StudyRun]) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
         let game = registry::game(&experiment.game)?;
-        check_mode(game, &experiment.train.mode)?;
-        check_mode(game, &experiment.test.mode)?;
+        game.check_mode(&experiment.train.mode)?;
+        game.check_mode(&experiment.test.mode)?;
     }
     Ok(())
 }

@@ -9,11 +9,7 @@ use super::{
     onlooker::{Watched, watch},
     verify::VerifyError,
 };
-use crate::{
-    game::{Game, check_mode},
-    split::LevelSplit,
-    vision::Sight,
-};
+use crate::{game::Game, split::LevelSplit, vision::Sight};
 
 /// Most memory that the pictures of a data set may take.
 pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
@@ -61,7 +57,7 @@ impl Demonstrations {
         for file in find_demos(path)? {
             let reader = DemoReader::open_for_game(&file, game.name(), game.version(), None)?;
             let header = reader.header().clone();
-            check_mode(game, &header.mode).map_err(|source| VerifyError::Mode { path: file.clone(), source })?;
+            game.check_mode(&header.mode).map_err(|source| VerifyError::Mode { path: file.clone(), source })?;
             let is_seen = !sight.is_image() && header.observation_names == names;
             let (shared, mode) = (Arc::<Path>::from(file.as_path()), Arc::<str>::from(header.mode.as_str()));
             for (index, episode) in reader.enumerate() {

@@ -16,8 +16,9 @@ use super::{
 };
 use crate::{
     fault::Fault,
-    game::{Game, UnknownName, build_world, check_mode},
+    game::{Game, build_world},
     headless::tick_world,
+    mode::ModeError,
     split::LevelSplit,
     vision::{Sight, VisionError},
 };
@@ -58,7 +59,7 @@ pub enum VerifyError {
         /// The file.
         path: PathBuf,
         /// The mode, and those there are.
-        source: UnknownName,
+        source: ModeError,
     },
     /// A recording shows a level that is kept for the test.
     #[error(
@@ -107,7 +108,7 @@ fn gib(bytes: u64) -> f64 {
 pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<VerifyReport, VerifyError> {
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
     let mode = reader.header().mode.clone();
-    check_mode(game, &mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
+    game.check_mode(&mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
     let mut stage = ReplayStage::new(game, &mode);
     let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
     for episode in reader {

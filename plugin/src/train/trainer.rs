@@ -19,7 +19,8 @@ use super::{
 use crate::{
     episode::EpisodeEnded,
     fault::Fault,
-    game::{Game, UnknownName, check_mode},
+    game::Game,
+    mode::ModeError,
     policy::in_words,
     skill_prior::SkillPrior,
     vision::{Sight, UnknownSight, VisionError},
@@ -39,7 +40,7 @@ pub enum TrainError {
     Experiment(#[from] ExperimentError),
     /// The game has no such mode.
     #[error(transparent)]
-    Mode(#[from] UnknownName),
+    Mode(#[from] ModeError),
     /// The game cannot be seen this way.
     #[error(transparent)]
     Vision(#[from] VisionError),
@@ -285,8 +286,8 @@ impl Trainer {
 /// Whether the experiment can be run on this game.
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
     experiment.check()?;
-    check_mode(game, &experiment.train.mode)?;
-    check_mode(game, &experiment.test.mode)?;
+    game.check_mode(&experiment.train.mode)?;
+    game.check_mode(&experiment.test.mode)?;
     Ok(experiment.sight().check(game)?)
 }
 

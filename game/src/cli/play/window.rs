@@ -7,7 +7,7 @@ use bevy_playbot::{
         file::{DemoHeader, DemoSummary},
         recorder::demo_actions,
     },
-    game::{Game, check_mode},
+    game::Game,
     split::LevelSplit,
     vision::Sight,
 };
@@ -52,7 +52,7 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
         Some(text) => format!("{mode}:{text}").parse()?,
         None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL },
     };
-    check_mode(game, &levels.mode)?;
+    game.check_mode(&levels.mode)?;
     if named.is_some_and(|mode| mode != levels.mode) {
         return Err(CliError::Usage(format!(
             "--mode and --levels name different modes: leave out --mode, or {levels}"

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     demo::file::DemoReader,
     eval::Player,
-    game::{Game, check_mode},
+    game::Game,
     policy::in_words,
     train::run_dir::write_atomically,
     vision::{ObservationKind, Sight},
@@ -104,14 +104,14 @@ fn open_stage(game: &'static dyn Game, args: &Args) -> Result<(Stage, Sight, Str
     if let Some(path) = &args.demo {
         let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
         let mode = reader.header().mode.clone();
-        check_mode(game, &mode)?;
+        game.check_mode(&mode)?;
         let sight = sight(game, args, None)?;
         let episode = episode(reader, path, args.episode_number)?;
         let stage = Stage::replaying(game, &mode, &sight, episode)?;
         return Ok((stage, sight, "recording".to_owned()));
     }
-    let mode = args.mode.as_deref().unwrap_or("hard");
-    check_mode(game, mode)?;
+    let mode = args.mode.as_deref().or(game.modes().last().copied()).unwrap_or_default();
+    game.check_mode(mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,
         None => Chosen::usual(game)?,
@@ -204,7 +204,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
     if args.json {
         print_line(json!({
             "path": path.to_string(), "bytes": written.bytes, "width": width, "height": height,
-            "frames": written.frames, "ticks": stage.ticks(), "end": stage.end(), "player": written.player,
+            "frames": written.frames, "ticks": stage.ticks(), "end": stage.end().map(|ended| ended.end), "player": written.player,
             "level": stage.level(), "divergence": stage.divergence().map(ToString::to_string),
         }))?;
     } else {
