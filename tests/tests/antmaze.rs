@@ -15,8 +15,8 @@ use bevy_playbot::{
     train::worlds::on_threads,
 };
 use playbot_games::antmaze::{
-    AntMaze, AntMazeLevel, WaypointBot,
-    components::{Ant, InMaze},
+    AntMaze, AntMazeLevel, DemonstratorBot,
+    components::{InMaze, MazeAnt},
     generate,
     geometry::distance,
 };
@@ -38,7 +38,7 @@ fn act(world: &mut World, agent: Entity, torques: [f32; 8]) {
 }
 
 fn place(world: &World, agent: Entity) -> [f32; 2] {
-    let state = world.get::<Ant>(agent).expect("plays").0.state();
+    let state = world.get::<MazeAnt>(agent).expect("plays").0.state();
     [state.qpos[0], state.qpos[1]]
 }
 
@@ -46,7 +46,7 @@ fn place(world: &World, agent: Entity) -> [f32; 2] {
 fn put(world: &mut World, agent: Entity, place: [f32; 3]) {
     let mut state = world.get::<InMaze>(agent).expect("plays").0.reset;
     state.qpos[..3].copy_from_slice(&place);
-    world.get_mut::<Ant>(agent).expect("plays").0.set_state(&state);
+    world.get_mut::<MazeAnt>(agent).expect("plays").0.set_state(&state);
 }
 
 fn ended(world: &World, agent: Entity) -> u64 {
@@ -61,7 +61,16 @@ fn the_first_observation_is_the_reset_in_the_order_of_the_original() {
     let reset = level("large", 7).reset;
     let names = AntMaze.observation().names;
     assert_eq!((seen.len(), names.len()), (29, 29));
-    for (index, name) in [(0, "x"), (2, "z"), (3, "qw"), (7, "hip1"), (14, "ankle4"), (15, "vx"), (18, "wx"), (28, "ankle4_velocity")] {
+    for (index, name) in [
+        (0, "x"),
+        (2, "z"),
+        (3, "quaternion w"),
+        (7, "hip 1 angle"),
+        (14, "ankle 4 angle"),
+        (15, "velocity x"),
+        (18, "spin x"),
+        (28, "ankle 4 velocity"),
+    ] {
         assert_eq!(names[index], name);
     }
     for (value, (expected, name)) in seen.iter().zip(reset.qpos.iter().chain(&reset.qvel).zip(&names)) {
@@ -113,7 +122,7 @@ fn only_the_clock_ends_what_the_goal_does_not() {
     // On its back, in the air.
     let mut state = level("medium", 1).reset;
     state.qpos[3..7].copy_from_slice(&[0.0, 1.0, 0.0, 0.0]);
-    world.get_mut::<Ant>(agent).expect("plays").0.set_state(&state);
+    world.get_mut::<MazeAnt>(agent).expect("plays").0.set_state(&state);
     world.ticks(28).expect("sound");
     assert_eq!(ended(&world, agent), 0);
     world.tick().expect("sound");
@@ -161,7 +170,7 @@ fn nan_in_an_action_names_agent_level_and_tick() {
 
 #[test]
 fn an_ant_that_has_left_the_world_is_reported_and_let_alone() {
-    for place in [[-9.0, 0.0, 0.6], [0.0, 0.0, -3.0], [0.0, 60.0, 0.6], [0.0, 0.0, 50.0]] {
+    for place in [[-9.0, 0.0, 0.6], [0.0, 60.0, 0.6], [0.0, 0.0, 50.0]] {
         let (mut world, agent) = world_with("medium", 8);
         world.ticks(3).expect("sound");
         put(&mut world, agent, place);
@@ -266,7 +275,7 @@ fn systems_are_in_no_ambiguous_order() {
 fn demonstrations_follow_the_noise_that_is_asked_for() {
     let actions = |noise: f64| {
         let (mut world, agents) = build_world(&AntMaze, "umaze", 5, 0, 1);
-        world.entity_mut(agents[0]).insert((Control::Bot, WaypointBot::new(noise), LevelQueue::Always(1)));
+        world.entity_mut(agents[0]).insert((Control::Bot, DemonstratorBot::new(noise), LevelQueue::Always(1)));
         let mut actions: Vec<f32> = Vec::new();
         for _ in 0..100 {
             world.tick().expect("sound");

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_playbot::{fault::Faults, prelude::*};
 
 use super::{
-    components::{Ant, AntMazeRules, InMaze, PlaysIn},
+    components::{AntMazeRules, InMaze, MazeAnt, PlaysIn},
     level::{AntMazeLevel, generate},
     walls::wall_boxes,
 };
@@ -32,5 +32,5 @@ pub(super) fn start_episode(
 fn build(commands: &mut Commands, agent: Entity, level: AntMazeLevel) {
     let mut body = AntBody::new(&wall_boxes(&level.maze));
     body.set_state(&level.reset);
-    commands.entity(agent).insert((Ant(body), InMaze(Arc::new(level))));
+    commands.entity(agent).insert((MazeAnt(body), InMaze(Arc::new(level))));
 }

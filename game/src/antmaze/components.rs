@@ -17,7 +17,7 @@ pub struct InMaze(pub Arc<AntMazeLevel>);
 
 /// An agent's ant with the floor and the walls around it: a physics world of its own. Comes with the first episode.
 #[derive(Component)]
-pub struct Ant(pub AntBody);
+pub struct MazeAnt(pub AntBody);
 
 /// The arena of an agent: what is drawn around it belongs to this entity.
 #[derive(Component, Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! The walker on its way from waypoint to waypoint, as a bot of the game, and as the legs of a person.
+//! The walker on its way from waypoint to waypoint, as a bot of the game.
 
 use std::sync::Arc;
 
@@ -6,20 +6,20 @@ use bevy::prelude::*;
 use bevy_playbot::{agent::AgentOrder, fault::Faults, learner::rng::normal, policy::AgentStreams, prelude::*};
 
 use super::{
-    components::{Ant, InMaze},
+    components::{InMaze, MazeAnt},
     level::AntMazeLevel,
+    walker::{Walker, WalkerInput},
     waypoints::Waypoints,
 };
-use crate::ant::walker::{Walker, WalkerInput};
 
 /// Walks to the goal: [`Waypoints`] followed by the shipped [`Walker`].
 #[derive(Component, Debug)]
-pub struct WaypointBot {
+pub struct DemonstratorBot {
     noise: f64,
     way: Option<(Arc<AntMazeLevel>, Waypoints)>,
 }
 
-impl WaypointBot {
+impl DemonstratorBot {
     /// A bot to whose torques normal noise with this standard deviation is added. The original's demonstrations have 0.2.
     pub fn new(noise: f64) -> Self {
         Self { noise, way: None }
@@ -36,7 +36,7 @@ impl WaypointBot {
 /// Decides for all bots of the World in one pass of the walker's network.
 pub(super) fn decide(
     order: Res<AgentOrder>,
-    mut bots: Query<(&Control, &Episode, &InMaze, &Ant, &mut WaypointBot, &mut AgentStreams, &mut Action)>,
+    mut bots: Query<(&Control, &Episode, &InMaze, &MazeAnt, &mut DemonstratorBot, &mut AgentStreams, &mut Action)>,
     mut faults: ResMut<Faults>,
     (mut entities, mut input): (Local<Vec<Entity>>, Local<WalkerInput>),
 ) {
@@ -50,12 +50,15 @@ pub(super) fn decide(
         let state = ant.0.state();
         let at = [state.qpos[0], state.qpos[1]];
         let next = bot.way(&level.0).next(&level.0, at, &mut streams.action);
-        input.push(&state, [next[0] - at[0], next[1] - at[1]]);
+        input.push(&state, next);
         entities.push(entity);
+    }
+    if entities.is_empty() {
+        return;
     }
     let torques = match Walker::shipped().and_then(|walker| walker.act(&input)) {
         Ok(torques) => torques,
-        Err(error) => return faults.report(format!("the walker cannot walk: {error}")),
+        Err(error) => return faults.report(error.to_string()),
     };
     for (&entity, torques) in entities.iter().zip(torques) {
         let Ok((.., bot, mut streams, mut action)) = bots.get_mut(entity) else { continue };

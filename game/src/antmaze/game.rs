@@ -3,27 +3,33 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::Picture};
+use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
 
 use super::{
-    components::PlaysIn, demonstrator_bot::WaypointBot, picture::AntMazePicturePlugin, plugin::AntMazePlugin,
-    steering, view,
+    components::PlaysIn, demonstrator_bot::DemonstratorBot, mode::AntMazeMode, picture::AntMazePicturePlugin,
+    plugin::AntMazePlugin, steering, view,
 };
-use crate::{antview, maze::Map};
+use crate::{
+    ant::{
+        game::{ANT_HZ, action_names},
+        skeleton::JOINTS,
+    },
+    antview,
+    maze::Map,
+};
 
 /// AntMaze under its name `antmaze`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntMaze;
 
-static SPACE: LazyLock<Arc<ObservationSpace>> =
-    LazyLock::new(|| Arc::new(ObservationSpace { names: view::NAMES.map(str::to_owned).into() }));
+static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: view::names() }));
 
 /// Makes an arena with an idle agent, and returns the agent.
 pub fn spawn_agent(world: &mut World, index: u32) -> Entity {
     let arena = world.spawn_empty().id();
     world
         .spawn((
-            Agent::new(index, ActionSpace::Continuous(view::ACTION_NAMES.len())),
+            Agent::new(index, ActionSpace::Continuous(JOINTS)),
             VectorSensor::from_space(SPACE.clone()),
             PlaysIn(arena),
         ))
@@ -43,16 +49,20 @@ impl Game for AntMaze {
         &Map::NAMES
     }
 
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        mode.parse::<AntMazeMode>().map(drop).map_err(|error| error.of(mode))
+    }
+
     fn tick_hz(&self) -> f64 {
-        10.0
+        ANT_HZ
     }
 
     fn actions(&self) -> ActionSpace {
-        ActionSpace::Continuous(view::ACTION_NAMES.len())
+        ActionSpace::Continuous(JOINTS)
     }
 
     fn action_names(&self) -> Vec<String> {
-        view::ACTION_NAMES.map(str::to_owned).into()
+        action_names()
     }
 
     fn input_map(&self) -> Option<InputMap> {
@@ -85,6 +95,6 @@ impl Game for AntMaze {
     }
 
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
-        world.entity_mut(agent).insert(WaypointBot::new(noise));
+        world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
 }

@@ -39,7 +39,9 @@ mod tests {
 
     #[test]
     fn goals_are_where_the_original_has_them() {
-        for (maze, goal) in [(antmaze::medium(), [20.0, 20.0]), (antmaze::large(), [32.0, 24.0]), (antmaze::xl(), [68.0, 48.0])] {
+        for (maze, goal) in
+            [(antmaze::medium(), [20.0, 20.0]), (antmaze::large(), [32.0, 24.0]), (antmaze::xl(), [68.0, 48.0])]
+        {
             assert_eq!(centre_of(&maze, maze.start()), [0.0, 0.0]);
             assert_eq!(centre_of(&maze, maze.goal()), goal);
         }

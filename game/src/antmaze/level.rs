@@ -7,7 +7,7 @@ use super::{
     mode::{AntMazeMode, GoalNoise, Goals},
 };
 use crate::{
-    ant::{AntState, reset_state},
+    ant::AntState,
     maze::{Cell, Maze, MazeError},
 };
 
@@ -43,7 +43,7 @@ pub fn generate(mode: &AntMazeMode, seed: u64) -> Result<AntMazeLevel, MazeError
         maze.start()
     };
     let goal_at = goal_place(mode.goal_noise, centre_of(&maze, goal), &mut stream("antmaze goal noise"));
-    let mut reset = reset_state(&mut stream("antmaze reset"));
+    let mut reset = AntState::reset(&mut stream("antmaze reset"));
     let mut at = centre_of(&maze, start);
     if mode.random_start {
         let mut place = stream("antmaze start place");

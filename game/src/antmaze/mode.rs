@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use bevy_playbot::game::UnknownName;
+use bevy_playbot::{game::UnknownName, mode::ModeError};
 use thiserror::Error;
 
 use crate::maze::{Cell, Map, MazeError, OptionError, fixed::antmaze};
@@ -75,6 +75,19 @@ pub enum AntMazeModeError {
     /// There can be no such maze.
     #[error(transparent)]
     Maze(#[from] MazeError),
+    /// An option is given twice, or with its opposite.
+    #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
+    Twice(String),
+}
+
+impl AntMazeModeError {
+    /// The error as games give it: for this mode.
+    pub fn of(self, mode: &str) -> ModeError {
+        match self {
+            Self::Unknown(unknown) => unknown.into(),
+            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
+        }
+    }
 }
 
 /// Options of every map.
@@ -142,13 +155,27 @@ fn wrong(key: &str, value: &str, wanted: &'static str) -> OptionError {
     OptionError { key: key.to_owned(), value: value.to_owned(), wanted }
 }
 
+/// What an option is about, so that it is said only once.
+fn subject(option: &str) -> &str {
+    match option.split_once('=').map_or(option, |(key, _)| key) {
+        "dense" => "sparse",
+        key => key,
+    }
+}
+
 impl FromStr for AntMazeMode {
     type Err = AntMazeModeError;
 
     fn from_str(text: &str) -> Result<Self, AntMazeModeError> {
         let mut parts = text.split('+');
         let mut mode = Self::on(Map::named(parts.next().unwrap_or_default())?);
-        parts.try_for_each(|option| mode.set(option))?;
+        let options: Vec<_> = parts.collect();
+        for (index, option) in options.iter().enumerate() {
+            if options[..index].iter().any(|earlier| subject(earlier) == subject(option)) {
+                return Err(AntMazeModeError::Twice((*option).to_owned()));
+            }
+            mode.set(option)?;
+        }
         mode.check()
     }
 }
@@ -218,6 +245,8 @@ mod tests {
             ("medium+limit=many", &["limit=many", "at least 1"]),
             ("random+goals=demo", &["goals=demo", "goals=random"]),
             ("random+size=3x3", &["3 x 3"]),
+            ("medium+sparse+dense=exp", &["`dense=exp`", "contradicts"]),
+            ("medium+limit=5+limit=6", &["`limit=6`", "repeats"]),
             ("", &["unknown map ``", "medium"]),
         ] {
             let error = error(text);

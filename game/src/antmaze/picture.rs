@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 
 use super::{
-    components::{Ant, InMaze, PlaysIn},
+    components::{InMaze, MazeAnt, PlaysIn},
     geometry::{CELL, centre_of},
     play::GOAL_RADIUS,
     walls::wall_boxes,
@@ -34,9 +34,9 @@ fn show_levels(new: Query<(Entity, &PlaysIn, &InMaze), Changed<InMaze>>, mut com
     }
 }
 
-fn show_ants(mut ants: Query<(Entity, &Ant, Option<&mut AntPose>)>, mut commands: Commands) {
+fn show_ants(mut ants: Query<(Entity, &MazeAnt, Option<&mut AntPose>)>, mut commands: Commands) {
     for (agent, ant, pose) in &mut ants {
-        let now = AntPose::of(&ant.0.parts());
+        let now = AntPose(ant.0.parts());
         match pose {
             Some(mut pose) => *pose = now,
             None => {

@@ -4,11 +4,10 @@ use bevy::{math::ops, prelude::*};
 use bevy_playbot::{fault::Faults, prelude::*};
 
 use super::{
-    components::{Ant, AntMazeRules, InMaze},
+    components::{AntMazeRules, InMaze, MazeAnt},
     geometry::{cell_at, distance},
     level::AntMazeLevel,
     mode::Pay,
-    state_hash::hash_state,
     view,
 };
 use crate::ant::AntState;
@@ -21,16 +20,7 @@ const HEIGHTS: std::ops::Range<f32> = 0.0..20.0;
 /// Physics, reward and end of every ant whose agent plays.
 pub(super) fn play(
     rules: Res<AntMazeRules>,
-    mut ants: Query<(
-        &Agent,
-        &mut Control,
-        &Action,
-        &InMaze,
-        &mut Ant,
-        &mut Episode,
-        &mut Reward,
-        &mut StateHash,
-    )>,
+    mut ants: Query<(&Agent, &mut Control, &Action, &InMaze, &mut MazeAnt, &mut Episode, &mut Reward, &mut StateHash)>,
     mut faults: ResMut<Faults>,
 ) {
     for (agent, mut control, action, level, mut ant, mut episode, mut reward, mut hash) in &mut ants {
@@ -46,7 +36,7 @@ pub(super) fn play(
             continue;
         }
         let away = distance([state.qpos[0], state.qpos[1]], level.0.goal_at);
-        hash.0 = hash_state(&state, episode.tick);
+        *hash = state.hash();
         reward.add(pay(rules.0.pay, away));
         if away <= GOAL_RADIUS {
             episode.terminate(true);
@@ -79,8 +69,9 @@ fn pay(pay: Pay, away: f32) -> f32 {
 
 /// Why an ant is where none can be.
 fn astray(state: &AntState, level: &AntMazeLevel) -> Option<String> {
-    let names = view::NAMES.iter().zip(view::values(state));
-    if let Some((name, value)) = names.into_iter().find(|(_, value)| !value.is_finite()) {
+    if !state.is_finite() {
+        let mut named = view::names().into_iter().zip(view::values(state));
+        let (name, value) = named.find(|(_, value)| !value.is_finite())?;
         return Some(format!("the ant's `{name}` is {value}: its physics has failed"));
     }
     let [x, y, z, ..] = state.qpos;
@@ -89,7 +80,7 @@ fn astray(state: &AntState, level: &AntMazeLevel) -> Option<String> {
 }
 
 /// Fills the vector of every agent that plays and reads one.
-pub(super) fn observe(mut ants: Query<(&Episode, &Ant, &mut Observation), With<VectorSensor>>) {
+pub(super) fn observe(mut ants: Query<(&Episode, &MazeAnt, &mut Observation), With<VectorSensor>>) {
     for (episode, ant, mut observation) in &mut ants {
         if episode.is_running() {
             observation.set(view::values(&ant.0.state()));

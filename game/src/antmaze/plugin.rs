@@ -24,12 +24,13 @@ impl Plugin for AntMazePlugin {
             .add_systems(
                 FixedPreUpdate,
                 (
-                    demonstrator_bot::decide.in_set(PlaybotSystems::Decide),
-                    steering::steer
-                        .after(PlaybotSystems::Decide)
-                        .before(PlaybotSystems::Act)
-                        .run_if(resource_exists::<ButtonInput<KeyCode>>),
-                ),
+                    demonstrator_bot::decide,
+                    // The keyboard has written an action that does nothing.
+                    steering::steer.run_if(resource_exists::<ButtonInput<KeyCode>>),
+                )
+                    .chain()
+                    .after(PlaybotSystems::Decide)
+                    .before(PlaybotSystems::Act),
             )
             .add_systems(FixedUpdate, play::play.in_set(AntMazeSystems));
     }

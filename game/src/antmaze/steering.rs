@@ -3,8 +3,10 @@
 use bevy::prelude::*;
 use bevy_playbot::{agent::AgentOrder, fault::Faults, prelude::*};
 
-use super::components::Ant;
-use crate::ant::walker::{Walker, WalkerInput};
+use super::{
+    components::MazeAnt,
+    walker::{Walker, WalkerInput},
+};
 
 /// Keys for one way along an axis.
 type Keys = [KeyCode; 2];
@@ -16,15 +18,16 @@ const UP: Keys = [KeyCode::ArrowUp, KeyCode::KeyW];
 /// What the keyboard does. No person can turn eight hinges at once, so an action cannot come from the keys alone: the
 /// keys of this map do nothing, and [`steer`] writes the action.
 pub(super) fn input_map() -> InputMap {
-    let help = "arrow keys or W, A, S and D tell the ant's walker where to go; without a key the ant lets go of its legs";
-    InputMap::new([], |_| ActionValue::Continuous(vec![0.0; 8]), help)
+    let help =
+        "arrow keys or W, A, S and D tell the ant's walker where to go; without a key the ant lets go of its legs";
+    InputMap::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; 8]), help)
 }
 
 /// Walks for people in the direction of their keys.
 pub(super) fn steer(
     keys: Res<ButtonInput<KeyCode>>,
     order: Res<AgentOrder>,
-    mut ants: Query<(&Control, &Episode, &Ant, &mut Action), With<InputMap>>,
+    mut ants: Query<(&Control, &Episode, &MazeAnt, &mut Action), With<InputMap>>,
     mut faults: ResMut<Faults>,
     mut input: Local<WalkerInput>,
 ) {
@@ -39,10 +42,11 @@ pub(super) fn steer(
             continue;
         }
         input.clear();
-        input.push(&ant.0.state(), direction);
+        let state = ant.0.state();
+        input.push(&state, [state.qpos[0] + direction[0], state.qpos[1] + direction[1]]);
         match Walker::shipped().and_then(|walker| walker.act(&input)) {
             Ok(torques) => action.0 = ActionValue::Continuous(torques.concat()),
-            Err(error) => return faults.report(format!("the walker cannot walk: {error}")),
+            Err(error) => return faults.report(error.to_string()),
         }
     }
 }

@@ -2,38 +2,12 @@
 
 use bevy::prelude::*;
 
-use crate::ant::{Part, PartShape, WallBox};
+use crate::ant::{PARTS, Part, WallBox};
 
-/// The limbs of an agent's ant, in the coordinates of its arena: torso first.
-#[derive(Component, Clone, Debug)]
-pub struct AntPose(pub [Limb; 13]);
-
-impl AntPose {
-    /// The pose with these limbs, as [`AntBody::parts`](crate::ant::AntBody::parts) has them.
-    pub fn of(parts: &[Part; 13]) -> Self {
-        Self(parts.each_ref().map(Limb::of))
-    }
-}
-
-/// A sphere, or a capsule along its own y axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limb {
-    /// The middle, metres.
-    pub centre: Vec3,
-    /// How it is turned.
-    pub rotation: Quat,
-    /// Its radius, metres.
-    pub radius: f32,
-    /// From the middle to the centre of either end, metres; 0 for a sphere.
-    pub half_length: f32,
-}
-
-impl Limb {
-    /// From the middle to the centre of one end.
-    pub fn half_axis(&self) -> Vec3 {
-        self.rotation * Vec3::Y * self.half_length
-    }
-}
+/// The torso and the limbs of an agent's ant, in the coordinates of its arena, as
+/// [`AntBody::parts`](crate::ant::AntBody::parts) has them.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct AntPose(pub [Part; PARTS]);
 
 /// Where an agent's ant should go.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
@@ -69,16 +43,5 @@ impl Ground {
     /// A floor without walls.
     pub fn open() -> Self {
         Self { cell: 4.0, corner: [0.0; 2], columns: 0, is_wall: Vec::new(), walled: false, boxes: Vec::new() }
-    }
-}
-
-impl Limb {
-    fn of(part: &Part) -> Self {
-        let (radius, half_length) = match part.shape {
-            PartShape::Sphere { radius } => (radius, 0.0),
-            PartShape::Capsule { radius, half_length } => (radius, half_length),
-        };
-        let (centre, rotation) = (Vec3::from_array(part.translation), Quat::from_array(part.rotation));
-        Self { centre, rotation, radius, half_length }
     }
 }

@@ -9,7 +9,7 @@ mod flat;
 #[cfg(feature = "view3d")]
 mod solid;
 
-pub use components::{AntPose, GoalMark, Ground, Limb, OnGround};
+pub use components::{AntPose, GoalMark, Ground, OnGround};
 pub use flat::VIEW;
 #[cfg(feature = "view3d")]
 pub use solid::{SolidAnt, SolidViewPlugin};

@@ -59,6 +59,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     }
     let (plain, with_physics) = (registry::game("coinrun")?, &CoinRun { physics: true });
     let (maze2d, maze2d_physics) = (registry::game("maze2d")?, &Maze2d { physics: true });
+    let antmaze = registry::game("antmaze")?;
     use ObservationKind::{Camera, Raster, Vector};
     let mut cases: Vec<Case> = vec![
         ("sim/coinrun/vector", plain, "hard", Vector, simulate),
@@ -71,6 +72,8 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         ("sim/maze2d/rapier", maze2d, "medium+contact=rapier", Vector, simulate),
         ("sim/maze2d/random", maze2d, "random", Vector, simulate),
         ("sim/maze2d/raster", maze2d, "medium", Raster, simulate),
+        ("sim/antmaze/vector", antmaze, "medium", Vector, simulate),
+        ("sim/antmaze/raster", antmaze, "medium", Raster, simulate),
         ("train/maze2d/vector", maze2d, "medium", Vector, train),
     ];
     if cfg!(feature = "camera") {

@@ -1,6 +1,9 @@
 //! A view in space for games that have one, and the key that changes between it and the view from above.
 
-use bevy::{camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, input::InputSystems, prelude::*, transform::helper::TransformHelper};
+use bevy::{
+    camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, input::InputSystems, prelude::*,
+    transform::helper::TransformHelper,
+};
 
 use super::{camera::Zoom, seats::Seats};
 use crate::antview::{SolidAnt, SolidViewPlugin};

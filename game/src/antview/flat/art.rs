@@ -42,7 +42,8 @@ fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> Texel) -> Image {
     let mut image = Image::default();
     image.texture_descriptor.size.width = width;
     image.texture_descriptor.size.height = height;
-    image.data = Some((0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect());
+    image.data =
+        Some((0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect());
     image.sampler = ImageSampler::nearest();
     image
 }

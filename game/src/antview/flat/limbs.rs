@@ -3,7 +3,10 @@
 use bevy::prelude::*;
 
 use super::{GOAL, LIMBS, art::Art};
-use crate::antview::{AntPose, GoalMark, Limb, OnGround};
+use crate::{
+    ant::Part,
+    antview::{AntPose, GoalMark, OnGround},
+};
 
 /// Torso, seen from above and, of an ant that lies on its back, from below.
 const TORSO: Color = Color::srgb(0.66, 0.26, 0.20);
@@ -34,11 +37,7 @@ pub fn colour(number: usize) -> Color {
 }
 
 /// Makes sprites of new ants.
-pub fn dress(
-    new: Query<(Entity, &OnGround, &AntPose), Without<Sprites>>,
-    art: Res<Art>,
-    mut commands: Commands,
-) {
+pub fn dress(new: Query<(Entity, &OnGround, &AntPose), Without<Sprites>>, art: Res<Art>, mut commands: Commands) {
     for (agent, ground, pose) in &new {
         let limb = |number| {
             let sprite = Sprite::from_color(colour(number), Vec2::ZERO);
@@ -69,7 +68,7 @@ pub fn pose(
         sprite.color = if upright { TORSO } else { BELLY };
         for (limb, &entity) in legs.iter().zip(&sprites.limbs) {
             let Ok((mut transform, mut sprite)) = limbs.get_mut(entity) else { continue };
-            let along = limb.half_axis().truncate();
+            let along = (limb.rotation * Vec3::Y * limb.half_length).truncate();
             transform.translation = place(limb);
             transform.rotation = Quat::from_rotation_arc_2d(Vec2::X, along.try_normalize().unwrap_or(Vec2::X));
             sprite.custom_size = Some(2.0 * Vec2::new(along.length() + limb.radius, limb.radius));
@@ -77,8 +76,8 @@ pub fn pose(
     }
 }
 
-fn place(limb: &Limb) -> Vec3 {
-    limb.centre.truncate().extend(LIMBS + NEARER * limb.centre.z)
+fn place(part: &Part) -> Vec3 {
+    part.centre.truncate().extend(LIMBS + NEARER * (part.centre.z + part.radius))
 }
 
 /// Puts the discs where the goals are.

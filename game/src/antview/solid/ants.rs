@@ -3,7 +3,10 @@
 use bevy::prelude::*;
 
 use super::scenery::matt;
-use crate::antview::{AntPose, GoalMark, Limb, OnGround, flat};
+use crate::{
+    ant::{PARTS, Part},
+    antview::{AntPose, GoalMark, OnGround, flat},
+};
 
 /// Height of the light over a goal, metres.
 const BEAM: f32 = 3.0;
@@ -11,11 +14,11 @@ const BEAM: f32 = 3.0;
 /// The meshes of an agent's ant.
 #[derive(Component)]
 pub struct SolidAnt {
-    limbs: [Entity; 13],
+    limbs: [Entity; PARTS],
     goal: Entity,
     /// Pose before and after the last tick.
-    from: [Limb; 13],
-    to: [Limb; 13],
+    from: [Part; PARTS],
+    to: [Part; PARTS],
 }
 
 impl SolidAnt {
@@ -45,7 +48,7 @@ pub fn build(
     }
 }
 
-fn mesh(limb: &Limb) -> Mesh {
+fn mesh(limb: &Part) -> Mesh {
     if limb.half_length == 0.0 {
         Sphere::new(limb.radius).into()
     } else {
@@ -53,7 +56,7 @@ fn mesh(limb: &Limb) -> Mesh {
     }
 }
 
-fn place(limb: &Limb) -> Transform {
+fn place(limb: &Part) -> Transform {
     Transform::from_translation(limb.centre).with_rotation(limb.rotation)
 }
 
@@ -65,7 +68,10 @@ pub fn goals(
     mut commands: Commands,
 ) {
     for (goal, ant) in &changed {
-        let disc = (Mesh3d(meshes.add(Cylinder::new(goal.radius, 0.02))), MeshMaterial3d(materials.add(matt(flat::GOAL_COLOUR))));
+        let disc = (
+            Mesh3d(meshes.add(Cylinder::new(goal.radius, 0.02))),
+            MeshMaterial3d(materials.add(matt(flat::GOAL_COLOUR))),
+        );
         let light = StandardMaterial {
             base_color: flat::GOAL_COLOUR.with_alpha(0.25),
             alpha_mode: AlphaMode::Blend,
@@ -76,10 +82,12 @@ pub fn goals(
         let [x, y] = goal.at;
         // Cylinders stand along y.
         let upright = Transform::from_xyz(x, y, 0.01).with_rotation(Quat::from_rotation_arc(Vec3::Y, Vec3::Z));
-        commands.entity(ant.goal).despawn_related::<Children>().insert((upright, Visibility::default())).with_children(|marks| {
-            marks.spawn((disc, Transform::default()));
-            marks.spawn((beam, Transform::from_xyz(0.0, BEAM / 2.0, 0.0), bevy::light::NotShadowCaster));
-        });
+        commands.entity(ant.goal).despawn_related::<Children>().insert((upright, Visibility::default())).with_children(
+            |marks| {
+                marks.spawn((disc, Transform::default()));
+                marks.spawn((beam, Transform::from_xyz(0.0, BEAM / 2.0, 0.0), bevy::light::NotShadowCaster));
+            },
+        );
     }
 }
 

@@ -28,7 +28,12 @@ pub struct Built(Vec<Entity>);
 
 /// One light, whose shadows are sharp around the camera.
 pub fn sun(mut commands: Commands) {
-    let shadows = CascadeShadowConfigBuilder { num_cascades: 2, first_cascade_far_bound: 14.0, maximum_distance: 60.0, ..default() };
+    let shadows = CascadeShadowConfigBuilder {
+        num_cascades: 2,
+        first_cascade_far_bound: 14.0,
+        maximum_distance: 60.0,
+        ..default()
+    };
     commands.spawn((
         DirectionalLight { illuminance: 7000.0, shadow_maps_enabled: true, ..default() },
         shadows.build(),
@@ -65,9 +70,14 @@ pub fn grounds(
         built.into_iter().flat_map(|built| &built.0).for_each(|&entity| commands.entity(entity).despawn());
         let (middle, size) = extent(ground);
         let repeat = Affine2::from_scale(size / ground.cell);
-        let paint = StandardMaterial { base_color_texture: Some(paints.floor.clone()), uv_transform: repeat, ..matt(Color::WHITE) };
+        let paint = StandardMaterial {
+            base_color_texture: Some(paints.floor.clone()),
+            uv_transform: repeat,
+            ..matt(Color::WHITE)
+        };
         let floor = (Mesh3d(meshes.add(Rectangle::from_size(size))), MeshMaterial3d(materials.add(paint)));
-        let mut parts = vec![commands.spawn((ChildOf(arena), floor, Transform::from_translation(middle.extend(0.0)))).id()];
+        let mut parts =
+            vec![commands.spawn((ChildOf(arena), floor, Transform::from_translation(middle.extend(0.0)))).id()];
         for wall in &ground.boxes {
             let mesh = Mesh3d(meshes.add(Cuboid { half_size: wall.half.into() }));
             let place = Transform::from_translation(wall.centre.into());
