@@ -1,11 +1,13 @@
 //! The games of `bevy_playbot` and its command line.
 //!
+//! - [`ant`]: the quadruped, and the open floor on which it learns to walk.
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
 //! - `window`, with the feature of that name: a person plays.
 
+pub mod ant;
 pub mod cli;
 pub mod coinrun;
 pub mod maze;

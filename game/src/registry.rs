@@ -2,10 +2,10 @@
 
 use bevy_playbot::game::{Game, UnknownName};
 
-use crate::coinrun::CoinRun;
+use crate::{ant::Ant, coinrun::CoinRun};
 
 /// The games, by name.
-pub const GAMES: [&str; 1] = ["coinrun"];
+pub const GAMES: [&str; 2] = ["coinrun", "ant"];
 
 /// The game with this name.
 ///
@@ -14,6 +14,7 @@ pub const GAMES: [&str; 1] = ["coinrun"];
 /// [`UnknownName`] with the valid names.
 pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
     match name {
+        "ant" => Ok(&Ant),
         "coinrun" => Ok(&CoinRun { physics: false }),
         _ => Err(UnknownName::new("game", name, &GAMES)),
     }
