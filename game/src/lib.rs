@@ -1,5 +1,6 @@
 //! The games of `bevy_playbot` and its command line.
 //!
+//! - [`ant`]: the quadruped, and the open floor on which it learns to walk.
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.

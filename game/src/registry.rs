@@ -2,10 +2,10 @@
 
 use bevy_playbot::game::{Game, UnknownName};
 
-use crate::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
+use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 
 /// The games, by name.
-pub const GAMES: [&str; 3] = ["coinrun", "maze2d", "antmaze"];
+pub const GAMES: [&str; 4] = ["coinrun", "maze2d", "ant", "antmaze"];
 
 /// The game with this name.
 ///
@@ -16,6 +16,7 @@ pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
     match name {
         "coinrun" => Ok(&CoinRun { physics: false }),
         "maze2d" => Ok(&Maze2d { physics: false }),
+        "ant" => Ok(&Ant),
         "antmaze" => Ok(&AntMaze),
         _ => Err(UnknownName::new("game", name, &GAMES)),
     }

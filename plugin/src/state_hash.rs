@@ -8,7 +8,16 @@ use bevy::prelude::*;
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StateHash(pub u64);
 
+/// Start value and factor of 64-bit FNV-1a.
+const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
+
 impl StateHash {
+    /// FNV-1a over words instead of bytes. The order of the words counts.
+    pub fn of(words: impl IntoIterator<Item = u64>) -> Self {
+        Self(words.into_iter().fold(FNV_OFFSET, |hash, word| (hash ^ word).wrapping_mul(FNV_PRIME)))
+    }
+
     /// The 32 bits that recordings keep: both halves folded together.
     pub fn folded(&self) -> u32 {
         (self.0 ^ (self.0 >> 32)) as u32

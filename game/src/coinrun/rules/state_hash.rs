@@ -1,26 +1,17 @@
 //! A fingerprint of a running episode.
 
+use bevy_playbot::state_hash::StateHash;
+
 use super::body::Body;
 
-/// Start value and factor of 64-bit FNV-1a.
-const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
-
-/// FNV-1a over 32-bit words instead of bytes: the step number, then the bit patterns of x, y, vx
-/// and vy of the player and of every enemy in creation order. Negative zero counts as zero.
+/// Hash of the step number, then of the bit patterns of x, y, vx and vy of the player and of every enemy in creation
+/// order. Negative zero counts as zero.
 pub fn hash_state<'a>(player: &'a Body, enemies: impl IntoIterator<Item = &'a Body>, step: u32) -> u64 {
-    let mut hash = mix(FNV_OFFSET, step);
-    for body in std::iter::once(player).chain(enemies) {
-        for value in [body.x, body.y, body.vx, body.vy] {
-            // Adding zero turns negative zero into zero and changes nothing else.
-            hash = mix(hash, (value + 0.0).to_bits());
-        }
-    }
-    hash
-}
-
-fn mix(hash: u64, word: u32) -> u64 {
-    (hash ^ u64::from(word)).wrapping_mul(FNV_PRIME)
+    let bodies = std::iter::once(player).chain(enemies);
+    // Adding zero turns negative zero into zero and changes nothing else.
+    let words =
+        bodies.flat_map(|body| [body.x, body.y, body.vx, body.vy].map(|value| u64::from((value + 0.0).to_bits())));
+    StateHash::of(std::iter::once(u64::from(step)).chain(words)).0
 }
 
 #[cfg(test)]

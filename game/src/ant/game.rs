@@ -1,0 +1,86 @@
+//! The open floor for the trainer, the evaluation and the replay.
+
+use std::sync::{Arc, LazyLock};
+
+use bevy::prelude::*;
+use bevy_playbot::{prelude::*, vision::VisionSystems};
+
+use super::{
+    sense::{joint_names, names},
+    skeleton::{ACTUATED, JOINTS},
+    walk::{Task, Walker, observe, start_episode, walk},
+};
+
+/// Control steps per second.
+pub const ANT_HZ: f64 = 10.0;
+
+/// Names of an action's numbers, in order.
+pub fn action_names() -> Vec<String> {
+    let joints = joint_names();
+    ACTUATED.iter().map(|&joint| joints[joint].clone()).collect()
+}
+
+/// The game `ant`: an open floor, goals in all directions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ant;
+
+static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: names() }));
+
+impl Game for Ant {
+    fn name(&self) -> &'static str {
+        "ant"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &Task::NAMES
+    }
+
+    fn tick_hz(&self) -> f64 {
+        ANT_HZ
+    }
+
+    fn actions(&self) -> ActionSpace {
+        ActionSpace::Continuous(JOINTS)
+    }
+
+    fn action_names(&self) -> Vec<String> {
+        action_names()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        (**SPACE).clone()
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        app.add_plugins(AntPlugin { task: Task::named(mode).expect("callers check the mode against `modes`") });
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let agent = Agent::new(index, self.actions());
+        world.spawn((agent, VectorSensor::from_space(SPACE.clone()), Walker::default())).id()
+    }
+}
+
+/// The tick of the ant, in `FixedUpdate`. Add what your game adds before or after it.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct AntSystems;
+
+/// Adds ants on an open floor.
+#[derive(Clone, Copy, Debug)]
+pub struct AntPlugin {
+    /// What is asked of them.
+    pub task: Task,
+}
+
+impl Plugin for AntPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(self.task)
+            .add_observer(start_episode)
+            .add_systems(ObserveSchedule, observe.before(VisionSystems::Dress))
+            .add_systems(FixedUpdate, walk.in_set(AntSystems));
+    }
+}

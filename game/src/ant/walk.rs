@@ -1,0 +1,142 @@
+//! The game `ant`: get to goals on an open floor.
+
+use bevy::prelude::*;
+use bevy_playbot::{fault::Faults, prelude::*};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState};
+
+/// How near a goal is near enough, in metres.
+pub const GOAL_RADIUS: f32 = 0.5;
+/// Reward for each metre that the goal comes nearer. A control step at 1 m/s gives 1.
+const PROGRESS_REWARD: f32 = 10.0;
+/// Reward for each step on the feet.
+const UPRIGHT_REWARD: f32 = 0.1;
+/// Price of the square of each action.
+const EFFORT_PRICE: f32 = 0.02;
+
+/// What is asked of the ant.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// One goal, 8 m away in any direction. Reaching it ends the episode with success.
+    Goal,
+    /// One goal after another, 2 m to 10 m from the last, as long as time lasts: what the walker trains on.
+    Chase,
+}
+
+impl Task {
+    /// The names of the tasks.
+    pub const NAMES: [&str; 2] = ["goal", "chase"];
+
+    /// The task with this name.
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "goal" => Some(Self::Goal),
+            "chase" => Some(Self::Chase),
+            _ => None,
+        }
+    }
+
+    /// Control steps until time is up.
+    fn limit(self) -> u32 {
+        match self {
+            Self::Goal => 200,
+            Self::Chase => 300,
+        }
+    }
+
+    fn next_goal(self, from: Vec2, rng: &mut ChaCha8Rng) -> Vec2 {
+        let distance = match self {
+            Self::Goal => 8.0,
+            Self::Chase => rng.random_range(2.0..=10.0f32),
+        };
+        from + distance * Vec2::from_angle(rng.random_range(0.0..std::f32::consts::TAU))
+    }
+}
+
+/// An ant and the goal it is to reach.
+#[derive(Component)]
+pub struct Walker {
+    /// The ant.
+    pub body: AntBody,
+    /// The goal, in metres.
+    pub goal: Vec2,
+    /// Action values that were out of range and have been clipped, over all episodes.
+    pub clipped: u64,
+    /// Draws the goals of this level.
+    draws: ChaCha8Rng,
+}
+
+impl Default for Walker {
+    fn default() -> Self {
+        Self { body: AntBody::new(&[]), goal: Vec2::ZERO, clipped: 0, draws: ChaCha8Rng::seed_from_u64(0) }
+    }
+}
+
+impl Walker {
+    fn place(&self) -> Vec2 {
+        self.body.torso().0.truncate()
+    }
+}
+
+pub(super) fn start_episode(event: On<StartEpisode>, task: Res<Task>, mut walkers: Query<&mut Walker>) {
+    let Ok(mut walker) = walkers.get_mut(event.entity) else { return };
+    let mut rng = ChaCha8Rng::seed_from_u64(event.level);
+    walker.body.set_state(&AntState::reset(&mut rng));
+    walker.goal = task.next_goal(Vec2::ZERO, &mut rng);
+    walker.draws = rng;
+}
+
+pub(super) fn walk(
+    task: Res<Task>,
+    mut walkers: Query<(&Agent, &Control, &Action, &mut Walker, &mut Episode, &mut Reward, &mut StateHash)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, control, action, mut walker, mut episode, mut reward, mut hash) in &mut walkers {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        let Some(action) = action.continuous().and_then(|values| <[f32; JOINTS]>::try_from(values).ok()) else {
+            continue;
+        };
+        walker.clipped += action.iter().filter(|value| value.abs() > 1.0).count() as u64;
+        let before = walker.place().distance(walker.goal);
+        walker.body.step(&action);
+        let state = walker.body.state();
+        if !state.is_finite() {
+            faults.report(format!(
+                "agent {}, level {}, tick {}: the ant's state is no longer finite",
+                agent.index, episode.level, episode.tick
+            ));
+            continue;
+        }
+        *hash = state.hash();
+        let distance = walker.place().distance(walker.goal);
+        let effort: f32 = action.iter().map(|value| value.clamp(-1.0, 1.0).powi(2)).sum();
+        reward.add(PROGRESS_REWARD * (before - distance) + UPRIGHT_REWARD - EFFORT_PRICE * effort);
+        if distance <= GOAL_RADIUS {
+            match *task {
+                Task::Goal => episode.terminate(true),
+                Task::Chase => {
+                    let Walker { goal, draws, .. } = &mut *walker;
+                    *goal = task.next_goal(*goal, draws);
+                }
+            }
+        }
+        if state.upright() < 0.0 {
+            episode.terminate(false);
+        }
+        if episode.tick + 1 >= task.limit() {
+            episode.truncate();
+        }
+    }
+}
+
+pub(super) fn observe(mut walkers: Query<(&Episode, &Walker, &mut Observation), With<VectorSensor>>) {
+    for (episode, walker, mut observation) in &mut walkers {
+        if episode.is_running() {
+            observation.set(senses(&walker.body.state(), walker.goal));
+        }
+    }
+}
