@@ -2,10 +2,10 @@
 
 use bevy_playbot::game::{Game, UnknownName};
 
-use crate::{ant::Ant, coinrun::CoinRun};
+use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 
 /// The games, by name.
-pub const GAMES: [&str; 2] = ["coinrun", "ant"];
+pub const GAMES: [&str; 4] = ["coinrun", "maze2d", "ant", "antmaze"];
 
 /// The game with this name.
 ///
@@ -14,8 +14,10 @@ pub const GAMES: [&str; 2] = ["coinrun", "ant"];
 /// [`UnknownName`] with the valid names.
 pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
     match name {
-        "ant" => Ok(&Ant),
         "coinrun" => Ok(&CoinRun { physics: false }),
+        "maze2d" => Ok(&Maze2d { physics: false }),
+        "ant" => Ok(&Ant),
+        "antmaze" => Ok(&AntMaze),
         _ => Err(UnknownName::new("game", name, &GAMES)),
     }
 }

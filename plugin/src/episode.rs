@@ -26,7 +26,7 @@ pub enum EpisodeEnd {
 }
 
 impl EpisodeEnd {
-    /// Whether the level's aim was reached.
+    /// Whether the game is over because the level's aim was reached.
     pub fn is_success(self) -> bool {
         matches!(self, Self::Terminated { success: true })
     }
@@ -41,7 +41,10 @@ pub struct Episode {
     pub tick: u32,
     /// Sum of rewards so far, undiscounted.
     pub total_reward: f64,
+    /// Ticks so far whose action lay outside the game's range and was clipped to it.
+    pub clipped: u32,
     state: EpisodeState,
+    reached: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,6 +69,22 @@ impl Episode {
         if self.is_running() && self.end().is_none() {
             self.state = EpisodeState::Ended(EpisodeEnd::Truncated);
         }
+    }
+
+    /// The level's aim has been reached and the game goes on, as it does in games that only the clock ends: the episode
+    /// counts as a success even if it is truncated. Between two episodes it means nothing.
+    pub fn reach(&mut self) {
+        self.reached |= self.is_running();
+    }
+
+    /// Notes that the action of this tick was clipped to the game's range.
+    pub fn note_clipped(&mut self) {
+        self.clipped += u32::from(self.is_running());
+    }
+
+    /// Whether the level's aim was reached: by the end of the episode, or before it.
+    pub fn is_success(&self) -> bool {
+        self.reached || self.end().is_some_and(EpisodeEnd::is_success)
     }
 
     /// The end, in the tick in which it came.
@@ -105,8 +124,12 @@ pub struct EpisodeEnded {
     pub level: u64,
     /// How it ended.
     pub end: EpisodeEnd,
+    /// Whether the level's aim was reached, at the end or before it: see [`Episode::reach`].
+    pub success: bool,
     /// Length in ticks.
     pub ticks: u32,
+    /// Ticks whose action was clipped to the game's range.
+    pub clipped: u32,
     /// Sum of rewards, undiscounted.
     pub total_reward: f64,
 }
@@ -172,12 +195,14 @@ pub(crate) fn end_episodes(
         let Ok((mut episode, mut count)) = agents.get_mut(entity) else { continue };
         let Some(end) = episode.end() else { continue };
         count.finished += 1;
-        count.successes += u64::from(end.is_success());
+        count.successes += u64::from(episode.is_success());
         commands.trigger(EpisodeEnded {
             entity,
             level: episode.level,
             end,
+            success: episode.is_success(),
             ticks: episode.tick,
+            clipped: episode.clipped,
             total_reward: episode.total_reward,
         });
         episode.abandon();

@@ -104,8 +104,12 @@ pub struct EpisodeResult {
     pub level: u64,
     /// How it ended.
     pub end: EpisodeEnd,
+    /// Whether the level's aim was reached, at the end or before it.
+    pub success: bool,
     /// Length, ticks.
     pub ticks: u32,
+    /// Ticks whose action was clipped to the game's range.
+    pub clipped: u32,
     /// Sum of rewards.
     pub total_reward: f64,
 }
@@ -127,6 +131,8 @@ pub struct EvalSummary {
     pub success: f64,
     /// Mean length, ticks.
     pub length_mean: f64,
+    /// Share of all ticks whose action was clipped to the game's range.
+    pub clipped: f64,
 }
 
 #[derive(Resource, Default)]
@@ -136,7 +142,9 @@ fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
     results.0.push(EpisodeResult {
         level: event.level,
         end: event.end,
+        success: event.success,
         ticks: event.ticks,
+        clipped: event.clipped,
         total_reward: event.total_reward,
     });
 }
@@ -211,7 +219,8 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
         episodes: results.len() as u64,
         return_mean,
         return_se: if n > 1.0 { (squares / (n - 1.0) / n).sqrt() } else { 0.0 },
-        success: mean(&|result| f64::from(u8::from(result.end.is_success()))),
+        success: mean(&|result| f64::from(u8::from(result.success))),
         length_mean: mean(&|result| f64::from(result.ticks)),
+        clipped: mean(&|result| f64::from(result.clipped)) / mean(&|result| f64::from(result.ticks)).max(1.0),
     }
 }

@@ -20,7 +20,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::ExperimentArgs,
 };
-use crate::{coinrun::CoinRun, registry};
+use crate::{coinrun::CoinRun, maze2d::Maze2d, registry};
 
 /// Measures speed. Numbers are for this machine and this moment; nothing is tested.
 #[derive(clap::Args)]
@@ -58,24 +58,34 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
     }
     let (plain, with_physics) = (registry::game("coinrun")?, &CoinRun { physics: true });
+    let (maze2d, maze2d_physics) = (registry::game("maze2d")?, &Maze2d { physics: true });
+    let antmaze = registry::game("antmaze")?;
     use ObservationKind::{Camera, Raster, Vector};
     let mut cases: Vec<Case> = vec![
-        ("sim/coinrun/vector", plain, Vector, simulate),
-        ("sim/coinrun/physics", with_physics, Vector, simulate),
-        ("sim/coinrun/raster", plain, Raster, simulate),
-        ("train/coinrun/vector", plain, Vector, train),
-        ("train/coinrun/raster", plain, Raster, train),
+        ("sim/coinrun/vector", plain, "hard", Vector, simulate),
+        ("sim/coinrun/physics", with_physics, "hard", Vector, simulate),
+        ("sim/coinrun/raster", plain, "hard", Raster, simulate),
+        ("train/coinrun/vector", plain, "hard", Vector, train),
+        ("train/coinrun/raster", plain, "hard", Raster, train),
+        ("sim/maze2d/vector", maze2d, "medium", Vector, simulate),
+        ("sim/maze2d/physics", maze2d_physics, "medium", Vector, simulate),
+        ("sim/maze2d/rapier", maze2d, "medium+contact=rapier", Vector, simulate),
+        ("sim/maze2d/random", maze2d, "random", Vector, simulate),
+        ("sim/maze2d/raster", maze2d, "medium", Raster, simulate),
+        ("sim/antmaze/vector", antmaze, "medium", Vector, simulate),
+        ("sim/antmaze/raster", antmaze, "medium", Raster, simulate),
+        ("train/maze2d/vector", maze2d, "medium", Vector, train),
     ];
     if cfg!(feature = "camera") {
-        cases.push(("sim/coinrun/camera", plain, Camera, simulate));
+        cases.push(("sim/coinrun/camera", plain, "hard", Camera, simulate));
     }
     let wanted: Vec<_> = cases.iter().filter(|(name, ..)| name.contains(&args.case)).collect();
     if wanted.is_empty() {
         let names: Vec<_> = cases.iter().map(|(name, ..)| *name).collect();
         return Err(CliError::Usage(format!("no case is called `{}`; cases: {}", args.case, names.join(", "))));
     }
-    for (name, game, kind, measure) in wanted {
-        let measured = match measure(*game, *kind, &args) {
+    for (name, game, mode, kind, measure) in wanted {
+        let measured = match measure(*game, mode, *kind, &args) {
             Err(CliError::Vision(error)) if args.case.is_empty() => {
                 eprintln!("{name}: {error}");
                 continue;
@@ -98,10 +108,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// Name, game, what agents see, and what to do.
-type Case = (&'static str, &'static dyn Game, ObservationKind, Measurement);
+/// Name, game, mode, what agents see, and what to do.
+type Case = (&'static str, &'static dyn Game, &'static str, ObservationKind, Measurement);
 
-type Measurement = fn(&dyn Game, ObservationKind, &Args) -> Result<Measure, CliError>;
+type Measurement = fn(&dyn Game, &str, ObservationKind, &Args) -> Result<Measure, CliError>;
 
 struct Measure {
     steps_per_s: f64,
@@ -118,13 +128,13 @@ impl Measure {
     }
 }
 
-/// Random actions on hard levels, observations filled every tick.
-fn simulate(game: &dyn Game, kind: ObservationKind, args: &Args) -> Result<Measure, CliError> {
+/// Random actions on 64 levels, observations filled every tick.
+fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> Result<Measure, CliError> {
     let threads = args.threads as u32;
     let (share, sight) = (args.arenas / threads, Sight { kind, ..Sight::default() });
     let mut worlds = Vec::new();
     for index in 0..threads {
-        let (mut world, agents) = build_seeing_world(game, "hard", &sight, 1, index * share, share)?;
+        let (mut world, agents) = build_seeing_world(game, mode, &sight, 1, index * share, share)?;
         for agent in agents {
             let queue = LevelQueue::Uniform { first: 0, last: 63 };
             world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
@@ -151,8 +161,10 @@ fn simulate(game: &dyn Game, kind: ObservationKind, args: &Args) -> Result<Measu
 
 /// PPO with 3 epochs and 8 minibatches: on state vectors with 256 steps a rollout, on pictures with 32 and the
 /// Nature-CNN.
-fn train(game: &dyn Game, kind: ObservationKind, args: &Args) -> Result<Measure, CliError> {
+fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> Result<Measure, CliError> {
     let mut experiment = ExperimentArgs::default().load([])?;
+    experiment.game = game.name().to_owned();
+    (experiment.train, experiment.test) = (levels(mode, 0), levels(mode, 64));
     experiment.observation = kind;
     experiment.arenas = args.arenas;
     experiment.worlds = args.threads as u32;
@@ -174,6 +186,11 @@ fn train(game: &dyn Game, kind: ObservationKind, args: &Args) -> Result<Measure,
     let mut parts = stages(trainer.worlds_mut(), steps);
     parts["learn"] = json!(microseconds(learn_s * args.threads as f64, steps));
     Ok(Measure { steps_per_s, parts })
+}
+
+/// 64 levels of a mode.
+fn levels(mode: &str, first: u64) -> LevelSplit {
+    LevelSplit { mode: mode.to_owned(), first, last: first + 63 }
 }
 
 /// Microseconds per step that the Worlds' threads spent in each part of their ticks.

@@ -20,6 +20,8 @@ use bevy_playbot::{
 };
 use thiserror::Error;
 
+use crate::maze::{MapError, MazeError};
+
 /// How a command that worked ended.
 pub enum Outcome {
     /// Nothing to complain about.
@@ -67,6 +69,10 @@ pub enum CliError {
     #[error(transparent)]
     Name(#[from] UnknownName),
     #[error(transparent)]
+    Map(#[from] MapError),
+    #[error(transparent)]
+    Maze(#[from] MazeError),
+    #[error(transparent)]
     Mode(#[from] ModeError),
     #[error(transparent)]
     Split(#[from] SplitError),
@@ -113,6 +119,8 @@ impl CliError {
         match self {
             Self::Usage(_)
             | Self::Name(_)
+            | Self::Map(_)
+            | Self::Maze(_)
             | Self::Mode(_)
             | Self::Split(_)
             | Self::Config(_)

@@ -18,21 +18,24 @@ use super::{
 };
 use crate::registry;
 
-/// Records the game's demonstrator: a bot that plans, with some of its actions replaced by random ones.
+/// Records the game's demonstrator: a bot that plans, with noise on its actions.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot record coinrun --levels hard:0..9 --out my.demo
-  playbot record coinrun --levels easy:0..499 --noise 0.2 --steps 100000 --out demos/coinrun/easy.demo")]
+  playbot record coinrun --levels easy:0..499 --noise 0.2 --steps 100000 --out demos/coinrun/easy.demo
+  playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included; played in order, again and again until --steps is reached.
-    #[arg(long, default_value = "easy:0..499")]
-    levels: LevelSplit,
+    /// Levels, as mode:first..last, both included; played in order, again and again until --steps is reached. Without it
+    /// levels 0 to 499 of the game's first mode.
+    #[arg(long)]
+    levels: Option<LevelSplit>,
     /// File to write.
     #[arg(long)]
     out: PathBuf,
-    /// Probability with which an action is replaced by a uniformly random one.
+    /// Discrete actions: probability with which one is replaced by a uniformly random one. Continuous actions: standard
+    /// deviation of the normal noise on each value, before it is clipped.
     #[arg(long, default_value_t = 0.0)]
     noise: f64,
     /// Stop after exactly this many steps; without it, after one round of the levels.
@@ -50,15 +53,14 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
-    game.check_mode(&args.levels.mode)?;
-    if !(0.0..=1.0).contains(&args.noise) {
-        return Err(CliError::Usage(format!("--noise is {}; a probability lies between 0 and 1", args.noise)));
-    }
+    let levels = args.levels.clone().unwrap_or_else(|| usual_levels(game));
+    game.check_mode(&levels.mode)?;
+    check_noise(game, args.noise)?;
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
     }
-    let writer = open_writer(game, &args)?;
-    let (mut world, agents) = build_world(game, &args.levels.mode, args.seed, 0, 1);
+    let writer = open_writer(game, &levels.mode, &args)?;
+    let (mut world, agents) = build_world(game, &levels.mode, args.seed, 0, 1);
     let agent = agents[0];
     game.arm_demonstrator(&mut world, agent, args.noise);
     let mut recorder = Recorder::new(writer);
@@ -66,8 +68,8 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         recorder = recorder.with_step_limit(steps);
     }
     world.insert_resource(recorder);
-    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue(&args)));
-    play(&mut world, agent, &args)?;
+    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue(&levels, args.steps)));
+    play(&mut world, agent, &levels, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let count = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let share = 100.0 * count.successes as f64 / count.finished.max(1) as f64;
@@ -75,9 +77,23 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-fn open_writer(game: &dyn Game, args: &Args) -> Result<DemoWriter, CliError> {
-    let mut header =
-        DemoHeader::new(game.name(), game.version(), &args.levels.mode, game.tick_hz(), demo_actions(&game.actions()));
+fn usual_levels(game: &dyn Game) -> LevelSplit {
+    LevelSplit { mode: game.modes().first().copied().unwrap_or_default().to_owned(), first: 0, last: 499 }
+}
+
+/// A probability for discrete actions, a standard deviation for continuous ones.
+fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
+    let (fits, wanted) = match game.actions() {
+        ActionSpace::Discrete(_) => ((0.0..=1.0).contains(&noise), "a probability lies between 0 and 1"),
+        ActionSpace::Continuous(_) => {
+            (noise.is_finite() && noise >= 0.0, "a standard deviation is a finite number, 0 or more")
+        }
+    };
+    if fits { Ok(()) } else { Err(CliError::Usage(format!("--noise is {noise}; {wanted}"))) }
+}
+
+fn open_writer(game: &dyn Game, mode: &str, args: &Args) -> Result<DemoWriter, CliError> {
+    let mut header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), demo_actions(&game.actions()));
     header.demonstrator = game.demonstrator().unwrap_or("none").to_owned();
     header.action_noise = args.noise;
     if args.observations {
@@ -87,22 +103,27 @@ fn open_writer(game: &dyn Game, args: &Args) -> Result<DemoWriter, CliError> {
 }
 
 /// One round of the levels, or as many rounds as the steps can need: every level takes at least one step.
-fn queue(args: &Args) -> LevelQueue {
-    let rounds = args.steps.map_or(1, |steps| steps.div_ceil(args.levels.len()));
-    LevelQueue::list((0..rounds).flat_map(|_| args.levels.levels()).collect::<Vec<_>>())
+fn queue(levels: &LevelSplit, steps: Option<u64>) -> LevelQueue {
+    let rounds = steps.map_or(1, |steps| steps.div_ceil(levels.len()));
+    LevelQueue::list((0..rounds).flat_map(|_| levels.levels()).collect::<Vec<_>>())
 }
 
-fn play(world: &mut bevy::prelude::World, agent: bevy::prelude::Entity, args: &Args) -> Result<(), CliError> {
+fn play(
+    world: &mut bevy::prelude::World,
+    agent: bevy::prelude::Entity,
+    levels: &LevelSplit,
+    steps: Option<u64>,
+) -> Result<(), CliError> {
     interrupt::listen();
-    let (length, unit) = args.steps.map_or((args.levels.len(), "levels"), |steps| (steps, "steps"));
+    let (length, unit) = steps.map_or((levels.len(), "levels"), |steps| (steps, "steps"));
     let bar = progress::bar("record", length, unit);
     loop {
         world.tick()?;
         let recorder = world.resource::<Recorder>();
-        let done = if args.steps.is_some() { recorder.steps() } else { recorder.episodes() };
+        let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
         bar.set_position(done);
         let idle = !world.get::<Control>(agent).is_some_and(|control| control.is_active());
-        if idle || args.steps.is_some_and(|steps| done >= steps) || interrupt::asked() {
+        if idle || steps.is_some_and(|steps| done >= steps) || interrupt::asked() {
             break;
         }
     }

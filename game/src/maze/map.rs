@@ -1,6 +1,9 @@
 //! The map of a mode: one of the fixed ones, or a generated one for each seed.
 
+use std::{fmt, str::FromStr};
+
 use bevy_playbot::game::UnknownName;
+use thiserror::Error;
 
 use super::{error::MazeError, fixed, generator::generate, layout::Maze, spec::MazeSpec, spec_text::OptionError};
 
@@ -17,6 +20,20 @@ pub enum Map {
     Xl,
     /// Another maze for each seed.
     Random(MazeSpec),
+}
+
+/// The text is no map.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum MapError {
+    /// No map, or no option, has this name.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
+    /// The value of an option cannot be read.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// There can be no such maze.
+    #[error(transparent)]
+    Maze(#[from] MazeError),
 }
 
 impl Map {
@@ -118,5 +135,60 @@ impl Map {
             Self::Xl => fixed::antmaze::xl(),
             Self::Random(spec) => generate(spec, seed)?,
         })
+    }
+}
+
+impl FromStr for Map {
+    type Err = MapError;
+
+    /// Reads a name with the map's options behind it: `medium`, `random+size=9x9+loops=0.2`.
+    fn from_str(text: &str) -> Result<Self, MapError> {
+        let mut words = text.split('+');
+        let mut map = Self::named(words.next().unwrap_or_default())?;
+        for word in words {
+            let (key, value) = word.split_once('=').unwrap_or((word, ""));
+            if !map.set_option(key, value)? {
+                return Err(UnknownName::new("map option", word, map.valid_options()).into());
+            }
+        }
+        map.check()?;
+        Ok(map)
+    }
+}
+
+impl fmt::Display for Map {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        self.options().iter().try_for_each(|option| write!(f, "+{option}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_reads_back_without_defaults() {
+        for text in ["medium", "random", "random+size=9x13+loops=0.25+corridor=2+difficulty=5..8"] {
+            assert_eq!(text.parse::<Map>().expect("a map").to_string(), text);
+        }
+        assert_eq!("random+size=11x11+loops=0.10".parse::<Map>().expect("a map").to_string(), "random");
+        let one: Map = "random+difficulty=7".parse().expect("a map");
+        assert_eq!(one.to_string(), "random+difficulty=7..7");
+    }
+
+    #[test]
+    fn what_cannot_be_read_says_what_can() {
+        let error = |text: &str| text.parse::<Map>().expect_err("no map").to_string();
+        assert!(error("medum").contains("did you mean `medium`"), "{}", error("medum"));
+        assert!(error("random+lops=0.1").contains("did you mean `loops=0.2`"), "{}", error("random+lops=0.1"));
+        assert!(error("medium+loops=0.1").contains("unknown map option"));
+        assert!(error("random+size=9").contains("rows x columns"));
+        assert!(error("random+size=9x5000").contains("too large"));
+        assert!(error("random+size=4x9").contains("no room"));
+        assert!(error("random+corridor=0").contains("at least 1"));
+        assert!(error("random+loops=1.5").contains("between 0 and 1"));
+        assert!(error("random+loops=NaN").contains("between 0 and 1"));
+        assert!(error("random+difficulty=9..3").contains("fewest and the most"));
     }
 }

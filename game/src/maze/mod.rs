@@ -24,7 +24,7 @@ pub use distances::Distances;
 pub use error::MazeError;
 pub use generator::generate;
 pub use layout::{MAX_CELLS, MAX_SIDE, Maze};
-pub use map::Map;
+pub use map::{Map, MapError};
 pub use planner::{GridMove, Planner};
 pub use spec::{HELD_OUT_SEEDS, MazeSpec, TRAIN_SEEDS};
 pub use spec_text::OptionError;

@@ -76,6 +76,10 @@ impl GameWindow {
         app.world_mut().entity_mut(agent).insert((Control::Human, keys, playlist.queue()));
         app.insert_resource(seats).insert_resource(playlist);
         camera::build(&mut app, picture.width);
+        #[cfg(feature = "view3d")]
+        if app.is_plugin_added::<crate::antview::AntViewPlugin>() {
+            super::solid::build(&mut app);
+        }
         ending::build(&mut app, stop);
         keys::build(&mut app);
         pace::build(&mut app);

@@ -44,9 +44,14 @@ impl Zoom {
         self.steps = (self.steps - 1).max(0);
     }
 
+    /// How many times as much is seen as at the nearest.
+    pub fn factor(&self) -> f32 {
+        (0..self.steps).fold(1.0, |factor, _| factor * ZOOM_STEP)
+    }
+
     /// World units from left to right.
     fn side(&self) -> f32 {
-        (0..self.steps).fold(self.width, |side, _| side * ZOOM_STEP)
+        self.width * self.factor()
     }
 
     fn scaling(&self) -> ScalingMode {

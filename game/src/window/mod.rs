@@ -1,7 +1,8 @@
 //! A window in which a person plays, and hands over to a policy or a bot and back.
 //!
 //! The game runs as it does without a window: its rules, the recorder and the policy see fixed ticks only, so that what
-//! was recorded here replays headless. The window adds a clock, a keyboard and a camera.
+//! was recorded here replays headless. The window adds a clock, a keyboard and a camera, and with the feature `view3d` a view in
+//! space for games that have one.
 
 mod app;
 mod camera;
@@ -12,6 +13,8 @@ mod pace;
 mod playlist;
 mod score;
 mod seats;
+#[cfg(feature = "view3d")]
+mod solid;
 mod title;
 
 pub use app::{GameWindow, WindowSetup};

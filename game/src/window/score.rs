@@ -16,10 +16,11 @@ pub(super) struct LastEpisode(Option<EpisodeEnded>);
 impl LastEpisode {
     /// How it ended, in words.
     pub fn words(&self) -> Option<String> {
-        let EpisodeEnded { level, end, ticks, .. } = self.0?;
+        let EpisodeEnded { level, end, success, ticks, .. } = self.0?;
         let how = match end {
             EpisodeEnd::Terminated { success: true } => "won",
             EpisodeEnd::Terminated { success: false } => "lost",
+            EpisodeEnd::Truncated if success => "reached the goal, time was up",
             EpisodeEnd::Truncated => "out of time",
         };
         Some(format!("level {level} {how} after {ticks} ticks"))
@@ -35,7 +36,7 @@ fn note_end(
     mut queues: Query<&mut LevelQueue>,
 ) {
     last.0 = Some(*event);
-    if event.end.is_success() {
+    if event.success {
         playlist.advance();
     }
     if let Ok(mut queue) = queues.get_mut(seats.agent) {

@@ -25,6 +25,8 @@ pub const SUCCESS_RATE: &str = "charts/success_rate";
 pub const EPISODIC_RETURN: &str = "charts/episodic_return";
 /// Tag of the mean length of the last 100 episodes, ticks.
 pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
+/// Tag of the share of clipped actions in the last 100 episodes.
+pub const CLIPPED_SHARE: &str = "charts/clipped_share";
 /// Tag of the environment steps per second.
 pub const SPS: &str = "charts/SPS";
 /// Tag of the number of episodes that have ended.

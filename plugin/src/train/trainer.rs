@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Instant};
 
 use bevy::prelude::World;
-use playbot_learner::{DeviceKind, LearnError, Policy, Rollout, SkillModel};
+use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -13,7 +13,7 @@ use super::{
     collect::Collector,
     config::{Algorithm, Experiment, ExperimentError},
     learner::{Learner, LearnerMetrics},
-    metrics_log::{EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
+    metrics_log::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
     worlds::on_threads,
 };
 use crate::{
@@ -98,6 +98,9 @@ pub(crate) struct RecentEpisode {
     total_reward: f64,
     ticks: u32,
     success: bool,
+    /// Ticks whose action was clipped; missing in checkpoints from before it was counted.
+    #[serde(default)]
+    clipped: u32,
 }
 
 /// What one update brought. Everything in it is the same in every run with the same seed, except `timing`.
@@ -115,6 +118,9 @@ pub struct UpdateReport {
     pub episodic_length: Option<f64>,
     /// Success rate of the last 100 episodes.
     pub success_rate: Option<f64>,
+    /// Share of the ticks of the last 100 episodes whose action was clipped to the game's range; only for continuous
+    /// actions.
+    pub clipped_share: Option<f64>,
     /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
     pub initial_kl: Option<f32>,
     /// What the learner reports.
@@ -131,6 +137,7 @@ impl UpdateReport {
             (EPISODIC_RETURN, self.episodic_return),
             (EPISODIC_LENGTH, self.episodic_length),
             (SUCCESS_RATE, self.success_rate),
+            (CLIPPED_SHARE, self.clipped_share),
             ("score/initial_kl", self.initial_kl.map(f64::from)),
         ];
         let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
@@ -224,7 +231,10 @@ impl Trainer {
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();
         let timing = Timing { collect_s, learn_s: start.elapsed().as_secs_f64() - collect_s };
-        Ok(self.progress.report(learner, initial_kl, timing))
+        let mut report = self.progress.report(learner, initial_kl, timing);
+        report.clipped_share =
+            report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
+        Ok(report)
     }
 
     /// Before the first update of SCORE, the policy must be the decoder, to the bit.
@@ -288,7 +298,8 @@ impl Progress {
         self.recent.extend(finished.iter().map(|episode| RecentEpisode {
             total_reward: episode.total_reward,
             ticks: episode.ticks,
-            success: episode.end.is_success(),
+            success: episode.success,
+            clipped: episode.clipped,
         }));
         let surplus = self.recent.len().saturating_sub(RECENT);
         self.recent.drain(..surplus);
@@ -306,6 +317,12 @@ impl Progress {
 
     fn success_rate(&self) -> Option<f64> {
         self.mean(|episode| f64::from(u8::from(episode.success)))
+    }
+
+    /// Share of the clipped ticks among those of the last episodes.
+    fn clipped_share(&self) -> Option<f64> {
+        let ticks = self.mean(|episode| f64::from(episode.ticks)).filter(|ticks| *ticks > 0.0)?;
+        Some(self.mean(|episode| f64::from(episode.clipped))? / ticks)
     }
 
     /// How good the policy is, where enough episodes have ended to say so.
@@ -326,6 +343,7 @@ impl Progress {
             episodic_return: self.episodic_return(),
             episodic_length: self.mean(|episode| f64::from(episode.ticks)),
             success_rate: self.success_rate(),
+            clipped_share: self.clipped_share(),
             initial_kl,
             learner,
             timing,

@@ -15,6 +15,7 @@ use super::{player::PlayerArgs, recording::Existing};
   R, N       play the level again, go to the next one
   P          pause
   -, =       see more, see less
+  V          ants from above or in space, in a program with the feature view3d
   Escape     end, as do Ctrl-Q and closing the window
 
 A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.

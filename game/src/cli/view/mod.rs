@@ -204,7 +204,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
     if args.json {
         print_line(json!({
             "path": path.to_string(), "bytes": written.bytes, "width": width, "height": height,
-            "frames": written.frames, "ticks": stage.ticks(), "end": stage.end(), "player": written.player,
+            "frames": written.frames, "ticks": stage.ticks(), "end": stage.end().map(|ended| ended.end), "player": written.player,
             "level": stage.level(), "divergence": stage.divergence().map(ToString::to_string),
         }))?;
     } else {

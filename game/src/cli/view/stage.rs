@@ -41,7 +41,7 @@ pub struct Stage {
 }
 
 #[derive(Resource, Default)]
-struct End(Option<EpisodeEnd>);
+struct End(Option<EpisodeEnded>);
 
 impl Stage {
     /// A level that a player plays.
@@ -73,7 +73,7 @@ impl Stage {
         let (mut world, agents) = build_seeing_world(game, mode, sight, 0, 0, 1)?;
         let agent = agents[0];
         world.init_resource::<End>();
-        world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(ended.end));
+        world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(*ended));
         // The sensor for pictures has taken the place of the vector, which a player may read.
         let vector = VectorSensor::new(game.observation().names);
         world.entity_mut(agent).insert((vector, LevelQueue::Always(level)));
@@ -136,7 +136,7 @@ impl Stage {
     }
 
     /// How the episode ended, once it has.
-    pub fn end(&self) -> Option<EpisodeEnd> {
+    pub fn end(&self) -> Option<EpisodeEnded> {
         self.world.resource::<End>().0
     }
 
@@ -147,10 +147,11 @@ impl Stage {
 }
 
 /// How an episode ended.
-pub fn end_in_words(end: EpisodeEnd) -> &'static str {
-    match end {
+pub fn end_in_words(ended: EpisodeEnded) -> &'static str {
+    match ended.end {
         EpisodeEnd::Terminated { success: true } => "won",
         EpisodeEnd::Terminated { success: false } => "lost",
+        EpisodeEnd::Truncated if ended.success => "reached the goal, time was up",
         EpisodeEnd::Truncated => "out of time",
     }
 }

@@ -1,6 +1,4 @@
-//! `playbot level`.
-
-use std::path::PathBuf;
+//! `playbot level coinrun`.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -11,45 +9,31 @@ use bevy_playbot::{
 };
 use serde_json::json;
 
-use super::{
-    error::{CliError, Outcome, print_line},
-    view::{self, film::Film},
-};
+use super::Args;
 use crate::{
+    cli::{
+        error::{CliError, Outcome, print_line},
+        view::{self, film::Film},
+    },
     coinrun::{Level, Mode, components::PlaysIn, generate},
     registry,
 };
 
-/// Shows the layout of a level.
-#[derive(clap::Args)]
-#[command(
-    after_help = "Examples:\n  playbot level coinrun --mode hard --seed 7\n  playbot level coinrun --mode easy --seed 0 --json\n  playbot level coinrun --seed 7 --png level.png"
-)]
-pub struct Args {
-    /// Name of the game.
-    game: String,
-    /// Mode of the game.
-    #[arg(long, default_value = "hard")]
-    mode: String,
-    /// Seed of the level.
-    #[arg(long, default_value_t = 0)]
-    seed: u32,
-    /// Print one line of JSON instead of a picture.
-    #[arg(long)]
-    json: bool,
-    /// Also draw the whole level, 16 pixels to the tile, into this file.
-    #[arg(long, value_name = "FILE")]
-    png: Option<PathBuf>,
-}
-
 const LEGEND: &str =
     "A start  C coin  # = ground  ~ ^ lava  S saw  < > enemy and where it goes  x crate  | enemies turn here";
 
-pub fn run(args: Args) -> Result<Outcome, CliError> {
-    let game = registry::game(&args.game)?;
-    game.check_mode(&args.mode)?;
-    let mode: Mode = args.mode.parse().map_err(|error| CliError::Usage(format!("{error}")))?;
-    let level = generate(mode, args.seed);
+/// Shows a level of CoinRun.
+pub fn show(args: &Args) -> Result<Outcome, CliError> {
+    if args.map.is_some() {
+        return Err(CliError::Usage("CoinRun has no maps: name a --mode and a --seed".to_owned()));
+    }
+    let game = registry::game("coinrun")?;
+    let mode = args.mode.as_deref().unwrap_or("hard");
+    game.check_mode(mode)?;
+    let mode: Mode = mode.parse().map_err(|error| CliError::Usage(format!("{error}")))?;
+    let seed = u32::try_from(args.seed.unwrap_or(0))
+        .map_err(|_| CliError::Usage("CoinRun's seeds have 32 bits: choose one up to 4294967295".to_owned()))?;
+    let level = generate(mode, seed);
     if let Some(path) = &args.png {
         view::write(path, &draw(game, &level)?)?;
     }

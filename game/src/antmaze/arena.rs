@@ -1,0 +1,36 @@
+//! Building a level as entities.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use bevy_playbot::{fault::Faults, prelude::*};
+
+use super::{
+    components::{AntMazeRules, InMaze, MazeAnt, PlaysIn},
+    level::{AntMazeLevel, generate},
+    walls::wall_boxes,
+};
+use crate::ant::AntBody;
+
+/// Makes the level an episode asks for and puts the agent's ant into it.
+pub(super) fn start_episode(
+    event: On<StartEpisode>,
+    rules: Res<AntMazeRules>,
+    agents: Query<&Agent, With<PlaysIn>>,
+    mut faults: ResMut<Faults>,
+    mut commands: Commands,
+) {
+    let Ok(agent) = agents.get(event.entity) else { return };
+    match generate(&rules.0, event.level) {
+        Ok(level) => build(&mut commands, event.entity, level),
+        Err(error) => faults.report(format!("agent {}, level {}: {error}", agent.index, event.level)),
+    }
+}
+
+/// Puts an agent with a new ant into a level. The physics begins anew with every episode: what happened in the last one
+/// changes nothing, not even the order in which contacts are solved.
+fn build(commands: &mut Commands, agent: Entity, level: AntMazeLevel) {
+    let mut body = AntBody::new(&wall_boxes(&level.maze));
+    body.set_state(&level.reset);
+    commands.entity(agent).insert((MazeAnt(body), InMaze(Arc::new(level))));
+}

@@ -1,0 +1,24 @@
+//! The game as entities: an agent with its ant, and the arena it is drawn in.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+
+use super::{level::AntMazeLevel, mode::AntMazeMode};
+use crate::ant::AntBody;
+
+/// Mode in which levels are made.
+#[derive(Resource, Clone, Debug, PartialEq)]
+pub struct AntMazeRules(pub AntMazeMode);
+
+/// The level that an agent plays. Comes with its first episode.
+#[derive(Component, Clone, Debug)]
+pub struct InMaze(pub Arc<AntMazeLevel>);
+
+/// An agent's ant with the floor and the walls around it: a physics world of its own. Comes with the first episode.
+#[derive(Component)]
+pub struct MazeAnt(pub AntBody);
+
+/// The arena of an agent: what is drawn around it belongs to this entity.
+#[derive(Component, Clone, Copy, Debug)]
+pub struct PlaysIn(pub Entity);

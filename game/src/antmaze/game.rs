@@ -1,0 +1,100 @@
+//! AntMaze for the trainer, the evaluation and the replay.
+
+use std::sync::{Arc, LazyLock};
+
+use bevy::prelude::*;
+use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
+
+use super::{
+    components::PlaysIn, demonstrator_bot::DemonstratorBot, mode::AntMazeMode, picture::AntMazePicturePlugin,
+    plugin::AntMazePlugin, steering, view,
+};
+use crate::{
+    ant::{
+        game::{ANT_HZ, action_names},
+        skeleton::JOINTS,
+    },
+    antview,
+    maze::Map,
+};
+
+/// AntMaze under its name `antmaze`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AntMaze;
+
+static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: view::names() }));
+
+/// Makes an arena with an idle agent, and returns the agent.
+pub fn spawn_agent(world: &mut World, index: u32) -> Entity {
+    let arena = world.spawn_empty().id();
+    world
+        .spawn((
+            Agent::new(index, ActionSpace::Continuous(JOINTS)),
+            VectorSensor::from_space(SPACE.clone()),
+            PlaysIn(arena),
+        ))
+        .id()
+}
+
+impl Game for AntMaze {
+    fn name(&self) -> &'static str {
+        "antmaze"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &Map::NAMES
+    }
+
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        mode.parse::<AntMazeMode>().map(drop).map_err(|error| error.of(mode))
+    }
+
+    fn tick_hz(&self) -> f64 {
+        ANT_HZ
+    }
+
+    fn actions(&self) -> ActionSpace {
+        ActionSpace::Continuous(JOINTS)
+    }
+
+    fn action_names(&self) -> Vec<String> {
+        action_names()
+    }
+
+    fn input_map(&self) -> Option<InputMap> {
+        Some(steering::input_map())
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        (**SPACE).clone()
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        let mode = mode.parse().expect("callers check the mode with `check_mode`");
+        app.add_plugins(AntMazePlugin { mode });
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: antview::VIEW })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(AntMazePicturePlugin);
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        spawn_agent(world, index)
+    }
+
+    fn demonstrator(&self) -> Option<&'static str> {
+        Some("waypoints")
+    }
+
+    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+}

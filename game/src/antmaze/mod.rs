@@ -1,0 +1,30 @@
+//! AntMaze: a quadruped walks through a maze to a goal that it does not see.
+//!
+//! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`]) and a
+//! seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at the time
+//! limit, never because the ant has fallen over.
+
+mod arena;
+pub mod components;
+mod demonstrator_bot;
+pub mod game;
+pub mod geometry;
+pub mod level;
+pub mod mode;
+pub mod picture;
+pub mod play;
+pub mod plugin;
+mod steering;
+pub mod view;
+pub mod walker;
+pub mod walls;
+pub mod waypoints;
+
+pub use demonstrator_bot::DemonstratorBot;
+pub use game::AntMaze;
+pub use level::{AntMazeLevel, generate};
+pub use mode::{AntMazeMode, AntMazeModeError, GoalNoise, Goals, Pay};
+pub use plugin::{AntMazePlugin, AntMazeSystems};
+pub use walker::{Walker, WalkerError};
+pub use walls::wall_boxes;
+pub use waypoints::Waypoints;

@@ -1,0 +1,256 @@
+//! Modes of the game: a map and what is to be done on it, as text.
+
+use std::{fmt, str::FromStr};
+
+use bevy_playbot::{game::UnknownName, mode::ModeError};
+use thiserror::Error;
+
+use crate::maze::{Cell, Map, MazeError, OptionError, fixed::antmaze};
+
+/// What a level of AntMaze is made of. Written as the map and its options, `large+sparse+limit=500`; what is left out is as
+/// in [`AntMazeMode::on`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct AntMazeMode {
+    /// The maze.
+    pub map: Map,
+    /// What the ant is paid.
+    pub pay: Pay,
+    /// The cell of the goal.
+    pub goals: Goals,
+    /// Where in its cell the goal is.
+    pub goal_noise: GoalNoise,
+    /// Whether the ant starts in a random free cell, U(0, 1) metre beyond its centre along each axis, instead of the
+    /// maze's start. Written `random-start`.
+    pub random_start: bool,
+    /// Ticks of 0.1 s after which an episode is truncated, at least 1. Written `limit=500`.
+    pub limit: u32,
+}
+
+/// What the ant is paid for each tick, by its distance to the goal after the tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pay {
+    /// Minus the distance in metres, as in D4RL.
+    #[default]
+    Distance,
+    /// exp(-distance), as in Gymnasium-Robotics. Written `dense=exp`.
+    Exponential,
+    /// 1 at the goal and 0 elsewhere. Written `sparse`.
+    Sparse,
+}
+
+/// Which cell the goal is in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Goals {
+    /// The maze's goal.
+    #[default]
+    Fixed,
+    /// One of those of the map's demonstrations, drawn from the level's seed. Written `goals=demo`.
+    Demo,
+    /// Any free cell but the maze's start, drawn from the level's seed. Written `goals=random`.
+    Random,
+}
+
+/// Where in its cell the goal is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GoalNoise {
+    /// In the middle.
+    #[default]
+    None,
+    /// U(0, 1) + U(0, 0.5) metres beyond the middle along each axis, drawn from the level's seed. Written
+    /// `goal-noise=d4rl`.
+    ///
+    /// D4RL's first versions draw it once for all episodes: that is one level seed. Its last one draws it for each.
+    D4rl,
+}
+
+/// The text is not a mode of AntMaze.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum AntMazeModeError {
+    /// No such map, or no such option.
+    #[error(transparent)]
+    Unknown(#[from] UnknownName),
+    /// The value of an option makes no sense.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// There can be no such maze.
+    #[error(transparent)]
+    Maze(#[from] MazeError),
+    /// An option is given twice, or with its opposite.
+    #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
+    Twice(String),
+}
+
+impl AntMazeModeError {
+    /// The error as games give it: for this mode.
+    pub fn of(self, mode: &str) -> ModeError {
+        match self {
+            Self::Unknown(unknown) => unknown.into(),
+            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
+        }
+    }
+}
+
+/// Options of every map.
+const OPTIONS: [&str; 7] =
+    ["sparse", "dense=exp", "goals=demo", "goals=random", "goal-noise=d4rl", "random-start", "limit=1000"];
+
+impl AntMazeMode {
+    /// The mode in which results are compared: dense reward, fixed start and goal, and time for 1000 ticks, on the smallest
+    /// map for 700.
+    pub fn on(map: Map) -> Self {
+        let (pay, goals, goal_noise) = (Pay::default(), Goals::default(), GoalNoise::default());
+        Self { limit: usual_limit(&map), map, pay, goals, goal_noise, random_start: false }
+    }
+
+    /// The goals that demonstrations on this map have; none on a generated one.
+    pub fn demo_goals(&self) -> &'static [Cell] {
+        match self.map {
+            Map::Umaze => &antmaze::UMAZE_DEMO_GOALS,
+            Map::Medium => &antmaze::MEDIUM_DEMO_GOALS,
+            Map::Large => &antmaze::LARGE_DEMO_GOALS,
+            Map::Xl => &antmaze::XL_DEMO_GOALS,
+            Map::Random(_) => &[],
+        }
+    }
+
+    fn set(&mut self, option: &str) -> Result<(), AntMazeModeError> {
+        let (key, value) = option.split_once('=').unwrap_or((option, ""));
+        match option {
+            "sparse" => self.pay = Pay::Sparse,
+            "dense=exp" => self.pay = Pay::Exponential,
+            "goals=fixed" => self.goals = Goals::Fixed,
+            "goals=demo" => self.goals = Goals::Demo,
+            "goals=random" => self.goals = Goals::Random,
+            "goal-noise=none" => self.goal_noise = GoalNoise::None,
+            "goal-noise=d4rl" => self.goal_noise = GoalNoise::D4rl,
+            "random-start" => self.random_start = true,
+            _ if key == "limit" => {
+                let ticks = value.parse().ok().filter(|ticks| *ticks > 0);
+                self.limit = ticks.ok_or_else(|| wrong(key, value, "write ticks, at least 1, as in limit=1000"))?;
+            }
+            _ if self.map.set_option(key, value)? => {}
+            _ => {
+                let valid: Vec<_> = OPTIONS.iter().chain(self.map.valid_options()).copied().collect();
+                return Err(UnknownName::new("option", option, &valid).into());
+            }
+        }
+        Ok(())
+    }
+
+    fn check(self) -> Result<Self, AntMazeModeError> {
+        self.map.check()?;
+        if self.goals == Goals::Demo && self.demo_goals().is_empty() {
+            let why = "generated mazes have no goals of demonstrations; take goals=random";
+            return Err(wrong("goals", "demo", why).into());
+        }
+        Ok(self)
+    }
+}
+
+fn usual_limit(map: &Map) -> u32 {
+    if *map == Map::Umaze { 700 } else { 1000 }
+}
+
+fn wrong(key: &str, value: &str, wanted: &'static str) -> OptionError {
+    OptionError { key: key.to_owned(), value: value.to_owned(), wanted }
+}
+
+/// What an option is about, so that it is said only once.
+fn subject(option: &str) -> &str {
+    match option.split_once('=').map_or(option, |(key, _)| key) {
+        "dense" => "sparse",
+        key => key,
+    }
+}
+
+impl FromStr for AntMazeMode {
+    type Err = AntMazeModeError;
+
+    fn from_str(text: &str) -> Result<Self, AntMazeModeError> {
+        let mut parts = text.split('+');
+        let mut mode = Self::on(Map::named(parts.next().unwrap_or_default())?);
+        let options: Vec<_> = parts.collect();
+        for (index, option) in options.iter().enumerate() {
+            if options[..index].iter().any(|earlier| subject(earlier) == subject(option)) {
+                return Err(AntMazeModeError::Twice((*option).to_owned()));
+            }
+            mode.set(option)?;
+        }
+        mode.check()
+    }
+}
+
+impl fmt::Display for AntMazeMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.map.name())?;
+        self.map.options().iter().try_for_each(|option| write!(f, "+{option}"))?;
+        f.write_str(match self.pay {
+            Pay::Distance => "",
+            Pay::Exponential => "+dense=exp",
+            Pay::Sparse => "+sparse",
+        })?;
+        f.write_str(match self.goals {
+            Goals::Fixed => "",
+            Goals::Demo => "+goals=demo",
+            Goals::Random => "+goals=random",
+        })?;
+        f.write_str(match self.goal_noise {
+            GoalNoise::None => "",
+            GoalNoise::D4rl => "+goal-noise=d4rl",
+        })?;
+        f.write_str(if self.random_start { "+random-start" } else { "" })?;
+        if self.limit == usual_limit(&self.map) { Ok(()) } else { write!(f, "+limit={}", self.limit) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        text.parse::<AntMazeMode>().expect_err("not a mode").to_string()
+    }
+
+    #[test]
+    fn modes_are_read_as_they_are_written() {
+        for text in [
+            "umaze",
+            "medium",
+            "large+sparse",
+            "xl+goals=demo+goal-noise=d4rl+random-start+limit=500",
+            "random+size=9x13+loops=0.25+corridor=2+dense=exp+goals=random",
+        ] {
+            assert_eq!(text.parse::<AntMazeMode>().expect("a mode").to_string(), text);
+        }
+    }
+
+    #[test]
+    fn what_is_usual_is_left_out() {
+        let written = |text: &str| text.parse::<AntMazeMode>().expect("a mode").to_string();
+        assert_eq!(written("umaze+limit=700+goals=fixed+goal-noise=none"), "umaze");
+        assert_eq!(written("medium+limit=700"), "medium+limit=700");
+        assert_eq!(written("large+random-start+sparse"), "large+sparse+random-start");
+        let mode: AntMazeMode = "medium".parse().expect("a mode");
+        assert_eq!(mode, AntMazeMode::on(Map::Medium));
+        assert_eq!((mode.limit, mode.pay, mode.random_start), (1000, Pay::Distance, false));
+    }
+
+    #[test]
+    fn errors_name_what_would_be_right() {
+        for (text, words) in [
+            ("medum", &["unknown map `medum`", "did you mean `medium`?", "umaze", "random"][..]),
+            ("medium+spares", &["unknown option `spares`", "did you mean `sparse`?", "limit=1000"]),
+            ("medium+size=9x9", &["unknown option `size=9x9`", "goals=demo"]),
+            ("medium+limit=0", &["limit=0", "at least 1"]),
+            ("medium+limit=many", &["limit=many", "at least 1"]),
+            ("random+goals=demo", &["goals=demo", "goals=random"]),
+            ("random+size=3x3", &["3 x 3"]),
+            ("medium+sparse+dense=exp", &["`dense=exp`", "contradicts"]),
+            ("medium+limit=5+limit=6", &["`limit=6`", "repeats"]),
+            ("", &["unknown map ``", "medium"]),
+        ] {
+            let error = error(text);
+            assert!(words.iter().all(|word| error.contains(word)), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! One tick of every arena.
+
+use bevy::{math::ops, prelude::*};
+use bevy_playbot::{fault::Faults, prelude::*};
+
+use super::{
+    components::{AntMazeRules, InMaze, MazeAnt},
+    geometry::{cell_at, distance},
+    level::AntMazeLevel,
+    mode::Pay,
+    view,
+};
+use crate::ant::AntState;
+
+/// An ant this near to the goal has reached it, metres.
+pub const GOAL_RADIUS: f32 = 0.5;
+/// Heights at which the middle of a torso can be, metres: between the floor and what no jump reaches.
+const HEIGHTS: std::ops::Range<f32> = 0.0..20.0;
+
+/// Physics, reward and end of every ant whose agent plays.
+pub(super) fn play(
+    rules: Res<AntMazeRules>,
+    mut ants: Query<(&Agent, &mut Control, &Action, &InMaze, &mut MazeAnt, &mut Episode, &mut Reward, &mut StateHash)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, mut control, action, level, mut ant, mut episode, mut reward, mut hash) in &mut ants {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        ant.0.step(&torques(action, &mut episode));
+        let state = ant.0.state();
+        if let Some(why) = astray(&state, &level.0) {
+            let Episode { level, tick, .. } = *episode;
+            faults.report(format!("agent {}, level {level}, tick {tick}: {why}", agent.index));
+            *control = Control::Idle;
+            continue;
+        }
+        let away = distance([state.qpos[0], state.qpos[1]], level.0.goal_at);
+        *hash = state.hash();
+        reward.add(pay(rules.0.pay, away));
+        if away <= GOAL_RADIUS {
+            episode.terminate(true);
+        }
+        if episode.tick + 1 >= rules.0.limit {
+            episode.truncate();
+        }
+    }
+}
+
+/// The action within -1..=1, and a note if it was not.
+fn torques(action: &Action, episode: &mut Episode) -> [f32; 8] {
+    let mut torques = [0.0; 8];
+    for (torque, asked) in torques.iter_mut().zip(action.continuous().unwrap_or_default()) {
+        *torque = asked.clamp(-1.0, 1.0);
+    }
+    if action.continuous() != Some(&torques[..]) {
+        episode.note_clipped();
+    }
+    torques
+}
+
+fn pay(pay: Pay, away: f32) -> f32 {
+    match pay {
+        Pay::Distance => -away,
+        Pay::Exponential => ops::exp(-away),
+        Pay::Sparse => f32::from(u8::from(away <= GOAL_RADIUS)),
+    }
+}
+
+/// Why an ant is where none can be.
+fn astray(state: &AntState, level: &AntMazeLevel) -> Option<String> {
+    if !state.is_finite() {
+        let mut named = view::names().into_iter().zip(view::values(state));
+        let (name, value) = named.find(|(_, value)| !value.is_finite())?;
+        return Some(format!("the ant's `{name}` is {value}: its physics has failed"));
+    }
+    let [x, y, z, ..] = state.qpos;
+    let inside = cell_at(&level.maze, [x, y]).is_some() && HEIGHTS.contains(&z);
+    (!inside).then(|| format!("the ant is at ({x}, {y}, {z}), outside the maze: its physics has failed"))
+}
+
+/// Fills the vector of every agent that plays and reads one.
+pub(super) fn observe(mut ants: Query<(&Episode, &MazeAnt, &mut Observation), With<VectorSensor>>) {
+    for (episode, ant, mut observation) in &mut ants {
+        if episode.is_running() {
+            observation.set(view::values(&ant.0.state()));
+        }
+    }
+}

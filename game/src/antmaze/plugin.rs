@@ -1,0 +1,37 @@
+//! AntMaze as a Bevy plugin.
+
+use bevy::prelude::*;
+use bevy_playbot::{prelude::*, vision::VisionSystems};
+
+use super::{arena, components::AntMazeRules, demonstrator_bot, mode::AntMazeMode, play, steering};
+
+/// The tick of AntMaze, in `FixedUpdate`. Add what your game adds before or after it.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct AntMazeSystems;
+
+/// Adds the rules of AntMaze. Agents are made by [`spawn_agent`](super::game::spawn_agent).
+#[derive(Clone, Debug)]
+pub struct AntMazePlugin {
+    /// What levels are made of.
+    pub mode: AntMazeMode,
+}
+
+impl Plugin for AntMazePlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(AntMazeRules(self.mode.clone()))
+            .add_observer(arena::start_episode)
+            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Dress))
+            .add_systems(
+                FixedPreUpdate,
+                (
+                    demonstrator_bot::decide,
+                    // The keyboard has written an action that does nothing.
+                    steering::steer.run_if(resource_exists::<ButtonInput<KeyCode>>),
+                )
+                    .chain()
+                    .after(PlaybotSystems::Decide)
+                    .before(PlaybotSystems::Act),
+            )
+            .add_systems(FixedUpdate, play::play.in_set(AntMazeSystems));
+    }
+}

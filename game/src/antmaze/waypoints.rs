@@ -1,0 +1,122 @@
+//! From cell to cell to the goal.
+
+use bevy_playbot::learner::rng::{ChaCha8Rng, unit};
+
+use super::{
+    geometry::{cell_at, centre_of, distance},
+    level::AntMazeLevel,
+};
+use crate::maze::{Cell, Planner};
+
+/// A waypoint counts as reached at this distance, metres: about the reach of the ant's legs.
+const REACHED: f32 = 1.0;
+
+/// The places that lead to a level's goal, one after the other: the next cell's centre + U(0, 1) metre along each axis,
+/// and at last the goal itself.
+#[derive(Clone, Debug)]
+pub struct Waypoints {
+    planner: Planner,
+    goal_at: [f32; 2],
+    /// The cell that the ant is on its way to, and the place in it.
+    next: Option<(Cell, [f32; 2])>,
+}
+
+impl Waypoints {
+    /// The way to the goal of a level, from everywhere.
+    pub fn new(level: &AntMazeLevel) -> Self {
+        Self { planner: Planner::new(&level.maze, level.goal), goal_at: level.goal_at, next: None }
+    }
+
+    /// Where an ant at this place `[x, y]` should go.
+    ///
+    /// It keeps to a waypoint until it is there, or until it has been pushed to where another cell is next.
+    pub fn next(&mut self, level: &AntMazeLevel, at: [f32; 2], rng: &mut ChaCha8Rng) -> [f32; 2] {
+        let Some(here) = cell_at(&level.maze, at).filter(|&cell| level.maze.is_free(cell)) else {
+            // Its middle is over a wall, which it cannot stay on.
+            return self.next.map_or(self.goal_at, |(_, place)| place);
+        };
+        let from = match self.next {
+            Some((cell, place)) if distance(at, place) <= REACHED => cell,
+            Some((cell, place)) if cell == here || cell == self.planner.next_cell(here) => return place,
+            _ => here,
+        };
+        let cell = self.planner.next_cell(from);
+        let place = if cell == self.planner.goal() {
+            self.goal_at
+        } else {
+            centre_of(&level.maze, cell).map(|x| x + unit(rng) as f32)
+        };
+        self.next = Some((cell, place));
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_playbot::learner::rng::Streams;
+
+    use super::*;
+    use crate::antmaze::generate;
+
+    /// Walks straight from waypoint to waypoint, some centimetres at a time, and returns where it was.
+    fn walk(mode: &str, seed: u64) -> (AntMazeLevel, Vec<[f32; 2]>) {
+        let level = generate(&mode.parse().expect("a mode"), seed).expect("a level");
+        let mut rng = Streams::new(seed).stream("walk", 0);
+        let mut waypoints = Waypoints::new(&level);
+        let mut at = [level.reset.qpos[0], level.reset.qpos[1]];
+        let mut places = vec![at];
+        while distance(at, level.goal_at) > 0.5 {
+            let next = waypoints.next(&level, at, &mut rng);
+            let away = distance(at, next).max(0.1);
+            at = [0, 1].map(|axis| at[axis] + 0.1 * (next[axis] - at[axis]) / away);
+            places.push(at);
+            assert!(places.len() < 10_000, "{mode} {seed}: walks for ever, at {at:?} on the way to {next:?}");
+        }
+        (level, places)
+    }
+
+    #[test]
+    fn waypoints_lead_to_the_goal_through_free_cells() {
+        for mode in ["umaze", "medium", "large+goal-noise=d4rl", "xl+goals=demo+random-start", "random+corridor=2"] {
+            for seed in 0..20 {
+                let (level, places) = walk(mode, seed);
+                let cells = places.iter().map(|&at| cell_at(&level.maze, at).expect("inside"));
+                assert!(cells.into_iter().all(|cell| level.maze.is_free(cell)), "{mode} {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_way_is_not_much_longer_than_the_shortest() {
+        let (level, places) = walk("large", 3);
+        let length: f32 = places.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+        let shortest = 4.0 * (level.maze.shortest_path().len() - 1) as f32;
+        assert!((0.7 * shortest..1.1 * shortest).contains(&length), "{length} m instead of {shortest}");
+    }
+
+    #[test]
+    fn waypoints_lie_beyond_the_centre_of_the_next_cell_and_are_kept() {
+        let level = generate(&"medium".parse().expect("a mode"), 0).expect("a level");
+        let mut rng = Streams::new(1).stream("walk", 0);
+        for _ in 0..200 {
+            let mut waypoints = Waypoints::new(&level);
+            let [x, y] = waypoints.next(&level, [0.0, 0.0], &mut rng);
+            let across = if x > 2.0 { [x - 4.0, y] } else { [x, y - 4.0] };
+            assert!(across.iter().all(|offset| (0.0..1.0).contains(offset)), "{x} {y}");
+            assert_eq!(waypoints.next(&level, [0.3, 0.1], &mut rng), [x, y]);
+        }
+    }
+
+    #[test]
+    fn an_ant_that_was_pushed_away_plans_anew() {
+        let level = generate(&"medium".parse().expect("a mode"), 0).expect("a level");
+        let mut rng = Streams::new(1).stream("walk", 0);
+        let mut waypoints = Waypoints::new(&level);
+        let before = waypoints.next(&level, [0.0, 0.0], &mut rng);
+        // Two cells before the goal, which is at (20, 20).
+        let after = waypoints.next(&level, [20.0, 12.0], &mut rng);
+        assert_ne!(before, after);
+        assert!(distance(after, [20.5, 16.5]) < 1.0, "{after:?}");
+        assert_eq!(waypoints.next(&level, [20.0, 16.0], &mut rng), [20.0, 20.0], "beside the goal it is the goal");
+    }
+}

@@ -1,0 +1,80 @@
+//! `playbot level maze2d` and `playbot level antmaze`.
+
+use std::{fs::File, io::Read, path::Path};
+
+use serde_json::json;
+
+use super::Args;
+use crate::{
+    cli::error::{CliError, Outcome, print_line},
+    maze::{Cell, MAX_CELLS, Map, MapError, Maze},
+};
+
+/// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
+const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
+
+/// Shows a maze.
+pub fn show(args: &Args) -> Result<Outcome, CliError> {
+    if args.mode.is_some() {
+        return Err(CliError::Usage("mazes are named by --map and --seed, without the rest of a mode".to_owned()));
+    }
+    let maze = maze(args)?;
+    if args.json {
+        print_line(json!({
+            "rows": maze.to_rows(),
+            "start": maze.start(),
+            "goal": maze.goal(),
+            "shortest_path_length": maze.difficulty(),
+        }))?;
+    } else {
+        print_line(picture(&maze).join("\n"))?;
+        print_line(format!("S start  G goal  # wall  . shortest path: {} moves", maze.difficulty()))?;
+    }
+    Ok(Outcome::Pass)
+}
+
+fn maze(args: &Args) -> Result<Maze, CliError> {
+    let text = args.map.as_deref().unwrap_or("random");
+    let map: Map = match text.parse() {
+        Ok(map) => map,
+        Err(MapError::Name(error)) if error.what == "map" => return from_file(Path::new(text), args, &error.to_string()),
+        Err(error) => return Err(error.into()),
+    };
+    if args.seed.is_some() && !matches!(map, Map::Random(_)) {
+        return Err(no_seed(&map.to_string()));
+    }
+    let seed = args.seed.unwrap_or(0);
+    Ok(if args.game == "antmaze" { map.antmaze(seed) } else { map.maze2d(seed) }?)
+}
+
+fn no_seed(map: &str) -> CliError {
+    CliError::Usage(format!("`{map}` has no seed: leave --seed out, or take --map random"))
+}
+
+/// The maze in a file of rows; `unknown` says that the text names no map either.
+fn from_file(path: &Path, args: &Args, unknown: &str) -> Result<Maze, CliError> {
+    let shown = path.display();
+    let file = File::open(path).map_err(|error| CliError::Usage(format!("{unknown}; and no file: {error}")))?;
+    if args.seed.is_some() {
+        return Err(no_seed(&shown.to_string()));
+    }
+    let mut text = String::new();
+    let read = file.take(MAX_BYTES + 1).read_to_string(&mut text);
+    read.map_err(|error| CliError::Usage(format!("cannot read {shown}: {error}")))?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(CliError::Usage(format!("{shown}: more than {MAX_CELLS} cells are no maze that fits into memory")));
+    }
+    let rows: Vec<&str> = text.trim_end().lines().map(str::trim_end).collect();
+    Maze::parse(&rows).map_err(|error| CliError::Usage(format!("{shown}: {error}")))
+}
+
+/// The rows for people, with the shortest path.
+fn picture(maze: &Maze) -> Vec<String> {
+    let mut rows: Vec<Vec<char>> = maze.to_rows().iter().map(|row| row.replace('O', " ").chars().collect()).collect();
+    let path = maze.shortest_path();
+    let inner = path.iter().skip(1).take(path.len().saturating_sub(2));
+    for &Cell { row, col } in inner {
+        rows[row][col] = '.';
+    }
+    rows.into_iter().map(String::from_iter).collect()
+}

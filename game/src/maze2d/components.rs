@@ -1,0 +1,28 @@
+//! The game as entities: an arena with its level, and the ball of its agent.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+
+use super::{ball::Ball, level::Maze2dLevel, mode::Maze2dMode};
+
+/// Map and rules of all arenas.
+#[derive(Resource, Clone, Debug, PartialEq)]
+pub struct Maze2dRules(pub Maze2dMode);
+
+/// One running copy of a level. With a physics context it also has [`MazePhysics`](super::physics::MazePhysics).
+#[derive(Component, Clone, Debug)]
+pub struct MazeArena {
+    /// The level.
+    pub level: Arc<Maze2dLevel>,
+    /// Its agent.
+    pub player: Entity,
+}
+
+/// The ball of an agent. Belongs to the entity with the [`Agent`](bevy_playbot::agent::Agent).
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub struct MazeBall(pub Ball);
+
+/// The arena of an agent.
+#[derive(Component, Clone, Copy, Debug)]
+pub struct PlaysIn(pub Entity);

@@ -1,0 +1,44 @@
+//! The waypoint demonstrator as an agent of the game.
+
+use bevy::prelude::*;
+use bevy_playbot::{policy::AgentStreams, prelude::*};
+
+use super::{
+    components::{Maze2dRules, MazeArena, MazeBall, PlaysIn},
+    demonstrator::Demonstrator,
+};
+
+/// Plays by walking from waypoint to waypoint. See [`Demonstrator`].
+#[derive(Component)]
+pub struct DemonstratorBot {
+    noise: f64,
+    /// Made anew at the first tick of an episode.
+    walker: Option<Demonstrator>,
+}
+
+impl DemonstratorBot {
+    /// A bot with normal noise of this standard deviation on each axis of its actions.
+    pub fn new(noise: f64) -> Self {
+        Self { noise, walker: None }
+    }
+}
+
+pub(super) fn decide(
+    rules: Res<Maze2dRules>,
+    mut bots: Query<(&Control, &Episode, &PlaysIn, &MazeBall, &mut DemonstratorBot, &mut AgentStreams, &mut Action)>,
+    arenas: Query<&MazeArena>,
+) {
+    for (control, episode, plays_in, ball, mut bot, mut streams, mut action) in &mut bots {
+        if *control != Control::Bot || !episode.is_running() {
+            continue;
+        }
+        let Ok(arena) = arenas.get(plays_in.0) else { continue };
+        let (noise, rng) = (bot.noise, &mut streams.action);
+        if episode.tick == 0 {
+            bot.walker = None;
+        }
+        let walker = bot.walker.get_or_insert_with(|| Demonstrator::new(arena.level.clone(), rules.0.retarget, rng));
+        let push = walker.act(&ball.0, noise, rng);
+        action.0 = ActionValue::Continuous(push.map(|axis| axis as f32).to_vec());
+    }
+}

@@ -1,0 +1,109 @@
+//! Maze2D for the trainer, the evaluation and the replay.
+
+use std::sync::{Arc, LazyLock};
+
+use bevy::prelude::*;
+use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
+
+use super::{
+    components::{MazeBall, PlaysIn},
+    demonstrator_bot::DemonstratorBot,
+    mode::Maze2dMode,
+    picture::{Maze2dPicturePlugin, VIEW},
+    play::OBSERVED,
+    plugin::Maze2dPlugin,
+};
+
+/// Maze2D under its name `maze2d`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Maze2d {
+    /// Whether arenas have a rapier context even where the contact does not need it. Training does without: nothing there
+    /// asks for them.
+    pub physics: bool,
+}
+
+/// Axes of the push.
+const AXES: usize = 2;
+
+static SPACE: LazyLock<Arc<ObservationSpace>> =
+    LazyLock::new(|| Arc::new(ObservationSpace { names: OBSERVED.map(str::to_owned).to_vec() }));
+
+/// Makes an arena with an idle agent, and returns the agent.
+pub fn spawn_agent(world: &mut World, index: u32) -> Entity {
+    let arena = world.spawn_empty().id();
+    world
+        .spawn((
+            Agent::new(index, ActionSpace::Continuous(AXES)),
+            VectorSensor::from_space(SPACE.clone()),
+            MazeBall::default(),
+            PlaysIn(arena),
+        ))
+        .id()
+}
+
+impl Game for Maze2d {
+    fn name(&self) -> &'static str {
+        "maze2d"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &Maze2dMode::NAMES
+    }
+
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        mode.parse::<Maze2dMode>().map(drop).map_err(|error| error.of(mode))
+    }
+
+    fn tick_hz(&self) -> f64 {
+        100.0
+    }
+
+    fn actions(&self) -> ActionSpace {
+        ActionSpace::Continuous(AXES)
+    }
+
+    fn action_names(&self) -> Vec<String> {
+        vec!["push x (down the rows)".to_owned(), "push y (along the columns)".to_owned()]
+    }
+
+    fn input_map(&self) -> Option<InputMap> {
+        // The first row of the map is at the top of the picture.
+        let rows = KeyAxis::new([KeyCode::ArrowUp, KeyCode::KeyW], [KeyCode::ArrowDown, KeyCode::KeyS]);
+        let columns = KeyAxis::new([KeyCode::ArrowLeft, KeyCode::KeyA], [KeyCode::ArrowRight, KeyCode::KeyD]);
+        let push = |at: &[i8]| ActionValue::Continuous(at.iter().map(|&axis| axis.into()).collect());
+        Some(InputMap::new([rows, columns], push, "arrow keys or W, A, S and D push the ball"))
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        (**SPACE).clone()
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        let mode = mode.parse().expect("callers check the mode with `check_mode`");
+        app.add_plugins(Maze2dPlugin { mode, physics: self.physics });
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(Maze2dPicturePlugin);
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        spawn_agent(world, index)
+    }
+
+    fn demonstrator(&self) -> Option<&'static str> {
+        Some("waypoints")
+    }
+
+    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+}

@@ -1,0 +1,31 @@
+//! Maze2D: push a ball through a maze to the goal. D4RL's `pointmaze`, and mazes without end.
+//!
+//! [`ball`], [`soft`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
+//! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
+//! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
+//! makes of a seed.
+
+pub mod arena;
+pub mod ball;
+pub mod components;
+pub mod demonstrator;
+mod demonstrator_bot;
+mod draws;
+pub mod game;
+pub mod level;
+pub mod mode;
+pub mod physics;
+pub mod picture;
+mod play;
+pub mod plugin;
+pub mod sim;
+pub mod soft;
+pub mod walls;
+
+pub use ball::Ball;
+pub use demonstrator::Demonstrator;
+pub use demonstrator_bot::DemonstratorBot;
+pub use game::Maze2d;
+pub use level::Maze2dLevel;
+pub use mode::{Contact, Maze2dMode, Maze2dModeError};
+pub use plugin::{Maze2dPlugin, Maze2dSystems};

@@ -1,0 +1,288 @@
+//! Modes of Maze2D: a map with options, such as `medium+fixed-start+limit=1000`.
+
+use std::{fmt, str::FromStr};
+
+use bevy_playbot::{game::UnknownName, mode::ModeError};
+use thiserror::Error;
+
+use super::walls::D4RL_OFFSET;
+use crate::maze::{Map, Maze, MazeError, OptionError};
+
+/// What the walls do to the ball.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contact {
+    /// MuJoCo's soft contact in closed form: the game that the literature measures on.
+    #[default]
+    Soft,
+    /// rapier2d's solver: hard and inelastic. Free flight is the same.
+    Rapier,
+}
+
+/// Map and rules. Written as the map's name and what differs from its defaults, joined by `+`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Maze2dMode {
+    /// The map.
+    pub map: Map,
+    /// Reward 1 within the goal radius and else 0, instead of exp(-distance).
+    pub sparse: bool,
+    /// Episodes start in the map's start cell, as the paper says, instead of in any free cell, as D4RL has it.
+    pub fixed_start: bool,
+    /// Each level has a goal of its own in a random free cell, instead of the map's.
+    pub random_goal: bool,
+    /// Steps after which an episode is truncated.
+    pub limit: u32,
+    /// Reaching the goal terminates the episode. D4RL's never terminate.
+    pub end_at_goal: bool,
+    /// The walls stand 0.2 aside, as D4RL's do.
+    pub offset: bool,
+    /// What the walls do.
+    pub contact: Contact,
+    /// The demonstrator walks to one random cell after the other, as in D4RL's data. Changes nothing in the game.
+    pub retarget: bool,
+}
+
+/// The text is not a mode of Maze2D.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum Maze2dModeError {
+    /// An unknown map, option or contact.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
+    /// The value of an option of the map cannot be read.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// There is no such maze.
+    #[error(transparent)]
+    Maze(#[from] MazeError),
+    /// The limit is no number of steps.
+    #[error("`limit={0}`: write steps, at least 1, as in limit=1000")]
+    Limit(String),
+    /// An option is given twice, or with its opposite.
+    #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
+    Twice(String),
+    /// Episodes end before the demonstrator can turn to another cell.
+    #[error("`retarget` needs episodes that go on at the goal: add no-end-at-goal")]
+    RetargetEnds,
+}
+
+impl Maze2dModeError {
+    /// The error as games give it: for this mode.
+    pub fn of(self, mode: &str) -> ModeError {
+        match self {
+            Self::Name(unknown) => unknown.into(),
+            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
+        }
+    }
+}
+
+/// Options of every map, each with a value it takes.
+const OPTIONS: [&str; 11] = [
+    "sparse",
+    "fixed-start",
+    "goal=random",
+    "goal=fixed",
+    "limit=1000",
+    "end-at-goal",
+    "no-end-at-goal",
+    "no-offset",
+    "contact=soft",
+    "contact=rapier",
+    "retarget",
+];
+
+impl Maze2dMode {
+    /// The modes without options.
+    pub const NAMES: [&'static str; 5] = Map::NAMES;
+
+    /// D4RL's rules on a map: random start, dense reward, its time limit (version 1). Generated mazes end at the goal.
+    pub fn new(map: Map) -> Self {
+        let (limit, end_at_goal) = (usual_limit(&map), ends_at_goal(&map));
+        Self {
+            map,
+            sparse: false,
+            fixed_start: false,
+            random_goal: false,
+            limit,
+            end_at_goal,
+            offset: true,
+            contact: Contact::Soft,
+            retarget: false,
+        }
+    }
+
+    /// How far the walls stand aside, along both axes.
+    pub fn wall_offset(&self) -> f64 {
+        if self.offset { D4RL_OFFSET } else { 0.0 }
+    }
+
+    /// The maze of a level.
+    ///
+    /// # Errors
+    ///
+    /// No maze can be generated for this seed.
+    pub fn maze(&self, seed: u64) -> Result<Maze, MazeError> {
+        self.map.maze2d(seed)
+    }
+
+    /// Takes one option.
+    fn set(&mut self, option: &str) -> Result<(), Maze2dModeError> {
+        let (key, value) = option.split_once('=').unwrap_or((option, ""));
+        match (key, value) {
+            ("sparse", "") => self.sparse = true,
+            ("fixed-start", "") => self.fixed_start = true,
+            ("goal", "random") => self.random_goal = true,
+            ("goal", "fixed") => self.random_goal = false,
+            ("end-at-goal", "") => self.end_at_goal = true,
+            ("no-end-at-goal", "") => self.end_at_goal = false,
+            ("no-offset", "") => self.offset = false,
+            ("contact", "soft") => self.contact = Contact::Soft,
+            ("contact", "rapier") => self.contact = Contact::Rapier,
+            ("retarget", "") => self.retarget = true,
+            ("limit", _) => {
+                let steps = value.parse().ok().filter(|&steps| steps > 0);
+                self.limit = steps.ok_or_else(|| Maze2dModeError::Limit(value.to_owned()))?;
+            }
+            _ if self.map.set_option(key, value)? => {}
+            _ => return Err(self.unknown(option).into()),
+        }
+        Ok(())
+    }
+
+    fn unknown(&self, option: &str) -> UnknownName {
+        let valid: Vec<&str> = OPTIONS.iter().chain(self.map.valid_options()).copied().collect();
+        UnknownName::new("option", option, &valid)
+    }
+
+    /// What differs from the map's defaults, in the order in which it is written.
+    fn options(&self) -> Vec<String> {
+        let usual = Self::new(self.map.clone());
+        let mut options = self.map.options();
+        let mut add = |differs: bool, option: &str| {
+            if differs {
+                options.push(option.to_owned());
+            }
+        };
+        add(self.sparse, "sparse");
+        add(self.fixed_start, "fixed-start");
+        add(self.random_goal, "goal=random");
+        add(self.limit != usual.limit, &format!("limit={}", self.limit));
+        add(self.end_at_goal != usual.end_at_goal, if self.end_at_goal { "end-at-goal" } else { "no-end-at-goal" });
+        add(!self.offset, "no-offset");
+        add(self.contact == Contact::Rapier, "contact=rapier");
+        add(self.retarget, "retarget");
+        options
+    }
+}
+
+/// D4RL's limits, version 1; for other maps, time for the longest ways at the demonstrator's pace.
+fn usual_limit(map: &Map) -> u32 {
+    match map {
+        Map::Umaze => 300,
+        Map::Medium => 600,
+        Map::Large => 800,
+        Map::Xl => 2000,
+        Map::Random(spec) => u32::try_from(spec.rows.saturating_mul(spec.columns)).map_or(u32::MAX, steps_for),
+    }
+}
+
+/// Time for a generated maze with so many cells.
+fn steps_for(cells: u32) -> u32 {
+    cells.saturating_mul(15).max(300)
+}
+
+fn ends_at_goal(map: &Map) -> bool {
+    matches!(map, Map::Random(_))
+}
+
+/// What an option is about, so that it is said only once.
+fn subject(option: &str) -> &str {
+    let key = option.split_once('=').map_or(option, |(key, _)| key);
+    key.strip_prefix("no-").unwrap_or(key)
+}
+
+impl FromStr for Maze2dMode {
+    type Err = Maze2dModeError;
+
+    fn from_str(text: &str) -> Result<Self, Maze2dModeError> {
+        let mut parts = text.split('+');
+        let mut map = Map::named(parts.next().unwrap_or_default())?;
+        let options: Vec<&str> = parts.collect();
+        for (index, option) in options.iter().enumerate() {
+            if options[..index].iter().any(|earlier| subject(earlier) == subject(option)) {
+                return Err(Maze2dModeError::Twice((*option).to_owned()));
+            }
+        }
+        // The size of a generated maze decides on the usual limit.
+        for (key, value) in options.iter().filter_map(|option| option.split_once('=')) {
+            map.set_option(key, value)?;
+        }
+        map.check()?;
+        let mut mode = Self::new(map);
+        options.iter().try_for_each(|option| mode.set(option))?;
+        if mode.retarget && mode.end_at_goal {
+            return Err(Maze2dModeError::RetargetEnds);
+        }
+        Ok(mode)
+    }
+}
+
+impl fmt::Display for Maze2dMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.map.name())?;
+        self.options().iter().try_for_each(|option| write!(f, "+{option}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mode(text: &str) -> Maze2dMode {
+        text.parse().unwrap_or_else(|error| panic!("{text}: {error}"))
+    }
+
+    #[test]
+    fn text_form_reads_back_and_leaves_defaults_out() {
+        for text in [
+            "umaze",
+            "medium+sparse",
+            "medium+fixed-start+limit=1000",
+            "large+goal=random+end-at-goal+no-offset+contact=rapier",
+            "medium+retarget",
+            "random+size=9x9+loops=0.2",
+            "random+no-end-at-goal+retarget",
+        ] {
+            assert_eq!(mode(text).to_string(), text);
+        }
+        assert_eq!(mode("medium+limit=600+contact=soft+goal=fixed+no-end-at-goal").to_string(), "medium");
+        assert_eq!(mode("random+limit=400+size=7x9").to_string(), "random+size=7x9+limit=400");
+    }
+
+    #[test]
+    fn maps_bring_the_limits_of_d4rl() {
+        for (map, limit) in [("umaze", 300), ("medium", 600), ("large", 800)] {
+            let mode = mode(map);
+            assert_eq!((mode.limit, mode.end_at_goal, mode.fixed_start, mode.offset), (limit, false, false, true));
+        }
+        assert!(mode("random").end_at_goal);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, part) in [
+            ("medum", "unknown map `medum` (did you mean `medium`?)"),
+            ("", "unknown map ``"),
+            ("medium+sprse", "unknown option `sprse` (did you mean `sparse`?)"),
+            ("medium+size=9x9", "unknown option `size=9x9`"),
+            ("medium+limit=0", "`limit=0`: write steps"),
+            ("medium+limit", "`limit=`: write steps"),
+            ("medium+contact=bullet", "contact=rapier"),
+            ("medium+limit=1+limit=2", "`limit=2` repeats"),
+            ("medium+end-at-goal+no-end-at-goal", "contradicts"),
+            ("random+loops=2", "loops = 2"),
+            ("random+retarget", "no-end-at-goal"),
+        ] {
+            let error = text.parse::<Maze2dMode>().expect_err(text).to_string();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+}

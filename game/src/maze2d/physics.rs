@@ -1,0 +1,95 @@
+//! A rapier2d context of an arena's own: the walls as colliders, the ball as a body.
+//!
+//! It stands by itself and is stepped by whoever owns it, so that arenas are independent and can be stepped on any
+//! thread. Under [`Contact::Rapier`](super::mode::Contact) it decides what the walls do to the ball; under
+//! [`Contact::Soft`](super::mode::Contact) the ball only shows it where it is, for sensors and rays of a game's own.
+
+use bevy::prelude::Component;
+use bevy_rapier2d::rapier::prelude::{
+    ColliderBuilder, ColliderHandle, IVector, IntegrationParameters, PhysicsWorld, Real, RigidBodyBuilder,
+    RigidBodyHandle, Vector,
+};
+
+use super::{
+    ball::{Ball, MASS, RADIUS, STEP, Vec2d},
+    walls::{HALF, Walls},
+};
+
+/// How far ahead of a fast ball contacts are looked for, m: more than it can move in a step.
+const AHEAD: Real = 0.06;
+
+/// The context. Coordinates are those of the observation.
+#[derive(Component)]
+pub struct MazePhysics {
+    /// Everything that rapier knows. Add bodies and sensors as you like; stepping is done by the game.
+    pub world: PhysicsWorld,
+    ball: RigidBodyHandle,
+    walls: ColliderHandle,
+}
+
+impl MazePhysics {
+    /// Walls, and a ball that they stop.
+    pub fn solving(walls: &Walls, ball: &Ball) -> Self {
+        let body = RigidBodyBuilder::dynamic().can_sleep(false).lock_rotations().soft_ccd_prediction(AHEAD);
+        Self::new(walls, ball, body)
+    }
+
+    /// Walls, and a ball that goes where it is put.
+    pub fn following(walls: &Walls, ball: &Ball) -> Self {
+        Self::new(walls, ball, RigidBodyBuilder::kinematic_position_based().can_sleep(false))
+    }
+
+    fn new(walls: &Walls, ball: &Ball, body: RigidBodyBuilder) -> Self {
+        let mut world = PhysicsWorld { gravity: Vector::ZERO, ..PhysicsWorld::default() };
+        world.integration_parameters = IntegrationParameters {
+            dt: STEP as Real,
+            // A contact may be taken over from the step before only if little has moved; here a ball moves its radius.
+            contact_recycling: false,
+            ..IntegrationParameters::default()
+        };
+        // One shape for all walls: a ball that slides along them must not meet the seams.
+        let cells: Vec<IVector> = walls.cells().map(|(row, column)| IVector::new(row, column)).collect();
+        let corner = walls.centre(0, 0).map(|along| along - HALF);
+        let shape = ColliderBuilder::voxels(Vector::ONE, &cells).translation(vector(corner)).friction(0.0);
+        let walls = world.colliders.insert(shape);
+        let ball_shape = ColliderBuilder::ball(RADIUS as Real).mass(MASS as Real).friction(0.0).restitution(0.0);
+        let (ball, _) = world.insert(body.translation(vector(ball.position)), ball_shape);
+        // Rays find nothing before the first step.
+        world.step();
+        Self { world, ball, walls }
+    }
+
+    /// The body of the ball.
+    pub fn ball(&self) -> RigidBodyHandle {
+        self.ball
+    }
+
+    /// The collider of all walls.
+    pub fn walls(&self) -> ColliderHandle {
+        self.walls
+    }
+
+    /// One step of a ball under a force. Its flight is the original's; the walls are rapier's affair.
+    pub(super) fn step(&mut self, ball: &mut Ball, force: Vec2d) {
+        let body = &mut self.world.bodies[self.ball];
+        body.set_translation(vector(ball.position), true);
+        body.set_linvel(vector(ball.velocity_under(force)), true);
+        self.world.step();
+        let body = &self.world.bodies[self.ball];
+        let [position, velocity] = [body.translation(), body.linvel()];
+        *ball = Ball {
+            position: [position.x, position.y].map(f64::from),
+            velocity: [velocity.x, velocity.y].map(f64::from),
+        };
+    }
+
+    /// Shows the context where the ball is now.
+    pub(super) fn follow(&mut self, ball: &Ball) {
+        self.world.bodies[self.ball].set_next_kinematic_translation(vector(ball.position));
+        self.world.step();
+    }
+}
+
+fn vector([x, y]: Vec2d) -> Vector {
+    Vector::new(x as Real, y as Real)
+}

@@ -1,0 +1,5 @@
+//! Mazes: the fixed maps against golden data, the generator's promises, and the planner on both.
+
+mod fixed;
+mod generator;
+mod planner;

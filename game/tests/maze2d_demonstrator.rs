@@ -1,0 +1,80 @@
+//! The demonstrator of Maze2D reaches its goals on every map, with the noise of its recordings and without.
+
+use std::sync::Arc;
+
+use bevy_playbot::learner::Streams;
+use playbot_games::maze2d::{
+    Demonstrator, Maze2dLevel, Maze2dMode,
+    sim::{BallSim, is_at_goal, reward},
+};
+
+/// What came of one episode.
+struct Outcome {
+    reached: bool,
+    total_reward: f64,
+    targets: usize,
+}
+
+fn play(mode: &Maze2dMode, seed: u64, noise: f64) -> Outcome {
+    let level = Arc::new(Maze2dLevel::new(mode, seed).expect("a level"));
+    let mut rng = Streams::new(seed).stream("test", 0);
+    let mut bot = Demonstrator::new(level.clone(), mode.retarget, &mut rng);
+    let mut sim = BallSim::new(mode, &level);
+    let mut outcome = Outcome { reached: false, total_reward: 0.0, targets: 0 };
+    let mut target = bot.target();
+    for _ in 0..mode.limit {
+        let push = bot.act(&sim.ball, noise, &mut rng);
+        outcome.targets += usize::from(bot.target() != target);
+        target = bot.target();
+        sim.step(push);
+        outcome.total_reward += f64::from(reward(sim.ball.position, level.goal(), mode.sparse));
+        outcome.reached |= is_at_goal(sim.ball.position, level.goal());
+        if outcome.reached && mode.end_at_goal {
+            break;
+        }
+    }
+    outcome
+}
+
+const LEVELS: u64 = 300;
+
+#[test]
+fn every_goal_is_reached() {
+    for map in [
+        "umaze",
+        "medium",
+        "large",
+        "xl",
+        "large+fixed-start",
+        "medium+no-offset",
+        "large+goal=random",
+        "medium+contact=rapier",
+        "random",
+        "random+size=15x21+loops=0",
+        "random+corridor=2+goal=random",
+    ] {
+        let mode: Maze2dMode = map.parse().expect("a mode");
+        for noise in [0.0, 0.5] {
+            let lost: Vec<_> = (0..LEVELS).filter(|&seed| !play(&mode, seed, noise).reached).collect();
+            assert!(lost.is_empty(), "{map} with noise {noise}: {} of {LEVELS} lost: {lost:?}", lost.len());
+        }
+    }
+}
+
+#[test]
+fn it_earns_what_d4rl_s_expert_earns() {
+    // D4RL's reference returns, dense rewards.
+    for (map, expert) in [("umaze", 193.66), ("medium", 297.46), ("large", 303.49)] {
+        let mode: Maze2dMode = map.parse().expect("a mode");
+        let mean = (0..LEVELS).map(|seed| play(&mode, seed, 0.0).total_reward).sum::<f64>() / LEVELS as f64;
+        println!("{map}: {mean:.1}, D4RL's expert {expert}");
+        assert!((mean / expert - 1.0).abs() < 0.1, "{map}: {mean} instead of {expert}");
+    }
+}
+
+#[test]
+fn a_demonstrator_that_retargets_visits_one_cell_after_the_other() {
+    let mode: Maze2dMode = "medium+retarget+limit=3000".parse().expect("a mode");
+    let targets: Vec<_> = (0..20).map(|seed| play(&mode, seed, 0.5).targets).collect();
+    assert!(targets.iter().all(|&targets| targets >= 5), "{targets:?}");
+}
