@@ -88,7 +88,10 @@ pub fn measure(game: &dyn Game, name: &str, player: &Player, plan: &EvalPlan) ->
     let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
     let summary = summarize(name, &plan.split, &episodes);
     if summary.clipped > 0.0 {
-        eprintln!("{name}: {:.1} % of the actions lay outside the game's range and were clipped", 100.0 * summary.clipped);
+        eprintln!(
+            "{name}: {:.1} % of the actions lay outside the game's range and were clipped",
+            100.0 * summary.clipped
+        );
     }
     Ok(Measured { summary, steps_per_s: steps as f64 / seconds })
 }

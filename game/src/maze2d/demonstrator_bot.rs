@@ -37,9 +37,7 @@ pub(super) fn decide(
         if episode.tick == 0 {
             bot.walker = None;
         }
-        let walker = bot
-            .walker
-            .get_or_insert_with(|| Demonstrator::new(arena.level.clone(), rules.0.retarget, rng));
+        let walker = bot.walker.get_or_insert_with(|| Demonstrator::new(arena.level.clone(), rules.0.retarget, rng));
         let push = walker.act(&ball.0, noise, rng);
         action.0 = ActionValue::Continuous(push.map(|axis| axis as f32).to_vec());
     }

@@ -77,7 +77,10 @@ impl MazePhysics {
         self.world.step();
         let body = &self.world.bodies[self.ball];
         let [position, velocity] = [body.translation(), body.linvel()];
-        *ball = Ball { position: [position.x, position.y].map(f64::from), velocity: [velocity.x, velocity.y].map(f64::from) };
+        *ball = Ball {
+            position: [position.x, position.y].map(f64::from),
+            velocity: [velocity.x, velocity.y].map(f64::from),
+        };
     }
 
     /// Shows the context where the ball is now.

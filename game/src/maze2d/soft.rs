@@ -84,9 +84,8 @@ fn least_cost(free: Vec2d, contacts: &[Contact]) -> Vec2d {
     for pushing in 0..1_u32 << contacts.len() {
         let pushes = |index: usize| pushing & 1 << index != 0;
         let acceleration = minimum(free, contacts, pushes);
-        let is_consistent = |(index, contact): (usize, &Contact)| {
-            (dot(contact.normal, acceleration) < contact.target) == pushes(index)
-        };
+        let is_consistent =
+            |(index, contact): (usize, &Contact)| (dot(contact.normal, acceleration) < contact.target) == pushes(index);
         if contacts.iter().enumerate().all(is_consistent) {
             return acceleration;
         }

@@ -58,7 +58,9 @@ impl Walls {
     /// Whether a cell is a wall; everything outside the maze is.
     fn is_solid(&self, row: i32, column: i32) -> bool {
         match (usize::try_from(row), usize::try_from(column)) {
-            (Ok(row), Ok(column)) if row < self.rows && column < self.columns => self.solid[row * self.columns + column],
+            (Ok(row), Ok(column)) if row < self.rows && column < self.columns => {
+                self.solid[row * self.columns + column]
+            }
             _ => true,
         }
     }

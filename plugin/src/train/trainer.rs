@@ -232,7 +232,8 @@ impl Trainer {
         self.progress.steps += self.experiment.steps_per_update();
         let timing = Timing { collect_s, learn_s: start.elapsed().as_secs_f64() - collect_s };
         let mut report = self.progress.report(learner, initial_kl, timing);
-        report.clipped_share = report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
+        report.clipped_share =
+            report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
         Ok(report)
     }
 

@@ -15,7 +15,9 @@ pub(super) fn run(args: Args) -> Result<Outcome, CliError> {
     let mode = args.mode.as_deref().unwrap_or("hard");
     game.check_mode(mode)?;
     if !args.start.is_empty() {
-        return Err(CliError::Usage("--start is for maze2d: a level of coinrun says where the player starts".to_owned()));
+        return Err(CliError::Usage(
+            "--start is for maze2d: a level of coinrun says where the player starts".to_owned(),
+        ));
     }
     let actions = read_actions(&args)?;
     let space = game.actions();

@@ -14,9 +14,11 @@ use crate::{
 
 pub(super) fn run(args: Args) -> Result<Outcome, CliError> {
     let Some(path) = &args.actions_file else {
-        return Err(CliError::Usage("the pushes of maze2d are numbers: write them to a file, one `ux uy` a line, and \
+        return Err(CliError::Usage(
+            "the pushes of maze2d are numbers: write them to a file, one `ux uy` a line, and \
             name it with --actions-file"
-            .to_owned()));
+                .to_owned(),
+        ));
     };
     let name = args.mode.as_deref().unwrap_or("medium");
     let mode: Maze2dMode = name.parse().map_err(|error: Maze2dModeError| error.of(name))?;
@@ -55,7 +57,9 @@ fn start(values: &[f64], level: &Maze2dLevel) -> Result<Ball, CliError> {
         return Err(CliError::Usage(format!("--start has {bad}: write finite numbers")));
     }
     if !level.walls.is_free([x, y]) {
-        return Err(CliError::Usage(format!("--start {x},{y} lies in a wall: x is the row and y the column of the map")));
+        return Err(CliError::Usage(format!(
+            "--start {x},{y} lies in a wall: x is the row and y the column of the map"
+        )));
     }
     Ok(Ball { position: [x, y], velocity: [vx, vy] })
 }

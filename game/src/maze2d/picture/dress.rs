@@ -60,7 +60,12 @@ pub(super) fn players(
         let place = Vec3::new(column as f32, row as f32, 0.0) * SPACING;
         commands.entity(plays_in.0).insert((Stage, Transform::from_translation(place), Board { tiles, goal, ball }));
         let middle = Transform::from_xyz(VIEW / 2.0, VIEW / 2.0, 0.0);
-        commands.entity(player).insert((ChildOf(plays_in.0), middle, Visibility::default(), PaintedVelocity::default()));
+        commands.entity(player).insert((
+            ChildOf(plays_in.0),
+            middle,
+            Visibility::default(),
+            PaintedVelocity::default(),
+        ));
     }
 }
 
