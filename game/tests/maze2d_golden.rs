@@ -205,13 +205,14 @@ fn the_ball_never_leaves_the_free_cells_nor_sinks_into_walls() {
 #[test]
 fn a_full_push_rests_where_the_original_rests() {
     for (contact, tolerance) in [(Contact::Soft, 1e-5), (Contact::Rapier, 0.01)] {
-        for (push, rest) in [(-1.0, 0.40137), (1.0, 2.19863)] {
+        for (axis, push, rest) in [(0, -1.0, 0.40137), (0, 1.0, 2.19863), (1, -1.0, 0.40137), (1, 1.0, 2.19863)] {
             let mode = Maze2dMode { contact, .."medium".parse().expect("a mode") };
             let level = Maze2dLevel::new(&mode, 0).expect("a level");
             let mut sim = BallSim::new(&mode, &Maze2dLevel { start: Ball::at([1.0, 1.0]), ..level });
-            (0..500).for_each(|_| sim.step([push, push]));
-            let [x, y] = sim.ball.position;
-            assert!((x - rest).abs() <= tolerance && (y - rest).abs() <= tolerance, "{contact:?}: {x}, {y} not {rest}");
+            let pushes = if axis == 0 { [push, 0.0] } else { [0.0, push] };
+            (0..500).for_each(|_| sim.step(pushes));
+            let along = sim.ball.position[axis];
+            assert!((along - rest).abs() <= tolerance, "{contact:?}, {pushes:?}: {along} instead of {rest}");
         }
     }
 }

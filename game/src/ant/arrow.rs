@@ -169,3 +169,43 @@ impl Cholesky {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A matrix that is positive definite because its diagonal outweighs the rest.
+    fn some_matrix() -> Arrow {
+        let mut matrix = Arrow::default();
+        for i in 0..BASE {
+            for j in 0..BASE {
+                matrix.base[i][j] = if i == j { 9.0 + i as f64 } else { 0.1 * (i + j) as f64 };
+            }
+            for leg in 0..LEGS {
+                matrix.arms[leg][0][i] = 0.2 * (i + leg) as f64 - 0.3;
+                matrix.arms[leg][1][i] = 0.1 * (i as f64 - leg as f64);
+            }
+        }
+        matrix.legs = std::array::from_fn(|leg| [4.0 + leg as f64, 0.5, 3.0]);
+        matrix
+    }
+
+    #[test]
+    fn solving_undoes_multiplying() {
+        let matrix = some_matrix();
+        let x = Coordinates {
+            base: [1.0, -2.0, 3.0, 0.5, -0.25, 4.0],
+            legs: [[1.0, 2.0], [-3.0, 0.5], [0.0, 7.0], [2.5, -1.0]],
+        };
+        let solved = matrix.factor().solve(&matrix.times(&x));
+        assert!(x.plus(-1.0, &solved).dot(&x.plus(-1.0, &solved)) < 1e-24, "{solved:?}");
+    }
+
+    #[test]
+    fn the_product_is_symmetric() {
+        let (matrix, mut x, mut y) = (some_matrix(), Coordinates::default(), Coordinates::default());
+        (x.base[2], x.legs[1]) = (1.5, [0.5, -2.0]);
+        (y.base[4], y.legs[1], y.legs[3]) = (-1.0, [1.0, 3.0], [2.0, 0.0]);
+        assert!((x.dot(&matrix.times(&y)) - y.dot(&matrix.times(&x))).abs() < 1e-12);
+    }
+}

@@ -122,3 +122,50 @@ impl Newton {
         (length, false)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ant::skeleton::LEGS;
+
+    fn unit_mass() -> Arrow {
+        let mut mass = Arrow { legs: [[1.0, 0.0, 1.0]; LEGS], ..Arrow::default() };
+        for i in 0..BASE {
+            mass.base[i][i] = 1.0;
+        }
+        mass
+    }
+
+    fn push(dimension: usize, sign: f64, reference: f64, weight: f64) -> Row {
+        let mut base = [0.0; BASE];
+        base[dimension] = sign;
+        Row { base, leg: 0, hinges: [0.0; 2], reference, weight }
+    }
+
+    #[test]
+    fn one_row_pulls_by_its_weight() {
+        let free = Coordinates { base: [0.0, 0.0, 0.0, 0.0, 0.0, -10.0], ..Coordinates::default() };
+        // Minimum of (a + 10)²/2 + 4·(a - 5)²/2 over a < 5.
+        let a = Newton::default().solve(&unit_mass(), &free, &[push(5, 1.0, 5.0, 4.0)], &Coordinates::default());
+        assert!((a.base[5] - 2.0).abs() < 1e-12, "{a:?}");
+    }
+
+    #[test]
+    fn rows_that_are_content_do_nothing() {
+        let free = Coordinates { base: [0.0, 0.0, 0.0, 0.0, 0.0, 3.0], ..Coordinates::default() };
+        let rows = [push(5, 1.0, -1.0, 50.0), push(5, -1.0, -8.0, 50.0)];
+        // Started where the second row pushes.
+        let guess = Coordinates { base: [0.0, 0.0, 0.0, 0.0, 0.0, 90.0], ..Coordinates::default() };
+        let a = Newton::default().solve(&unit_mass(), &free, &rows, &guess);
+        assert!((a.base[5] - 3.0).abs() < 1e-9, "{a:?}");
+    }
+
+    #[test]
+    fn opposed_rows_settle_between() {
+        let free = Coordinates::default();
+        let rows = [push(0, 1.0, 6.0, 1.0), push(0, -1.0, 6.0, 3.0)];
+        // Minimum of a²/2 + (a - 6)²/2 + 3·(a + 6)²/2.
+        let a = Newton::default().solve(&unit_mass(), &free, &rows, &free);
+        assert!((a.base[0] + 12.0 / 5.0).abs() < 1e-9, "{a:?}");
+    }
+}

@@ -1,0 +1,92 @@
+//! Shakes ants between walls with random torques for as long as asked, and stops at the first thing that should not be.
+//!
+//! `cargo run --release --example ant_soak -- 10000000` takes about five minutes on two cores.
+
+use std::{
+    process::ExitCode,
+    thread::{available_parallelism, scope},
+};
+
+use playbot_games::ant::{AntBody, AntState, WallBox};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Half the width of the square room, in metres: an ant has little more than its own size.
+const ROOM: f32 = 2.0;
+/// Control steps between two starts.
+const EPISODE: u64 = 1000;
+/// Nothing this ant does throws it higher, in metres, or makes it faster, in m/s and rad/s.
+const CEILING: f32 = 4.0;
+const FASTEST: f32 = 60.0;
+
+fn main() -> ExitCode {
+    let asked = std::env::args().nth(1).map_or(Ok(100_000), |text| text.parse::<u64>());
+    let Ok(steps) = asked else {
+        eprintln!("give a number of control steps, such as 10000000");
+        return ExitCode::from(3);
+    };
+    let threads = available_parallelism().map_or(1, |threads| threads.get() as u64);
+    let results: Vec<Result<Extremes, String>> = scope(|scope| {
+        let shake = |seed| scope.spawn(move || shake(seed, steps.div_ceil(threads)));
+        let running: Vec<_> = (0..threads).map(shake).collect();
+        running.into_iter().map(|thread| thread.join().expect("the check reports and does not panic")).collect()
+    });
+    let mut code = ExitCode::SUCCESS;
+    for (seed, result) in results.into_iter().enumerate() {
+        match result {
+            Ok(seen) => eprintln!(
+                "seed {seed}: highest {:.2} m, fastest {:.1}, nearest to a wall {:.3} m",
+                seen.height, seen.speed, seen.gap
+            ),
+            Err(why) => {
+                eprintln!("seed {seed}: {why}");
+                code = ExitCode::FAILURE;
+            }
+        }
+    }
+    code
+}
+
+struct Extremes {
+    height: f32,
+    speed: f32,
+    gap: f32,
+}
+
+fn shake(seed: u64, steps: u64) -> Result<Extremes, String> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut ant = AntBody::new(&room());
+    let mut seen = Extremes { height: 0.0, speed: 0.0, gap: ROOM };
+    for step in 0..steps {
+        if step % EPISODE == 0 {
+            ant.set_state(&start(&mut rng));
+        }
+        ant.step(&std::array::from_fn(|_| rng.random_range(-1.0..=1.0)));
+        let state = ant.state();
+        let [x, y, z] = [state.qpos[0], state.qpos[1], state.qpos[2]];
+        seen.height = seen.height.max(z);
+        seen.speed = state.qvel.iter().fold(seen.speed, |fastest, speed| fastest.max(speed.abs()));
+        seen.gap = seen.gap.min(ROOM - x.abs().max(y.abs()));
+        let sound = state.is_finite() && z > 0.0 && z < CEILING && seen.speed < FASTEST && seen.gap > 0.0;
+        if !sound {
+            return Err(format!("step {step}: {state:?}"));
+        }
+    }
+    Ok(seen)
+}
+
+/// Beside a wall, so that legs and walls meet often.
+fn start(rng: &mut ChaCha8Rng) -> AntState {
+    let mut state = AntState::reset(rng);
+    state.qpos[0] = rng.random_range(-1.0..1.0);
+    state.qpos[1] = rng.random_range(-1.0..1.0);
+    state
+}
+
+/// Four walls of AntMaze's height.
+fn room() -> [WallBox; 4] {
+    [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(|[x, y]| WallBox {
+        centre: [x * (ROOM + 2.0), y * (ROOM + 2.0), 1.0],
+        half: [2.0 + f32::abs(y) * ROOM, 2.0 + f32::abs(x) * ROOM, 1.0],
+    })
+}
