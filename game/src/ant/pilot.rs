@@ -97,3 +97,28 @@ impl Pilot {
         torques.ok_or_else(|| PilotError(format!("its policy does not act with {JOINTS} torques")))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_pilot_pushes_each_ant_its_own_way() {
+        let pilot = Pilot::shipped().expect("comes with the program");
+        let state = AntState::nominal();
+        let mut input = PilotInput::default();
+        [[8.0, 0.0], [0.0, 8.0], [8.0, 0.0], [2.0, 0.0]].iter().for_each(|&goal| input.push(&state, goal));
+        let torques = pilot.act(&input).expect("numbers");
+        assert_eq!(torques[0], torques[2]);
+        assert_eq!(torques[0], torques[3], "how far it is does not matter");
+        assert_ne!(torques[0], torques[1]);
+        input.clear();
+        assert!(pilot.act(&input).expect("nothing to do").is_empty());
+    }
+
+    #[test]
+    fn other_files_are_refused_by_name() {
+        let error = Pilot::from_bytes("legs.safetensors", b"nothing").expect_err("no policy").to_string();
+        assert!(error.contains("legs.safetensors"), "{error}");
+    }
+}
