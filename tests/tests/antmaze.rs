@@ -9,16 +9,21 @@ use bevy_playbot::{
         recorder::demo_actions,
         verify::verify_file,
     },
-    game::build_world,
+    eval::{EvalPlan, Player, evaluate, summarize},
+    game::{build_seeing_world, build_world},
     prelude::*,
     test_app::PlaybotTestExt,
     train::worlds::on_threads,
+    vision::{ObservationKind, Sight},
 };
-use playbot_games::antmaze::{
-    AntMaze, AntMazeLevel, DemonstratorBot,
-    components::{InMaze, MazeAnt},
-    generate,
-    geometry::distance,
+use playbot_games::{
+    ant::{Ant, walk::Walker},
+    antmaze::{
+        AntMaze, AntMazeLevel, DemonstratorBot,
+        components::{InMaze, MazeAnt},
+        generate,
+        geometry::distance,
+    },
 };
 
 fn level(mode: &str, seed: u64) -> AntMazeLevel {
@@ -291,10 +296,6 @@ fn demonstrations_follow_the_noise_that_is_asked_for() {
 
 #[test]
 fn pictures_show_floor_walls_ant_and_goal() {
-    use bevy_playbot::{
-        game::build_seeing_world,
-        vision::{ObservationKind, Sight},
-    };
     let sight = Sight { kind: ObservationKind::Raster, ..Sight::default() };
     let (mut world, agents) = build_seeing_world(&AntMaze, "umaze", &sight, 0, 0, 1).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0; 8]));
@@ -315,4 +316,68 @@ fn pictures_show_floor_walls_ant_and_goal() {
     world.tick().expect("sound");
     let [red, green, blue] = colours(&world)(16, 32);
     assert!(green > red + 40 && green > blue + 40, "the goal is green");
+}
+
+/// An app with keys in which a person has an ant.
+fn keyboard_with(game: &dyn Game, mode: &str) -> (App, Entity) {
+    let mut app = headless_app();
+    game.build(&mut app, mode);
+    app.init_resource::<ButtonInput<KeyCode>>();
+    let agent = game.spawn_agent(app.world_mut(), 0);
+    let keys = game.input_map().expect("has keys");
+    let still = Action(keys.action(|_| false));
+    app.world_mut().entity_mut(agent).insert((Control::Human, still, keys, LevelQueue::Always(2)));
+    (app, agent)
+}
+
+#[test]
+fn keys_tell_the_walker_where_to_go() {
+    for (key, axis, sign) in [(KeyCode::ArrowUp, 1, 1.0), (KeyCode::KeyD, 0, 1.0)] {
+        let (mut app, agent) = keyboard_with(&AntMaze, "large");
+        app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(key);
+        app.ticks(30).expect("sound");
+        let at = place(app.world(), agent);
+        assert!(sign * at[axis] > 1.5, "{key:?} led to {at:?}");
+    }
+    let (mut app, agent) = keyboard_with(&Ant, "goal");
+    app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(KeyCode::ArrowLeft);
+    app.ticks(30).expect("sound");
+    let at = app.world().get::<Walker>(agent).expect("an ant").body.torso().0;
+    assert!(at.x < -1.5, "left led to {at}");
+}
+
+#[test]
+fn the_demonstrator_walks_to_the_goal() {
+    for (levels, least) in [("umaze:0..15", 1.0), ("medium:0..15", 0.9), ("random+goals=random:0..15", 0.9)] {
+        let plan = EvalPlan {
+            split: levels.parse().expect("a split"),
+            sight: Sight::default(),
+            episodes_per_level: 1,
+            seed: 1,
+            arenas: 16,
+            worlds: 2,
+            threads: 2,
+        };
+        let episodes = evaluate(&AntMaze, &Player::Demonstrator, &plan, |_| {}).expect("sound");
+        let summary = summarize("waypoints", &plan.split, &episodes);
+        assert!(summary.success >= least, "{levels}: {summary:?}");
+        assert_eq!(summary.clipped, 0.0, "{levels}");
+    }
+}
+
+#[test]
+fn the_open_floor_is_drawn_around_its_ant() {
+    let sight = Sight { kind: ObservationKind::Raster, ..Sight::default() };
+    let (mut world, agents) = build_seeing_world(&Ant, "goal", &sight, 0, 0, 2).expect("can be drawn");
+    let still = Action(ActionValue::Continuous(vec![0.0; 8]));
+    for &agent in &agents {
+        world.entity_mut(agent).insert((Control::Human, still.clone(), LevelQueue::Always(0)));
+    }
+    world.tick().expect("sound");
+    for &agent in &agents {
+        let image = &world.get::<Observation>(agent).expect("an agent").image;
+        let at = |x: usize, y: usize| [0, 1, 2].map(|channel| image[channel * 64 * 64 + 64 * y + x]);
+        assert!(at(32, 32)[0] > at(32, 32)[2] + 60, "the ant is red");
+        assert!([(2, 2), (60, 30), (30, 60)].iter().all(|&(x, y)| at(x, y)[1] > 180), "floor");
+    }
 }

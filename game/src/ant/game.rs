@@ -3,13 +3,19 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::{
+    prelude::*,
+    vision::{Picture, VisionSystems},
+};
 
 use super::{
+    picture::AntPicturePlugin,
     sense::{joint_names, names},
     skeleton::{ACTUATED, JOINTS},
+    steering::{input_map, steer},
     walk::{Task, Walker, observe, start_episode, walk},
 };
+use crate::antview::VIEW;
 
 /// Control steps per second.
 pub const ANT_HZ: f64 = 10.0;
@@ -51,12 +57,24 @@ impl Game for Ant {
         action_names()
     }
 
+    fn input_map(&self) -> Option<InputMap> {
+        Some(input_map())
+    }
+
     fn observation(&self) -> ObservationSpace {
         (**SPACE).clone()
     }
 
     fn build(&self, app: &mut App, mode: &str) {
         app.add_plugins(AntPlugin { task: Task::named(mode).expect("callers check the mode against `modes`") });
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(AntPicturePlugin);
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
@@ -81,6 +99,13 @@ impl Plugin for AntPlugin {
         app.insert_resource(self.task)
             .add_observer(start_episode)
             .add_systems(ObserveSchedule, observe.before(VisionSystems::Dress))
+            .add_systems(
+                FixedPreUpdate,
+                steer::<Walker>
+                    .after(PlaybotSystems::Decide)
+                    .before(PlaybotSystems::Act)
+                    .run_if(resource_exists::<ButtonInput<KeyCode>>),
+            )
             .add_systems(FixedUpdate, walk.in_set(AntSystems));
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! The parts, from the bottom: [`skeleton`] has the measures, [`kinematics`] the pose, [`dynamics`] the mass matrix and
 //! the forces without contacts, [`contact`] finds where it touches, [`constraint`] and [`newton`] turn joint limits and
-//! contacts into accelerations, [`body`] integrates.
+//! contacts into accelerations, [`body`] integrates. [`pilot`] is what the game has taught.
 
 pub mod arrow;
 pub mod body;
@@ -20,10 +20,13 @@ pub mod game;
 pub mod kinematics;
 pub mod newton;
 pub mod parts;
+pub mod picture;
+pub mod pilot;
 pub mod sense;
 pub mod skeleton;
 pub mod spatial;
 pub mod state;
+pub mod steering;
 pub mod walk;
 pub mod walls;
 
@@ -31,5 +34,6 @@ pub use body::AntBody;
 pub use contact::WallBox;
 pub use game::{Ant, AntPlugin, AntSystems};
 pub use parts::{PARTS, Part};
+pub use pilot::{Pilot, PilotError};
 pub use state::AntState;
 pub use walls::Walls;

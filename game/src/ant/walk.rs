@@ -5,7 +5,7 @@ use bevy_playbot::{fault::Faults, prelude::*};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState};
+use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState, steering::HoldsAnt};
 
 /// How near a goal is near enough, in metres.
 pub const GOAL_RADIUS: f32 = 0.5;
@@ -77,6 +77,12 @@ impl Default for Walker {
 impl Walker {
     fn place(&self) -> Vec2 {
         self.body.torso().0.truncate()
+    }
+}
+
+impl HoldsAnt for Walker {
+    fn state(&self) -> AntState {
+        self.body.state()
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 
 use super::{level::AntMazeLevel, mode::AntMazeMode};
-use crate::ant::AntBody;
+use crate::ant::{AntBody, AntState, steering::HoldsAnt};
 
 /// Mode in which levels are made.
 #[derive(Resource, Clone, Debug, PartialEq)]
@@ -18,6 +18,12 @@ pub struct InMaze(pub Arc<AntMazeLevel>);
 /// An agent's ant with the floor and the walls around it: a physics world of its own. Comes with the first episode.
 #[derive(Component)]
 pub struct MazeAnt(pub AntBody);
+
+impl HoldsAnt for MazeAnt {
+    fn state(&self) -> AntState {
+        self.0.state()
+    }
+}
 
 /// The arena of an agent: what is drawn around it belongs to this entity.
 #[derive(Component, Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! The walker on its way from waypoint to waypoint, as a bot of the game.
+//! The pilot on its way from waypoint to waypoint, as a bot of the game.
 
 use std::sync::Arc;
 
@@ -8,11 +8,11 @@ use bevy_playbot::{agent::AgentOrder, fault::Faults, learner::rng::normal, polic
 use super::{
     components::{InMaze, MazeAnt},
     level::AntMazeLevel,
-    walker::{Walker, WalkerInput},
     waypoints::Waypoints,
 };
+use crate::ant::pilot::{Pilot, PilotInput};
 
-/// Walks to the goal: [`Waypoints`] followed by the shipped [`Walker`].
+/// Walks to the goal: [`Waypoints`] followed by the shipped [`Pilot`].
 #[derive(Component, Debug)]
 pub struct DemonstratorBot {
     noise: f64,
@@ -33,12 +33,12 @@ impl DemonstratorBot {
     }
 }
 
-/// Decides for all bots of the World in one pass of the walker's network.
+/// Decides for all bots of the World in one pass of the pilot's network.
 pub(super) fn decide(
     order: Res<AgentOrder>,
     mut bots: Query<(&Control, &Episode, &InMaze, &MazeAnt, &mut DemonstratorBot, &mut AgentStreams, &mut Action)>,
     mut faults: ResMut<Faults>,
-    (mut entities, mut input): (Local<Vec<Entity>>, Local<WalkerInput>),
+    (mut entities, mut input): (Local<Vec<Entity>>, Local<PilotInput>),
 ) {
     entities.clear();
     input.clear();
@@ -56,7 +56,7 @@ pub(super) fn decide(
     if entities.is_empty() {
         return;
     }
-    let torques = match Walker::shipped().and_then(|walker| walker.act(&input)) {
+    let torques = match Pilot::shipped().and_then(|pilot| pilot.act(&input)) {
         Ok(torques) => torques,
         Err(error) => return faults.report(error.to_string()),
     };

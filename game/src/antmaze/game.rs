@@ -7,12 +7,13 @@ use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
 
 use super::{
     components::PlaysIn, demonstrator_bot::DemonstratorBot, mode::AntMazeMode, picture::AntMazePicturePlugin,
-    plugin::AntMazePlugin, steering, view,
+    plugin::AntMazePlugin, view,
 };
 use crate::{
     ant::{
         game::{ANT_HZ, action_names},
         skeleton::JOINTS,
+        steering::input_map,
     },
     antview,
     maze::Map,
@@ -66,7 +67,7 @@ impl Game for AntMaze {
     }
 
     fn input_map(&self) -> Option<InputMap> {
-        Some(steering::input_map())
+        Some(input_map())
     }
 
     fn observation(&self) -> ObservationSpace {

@@ -14,9 +14,7 @@ pub mod mode;
 pub mod picture;
 pub mod play;
 pub mod plugin;
-mod steering;
 pub mod view;
-pub mod walker;
 pub mod walls;
 pub mod waypoints;
 
@@ -25,6 +23,5 @@ pub use game::AntMaze;
 pub use level::{AntMazeLevel, generate};
 pub use mode::{AntMazeMode, AntMazeModeError, GoalNoise, Goals, Pay};
 pub use plugin::{AntMazePlugin, AntMazeSystems};
-pub use walker::{Walker, WalkerError};
 pub use walls::wall_boxes;
 pub use waypoints::Waypoints;

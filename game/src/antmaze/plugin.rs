@@ -3,7 +3,14 @@
 use bevy::prelude::*;
 use bevy_playbot::{prelude::*, vision::VisionSystems};
 
-use super::{arena, components::AntMazeRules, demonstrator_bot, mode::AntMazeMode, play, steering};
+use super::{
+    arena,
+    components::{AntMazeRules, MazeAnt},
+    demonstrator_bot,
+    mode::AntMazeMode,
+    play,
+};
+use crate::ant::steering;
 
 /// The tick of AntMaze, in `FixedUpdate`. Add what your game adds before or after it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,11 +30,7 @@ impl Plugin for AntMazePlugin {
             .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Dress))
             .add_systems(
                 FixedPreUpdate,
-                (
-                    demonstrator_bot::decide,
-                    // The keyboard has written an action that does nothing.
-                    steering::steer.run_if(resource_exists::<ButtonInput<KeyCode>>),
-                )
+                (demonstrator_bot::decide, steering::steer::<MazeAnt>.run_if(resource_exists::<ButtonInput<KeyCode>>))
                     .chain()
                     .after(PlaybotSystems::Decide)
                     .before(PlaybotSystems::Act),

@@ -117,6 +117,6 @@ mod tests {
         let after = waypoints.next(&level, [20.0, 12.0], &mut rng);
         assert_ne!(before, after);
         assert!(distance(after, [20.5, 16.5]) < 1.0, "{after:?}");
-        assert_eq!(waypoints.next(&level, [20.0, 16.0], &mut rng), [20.0, 20.0], "beside the goal it is the goal");
+        assert_eq!(waypoints.next(&level, after, &mut rng), [20.0, 20.0], "after the last cell comes the goal itself");
     }
 }

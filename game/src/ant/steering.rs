@@ -4,8 +4,9 @@ use bevy::prelude::*;
 use bevy_playbot::{agent::AgentOrder, fault::Faults, prelude::*};
 
 use super::{
-    components::MazeAnt,
-    walker::{Walker, WalkerInput},
+    pilot::{Pilot, PilotInput},
+    skeleton::JOINTS,
+    state::AntState,
 };
 
 /// Keys for one way along an axis.
@@ -17,19 +18,26 @@ const UP: Keys = [KeyCode::ArrowUp, KeyCode::KeyW];
 
 /// What the keyboard does. No person can turn eight hinges at once, so an action cannot come from the keys alone: the
 /// keys of this map do nothing, and [`steer`] writes the action.
-pub(super) fn input_map() -> InputMap {
+pub fn input_map() -> InputMap {
     let help =
         "arrow keys or W, A, S and D tell the ant's walker where to go; without a key the ant lets go of its legs";
-    InputMap::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; 8]), help)
+    InputMap::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; JOINTS]), help)
 }
 
-/// Walks for people in the direction of their keys.
-pub(super) fn steer(
+/// Something that holds an agent's ant.
+pub trait HoldsAnt: Component {
+    /// Where the ant is and how it moves.
+    fn state(&self) -> AntState;
+}
+
+/// Walks for people in the direction of their keys. Runs after [`PlaybotSystems::Decide`], when the keyboard has written an
+/// action that does nothing, in apps with a keyboard.
+pub fn steer<C: HoldsAnt>(
     keys: Res<ButtonInput<KeyCode>>,
     order: Res<AgentOrder>,
-    mut ants: Query<(&Control, &Episode, &MazeAnt, &mut Action), With<InputMap>>,
+    mut ants: Query<(&Control, &Episode, &C, &mut Action), With<InputMap>>,
     mut faults: ResMut<Faults>,
-    mut input: Local<WalkerInput>,
+    mut input: Local<PilotInput>,
 ) {
     let way = |back, ahead| f32::from(i8::from(keys.any_pressed(ahead)) - i8::from(keys.any_pressed(back)));
     let direction = [way(LEFT, RIGHT), way(DOWN, UP)];
@@ -42,9 +50,9 @@ pub(super) fn steer(
             continue;
         }
         input.clear();
-        let state = ant.0.state();
+        let state = ant.state();
         input.push(&state, [state.qpos[0] + direction[0], state.qpos[1] + direction[1]]);
-        match Walker::shipped().and_then(|walker| walker.act(&input)) {
+        match Pilot::shipped().and_then(|pilot| pilot.act(&input)) {
             Ok(torques) => action.0 = ActionValue::Continuous(torques.concat()),
             Err(error) => return faults.report(error.to_string()),
         }

@@ -1,4 +1,4 @@
-//! The ant that walks where it is told: a policy that the game [`ant`](crate::ant) taught, shipped with the program.
+//! The walker that comes with the program: a policy that the game `ant` has taught to walk where it is told.
 
 use std::{path::Path, sync::LazyLock};
 
@@ -6,43 +6,43 @@ use bevy::math::Vec2;
 use bevy_playbot::learner::{Action, DeviceKind, FileError, LearnError, Policy, PolicyFile};
 use thiserror::Error;
 
-use crate::ant::{
-    AntState,
+use super::{
     sense::{SENSES, senses},
     skeleton::JOINTS,
+    state::AntState,
 };
 
 const NAME: &str = "assets/models/ant-walker.safetensors";
 const FILE: &[u8] = include_bytes!("../../../assets/models/ant-walker.safetensors");
 
-static SHIPPED: LazyLock<Result<Walker, WalkerError>> = LazyLock::new(|| Walker::from_bytes(NAME, FILE));
+static SHIPPED: LazyLock<Result<Pilot, PilotError>> = LazyLock::new(|| Pilot::from_bytes(NAME, FILE));
 
-/// The walker cannot walk.
+/// The walker that comes with the program cannot walk.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("the ant's walker cannot walk: {0}")]
-pub struct WalkerError(String);
+pub struct PilotError(String);
 
-impl From<FileError> for WalkerError {
+impl From<FileError> for PilotError {
     fn from(error: FileError) -> Self {
         Self(error.to_string())
     }
 }
 
-impl From<LearnError> for WalkerError {
+impl From<LearnError> for PilotError {
     fn from(error: LearnError) -> Self {
         Self(error.to_string())
     }
 }
 
-/// A policy that walks towards goals.
+/// A policy that walks towards any place.
 #[derive(Clone, Debug)]
-pub struct Walker(Policy);
+pub struct Pilot(Policy);
 
-/// What walkers sense: a row of [`SENSES`] numbers to an ant.
+/// What pilots sense: a row of [`SENSES`] numbers to an ant.
 #[derive(Clone, Debug, Default)]
-pub struct WalkerInput(Vec<f32>);
+pub struct PilotInput(Vec<f32>);
 
-impl WalkerInput {
+impl PilotInput {
     /// Forgets all ants.
     pub fn clear(&mut self) {
         self.0.clear();
@@ -58,13 +58,13 @@ impl WalkerInput {
     }
 }
 
-impl Walker {
+impl Pilot {
     /// The walker that comes with the program.
     ///
     /// # Errors
     ///
     /// This machine computes something else than the one that made the file.
-    pub fn shipped() -> Result<&'static Self, WalkerError> {
+    pub fn shipped() -> Result<&'static Self, PilotError> {
         SHIPPED.as_ref().map_err(Clone::clone)
     }
 
@@ -73,11 +73,11 @@ impl Walker {
     /// # Errors
     ///
     /// It is no policy file, or its policy senses something else.
-    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, WalkerError> {
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, PilotError> {
         let policy = PolicyFile::from_bytes(Path::new(name), bytes, DeviceKind::default())?.policy;
         if policy.obs_dim() != SENSES {
             let reads = policy.obs_dim();
-            return Err(WalkerError(format!("{name} reads {reads} values, but an ant senses {SENSES}")));
+            return Err(PilotError(format!("{name} reads {reads} values, but an ant senses {SENSES}")));
         }
         Ok(Self(policy))
     }
@@ -87,13 +87,38 @@ impl Walker {
     /// # Errors
     ///
     /// The policy says something that is no number, or acts with another number of torques.
-    pub fn act(&self, input: &WalkerInput) -> Result<Vec<[f32; JOINTS]>, WalkerError> {
+    pub fn act(&self, input: &PilotInput) -> Result<Vec<[f32; JOINTS]>, PilotError> {
         let output = self.0.forward(&[], &input.0[..], input.len())?;
         let row = |row| match output.greedy(row) {
             Action::Continuous(torques) => <[f32; JOINTS]>::try_from(torques).ok(),
             Action::Discrete(_) => None,
         };
         let torques: Option<Vec<_>> = (0..input.len()).map(row).collect();
-        torques.ok_or_else(|| WalkerError(format!("its policy does not act with {JOINTS} torques")))
+        torques.ok_or_else(|| PilotError(format!("its policy does not act with {JOINTS} torques")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_pilot_pushes_each_ant_its_own_way() {
+        let pilot = Pilot::shipped().expect("comes with the program");
+        let state = AntState::nominal();
+        let mut input = PilotInput::default();
+        [[8.0, 0.0], [0.0, 8.0], [8.0, 0.0], [2.0, 0.0]].iter().for_each(|&goal| input.push(&state, goal));
+        let torques = pilot.act(&input).expect("numbers");
+        assert_eq!(torques[0], torques[2]);
+        assert_eq!(torques[0], torques[3], "how far it is does not matter");
+        assert_ne!(torques[0], torques[1]);
+        input.clear();
+        assert!(pilot.act(&input).expect("nothing to do").is_empty());
+    }
+
+    #[test]
+    fn other_files_are_refused_by_name() {
+        let error = Pilot::from_bytes("legs.safetensors", b"nothing").expect_err("no policy").to_string();
+        assert!(error.contains("legs.safetensors"), "{error}");
     }
 }
