@@ -37,7 +37,9 @@ fn maze(args: &Args) -> Result<Maze, CliError> {
     let text = args.map.as_deref().unwrap_or("random");
     let map: Map = match text.parse() {
         Ok(map) => map,
-        Err(MapError::Name(error)) if error.what == "map" => return from_file(Path::new(text), args, &error.to_string()),
+        Err(MapError::Name(error)) if error.what == "map" => {
+            return from_file(Path::new(text), args, &error.to_string());
+        }
         Err(error) => return Err(error.into()),
     };
     if args.seed.is_some() && !matches!(map, Map::Random(_)) {
