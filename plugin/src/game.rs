@@ -92,8 +92,8 @@ pub trait Game: Send + Sync {
         None
     }
 
-    /// Hands an agent over to the demonstrator. `noise` is the probability with which an action is replaced by a
-    /// uniformly random one.
+    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by a
+    /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
     fn arm_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 }
 
