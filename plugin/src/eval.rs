@@ -1,5 +1,7 @@
 //! Measuring: each level equally often, every episode counted once.
 
+use std::collections::HashMap;
+
 use bevy::prelude::*;
 use playbot_learner::Policy;
 use serde::Serialize;
@@ -9,7 +11,7 @@ use crate::{
     agent::Agent,
     bot::BlindBot,
     control::Control,
-    episode::{EpisodeEnd, EpisodeEnded},
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
     fault::Fault,
     game::{Game, build_seeing_world},
     headless::tick_world,
@@ -135,18 +137,29 @@ pub struct EvalSummary {
     pub clipped: f64,
 }
 
+/// One measured episode, and where it led.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trail {
+    /// The episode.
+    pub result: EpisodeResult,
+    /// Where the agent was after each tick, on the game's [`FloorPlan`](crate::floor_plan::FloorPlan). Empty if the
+    /// game does not say.
+    pub places: Vec<Vec2>,
+}
+
 #[derive(Resource, Default)]
-struct Results(Vec<EpisodeResult>);
+struct Results(Vec<(Entity, EpisodeResult)>);
 
 fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
-    results.0.push(EpisodeResult {
+    let result = EpisodeResult {
         level: event.level,
         end: event.end,
         success: event.success,
         ticks: event.ticks,
         clipped: event.clipped,
         total_reward: event.total_reward,
-    });
+    };
+    results.0.push((event.entity, result));
 }
 
 /// Plays every level of the plan and returns all episodes, sorted by level. `progress` hears each finished episode; it
@@ -161,15 +174,41 @@ pub fn evaluate(
     plan: &EvalPlan,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Vec<EpisodeResult>, EvalError> {
+    let trails = play(game, player, plan, false, progress)?;
+    Ok(trails.into_iter().map(|trail| trail.result).collect())
+}
+
+/// [`evaluate`], and where every episode led. The results are the same.
+///
+/// # Errors
+///
+/// The game broke its contract, or cannot be seen this way.
+pub fn evaluate_with_trails(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Trail>, EvalError> {
+    play(game, player, plan, true, progress)
+}
+
+fn play(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    follow: bool,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Trail>, EvalError> {
     let worlds: Result<Vec<_>, _> = (0..plan.worlds).map(|world| stage(game, player, plan, world)).collect();
     let mut worlds = worlds?;
-    let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, &progress));
-    let mut results = Vec::new();
+    let followed = follow.then_some(game);
+    let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, followed, &progress));
+    let mut trails = Vec::new();
     for part in parts {
-        results.extend(part?);
+        trails.extend(part?);
     }
-    results.sort_by_key(|result| result.level);
-    Ok(results)
+    trails.sort_by_key(|trail| trail.result.level);
+    Ok(trails)
 }
 
 /// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
@@ -192,19 +231,33 @@ fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) ->
     Ok(world)
 }
 
-/// Ticks until every agent has played its list.
-fn play_out(world: &mut World, progress: &(impl Fn(u64) + Sync)) -> Result<Vec<EpisodeResult>, Fault> {
+/// Ticks until every agent has played its list. With a game, notes where each agent is after each tick.
+fn play_out(
+    world: &mut World,
+    followed: Option<&dyn Game>,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Vec<Trail>, Fault> {
     let mut agents = world.query_filtered::<&Control, With<Agent>>();
-    let mut known = 0;
+    let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
+    let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
+    let mut trails = Vec::new();
     while agents.iter(world).any(|control| control.is_active()) {
         tick_world(world)?;
-        let done = world.resource::<Results>().0.len() as u64;
-        if done > known {
-            progress(done - known);
-            known = done;
+        let ended = std::mem::take(&mut world.resource_mut::<Results>().0);
+        for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {
+            let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
+            let is_seen = is_playing || ended.iter().any(|(entity, _)| *entity == agent);
+            if let Some(place) = is_seen.then(|| game.whereabouts(world, agent)).flatten() {
+                places.entry(agent).or_default().push(place);
+            }
         }
+        if !ended.is_empty() {
+            progress(ended.len() as u64);
+        }
+        let trail = |(agent, result)| Trail { result, places: places.remove(&agent).unwrap_or_default() };
+        trails.extend(ended.into_iter().map(trail));
     }
-    Ok(std::mem::take(&mut world.resource_mut::<Results>().0))
+    Ok(trails)
 }
 
 /// Sums up the episodes of one player on one split.

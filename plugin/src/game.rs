@@ -6,6 +6,7 @@ use thiserror::Error;
 use crate::{
     action::ActionSpace,
     bot::BlindBot,
+    floor_plan::FloorPlan,
     input_map::InputMap,
     mode::ModeError,
     observation::ObservationSpace,
@@ -71,6 +72,16 @@ pub trait Game: Send + Sync {
     /// under [`Control::Idle`](crate::control::Control::Idle).
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity;
 
+    /// A level from above, for pictures of where agents went; `None` if it has no such picture.
+    fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
+        None
+    }
+
+    /// Where an agent is on its [`floor_plan`](Self::floor_plan); `None` where there is no plan, or no level is played.
+    fn whereabouts(&self, _world: &World, _agent: Entity) -> Option<Vec2> {
+        None
+    }
+
     /// Bots that every learner is compared with, by name.
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
         vec![("random", BlindBot::Uniform)]
@@ -81,8 +92,8 @@ pub trait Game: Send + Sync {
         None
     }
 
-    /// Hands an agent over to the demonstrator. `noise` is the probability with which an action is replaced by a
-    /// uniformly random one.
+    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by a
+    /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
     fn arm_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 }
 

@@ -88,6 +88,7 @@ pub mod demo;
 pub mod episode;
 pub mod eval;
 pub mod fault;
+pub mod floor_plan;
 pub mod game;
 pub mod headless;
 pub mod input_map;

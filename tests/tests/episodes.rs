@@ -39,6 +39,32 @@ fn termination_and_truncation_are_told_apart() {
     }
 }
 
+/// Says at tick 5 that the aim is reached, and from then on that actions are clipped.
+fn reach(mut episodes: Query<&mut Episode>) {
+    for mut episode in &mut episodes {
+        if episode.tick == 5 {
+            episode.reach();
+        }
+        if episode.tick >= 5 {
+            episode.note_clipped();
+        }
+    }
+}
+
+#[test]
+fn an_aim_that_was_reached_before_time_was_up_is_a_success_and_no_termination() {
+    for (reaches, success, clipped) in [(true, true, 15), (false, false, 0)] {
+        let (mut app, agent) = app_with(2, &[1, 1]);
+        app.add_systems(FixedPostUpdate, reach.before(PlaybotSystems::Judge).run_if(move || reaches));
+        app.play_episodes(2, 50).expect("ends in time");
+        let ended = &app.world().resource::<Ends>().0;
+        assert!(ended.iter().all(|ended| ended.end == EpisodeEnd::Truncated && ended.ticks == 20));
+        assert!(ended.iter().all(|ended| (ended.success, ended.clipped) == (success, clipped)), "of each episode anew");
+        let count = app.world().get::<EpisodeCount>(agent).expect("an agent");
+        assert_eq!((count.finished, count.successes), (2, 2 * u64::from(success)));
+    }
+}
+
 #[test]
 fn levels_are_played_in_order_and_then_the_agent_idles() {
     let (mut app, agent) = app_with(1, &[1, 2, 5]);

@@ -13,8 +13,11 @@ pub const GOAL_RADIUS: f32 = 0.5;
 const PROGRESS_REWARD: f32 = 10.0;
 /// Reward for each step on the feet.
 const UPRIGHT_REWARD: f32 = 0.1;
-/// Price of the square of each action.
-const EFFORT_PRICE: f32 = 0.02;
+/// Price of the square of each number of an action, as it was asked for: asking for more than there is costs too, so
+/// that the gait stays within the range and can be imitated.
+const EFFORT_PRICE: f32 = 0.05;
+/// Most that the square of a number costs.
+const MOST_EFFORT: f32 = 9.0;
 
 /// What is asked of the ant.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,7 +122,7 @@ pub(super) fn walk(
         }
         *hash = state.hash();
         let distance = walker.place().distance(walker.goal);
-        let effort: f32 = action.iter().map(|value| value.clamp(-1.0, 1.0).powi(2)).sum();
+        let effort: f32 = action.iter().map(|value| value.powi(2).min(MOST_EFFORT)).sum();
         reward.add(PROGRESS_REWARD * (before - distance) + UPRIGHT_REWARD - EFFORT_PRICE * effort);
         if distance <= GOAL_RADIUS {
             match *task {

@@ -3,11 +3,16 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
+use bevy_playbot::{floor_plan::FloorPlan, mode::ModeError, prelude::*, vision::Picture};
 
 use super::{
-    components::PlaysIn, demonstrator_bot::DemonstratorBot, mode::AntMazeMode, picture::AntMazePicturePlugin,
-    plugin::AntMazePlugin, view,
+    components::{MazeAnt, PlaysIn},
+    demonstrator_bot::DemonstratorBot,
+    level::generate,
+    mode::AntMazeMode,
+    picture::AntMazePicturePlugin,
+    plugin::AntMazePlugin,
+    view,
 };
 use crate::{
     ant::{
@@ -89,6 +94,15 @@ impl Game for AntMaze {
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         spawn_agent(world, index)
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Some(generate(&mode.parse().ok()?, level).ok()?.floor_plan())
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        let [x, y, ..] = world.get::<MazeAnt>(agent)?.0.state().qpos;
+        Some(Vec2::new(x, y))
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

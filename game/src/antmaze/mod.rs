@@ -7,6 +7,7 @@
 mod arena;
 pub mod components;
 mod demonstrator_bot;
+mod floor_plan;
 pub mod game;
 pub mod geometry;
 pub mod level;

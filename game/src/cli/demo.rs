@@ -98,13 +98,14 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
             print_line(json!(summary))?;
         } else {
             print_line(format!(
-                "{}: {} {}, {} episodes, {} steps, {:.1} % success, {} levels, {} KiB, by {}, decided by {}",
+                "{}: {} {}, {} episodes, {} steps, {:.1} % success{}, {} levels, {} KiB, by {}, decided by {}",
                 file.display(),
                 summary.header.game,
                 summary.header.mode,
                 summary.episodes,
                 summary.steps,
                 100.0 * summary.success_share.unwrap_or(0.0),
+                out_of_time(&summary),
                 summary.levels,
                 summary.bytes / 1024,
                 summary.header.demonstrator,
@@ -113,6 +114,11 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
         }
     }
     Ok(outcome)
+}
+
+/// Recordings do not say whether the aim was reached before time was up.
+fn out_of_time(summary: &DemoSummary) -> String {
+    if summary.truncated > 0 { format!(" ({} until time was up)", summary.truncated) } else { String::new() }
 }
 
 /// Who decided which share of the ticks.

@@ -17,6 +17,7 @@ use bevy_playbot::{
 use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
+    footprints::Footprints,
     methods,
     player::Chosen,
 };
@@ -29,6 +30,7 @@ use crate::registry;
   playbot eval --bot right-jump --bot random --levels hard:0..63 --json
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
+  playbot eval --run runs/first --bot right-jump --levels hard:64..66 --plot where.png
   playbot eval --run runs/first --bot search --levels hard:64..127 --levels easy:500..599")]
 pub struct Args {
     /// Folder of a run; may be given several times.
@@ -69,6 +71,9 @@ pub struct Args {
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
     device: DeviceKind,
+    /// Also draw where the players went, and how often they were where, into this .png or .svg.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     /// One line of JSON per player and range of levels.
     #[arg(long)]
     json: bool,
@@ -86,17 +91,28 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let players = players(game, &experiment, &args)?;
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
     let episodes = experiment.eval.episodes_per_level;
+    splits.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
-        game.check_mode(&split.mode)?;
         for Chosen { name, player, sight } in &players {
             let plan = EvalPlan { sight: *sight, ..methods::plan(&experiment, split, episodes, args.threads) };
-            let measured = methods::measure(game, name, player, &plan)?;
+            let measured = match &mut footprints {
+                Some(footprints) => {
+                    let (measured, trails) = methods::follow(game, name, player, &plan)?;
+                    footprints.add(game, split, name, trails);
+                    measured
+                }
+                None => methods::measure(game, name, player, &plan)?,
+            };
             if args.json {
                 methods::print_json(&measured.summary)?;
             }
             rows.push(measured.into_row());
         }
+    }
+    if let Some(footprints) = footprints {
+        footprints.write(game)?;
     }
     if !args.json {
         print_line(to_text_table(&rows))?;

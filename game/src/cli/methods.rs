@@ -1,7 +1,7 @@
 //! Players by name: what `eval` and `quickstart` measure.
 
 use bevy_playbot::{
-    eval::{EvalPlan, EvalSummary, Player, evaluate, summarize},
+    eval::{EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, evaluate, evaluate_with_trails, summarize},
     game::{Game, UnknownName},
     report::ResultRow,
     split::LevelSplit,
@@ -79,12 +79,37 @@ impl Measured {
 ///
 /// The game broke its contract.
 pub fn measure(game: &dyn Game, name: &str, player: &Player, plan: &EvalPlan) -> Result<Measured, CliError> {
+    timed(name, plan, |progress| evaluate(game, player, plan, progress), |episode| episode)
+        .map(|(measured, _)| measured)
+}
+
+/// [`measure`], and where every episode led.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub fn follow(
+    game: &dyn Game,
+    name: &str,
+    player: &Player,
+    plan: &EvalPlan,
+) -> Result<(Measured, Vec<Trail>), CliError> {
+    timed(name, plan, |progress| evaluate_with_trails(game, player, plan, progress), |trail| &trail.result)
+}
+
+fn timed<T>(
+    name: &str,
+    plan: &EvalPlan,
+    play: impl FnOnce(&(dyn Fn(u64) + Sync)) -> Result<Vec<T>, EvalError>,
+    result: impl Fn(&T) -> &EpisodeResult,
+) -> Result<(Measured, Vec<T>), CliError> {
     let total = plan.split.len() * u64::from(plan.episodes_per_level);
     let bar = progress::bar(&format!("test {name}"), total, "episodes");
     let start = std::time::Instant::now();
-    let episodes = evaluate(game, player, plan, |n| bar.inc(n))?;
+    let played = play(&|n| bar.inc(n))?;
     let seconds = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
+    let episodes: Vec<_> = played.iter().map(|episode| *result(episode)).collect();
     let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
     let summary = summarize(name, &plan.split, &episodes);
     if summary.clipped > 0.0 {
@@ -93,7 +118,7 @@ pub fn measure(game: &dyn Game, name: &str, player: &Player, plan: &EvalPlan) ->
             100.0 * summary.clipped
         );
     }
-    Ok(Measured { summary, steps_per_s: steps as f64 / seconds })
+    Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
 }
 
 /// Prints a row as one line of JSON.

@@ -3,11 +3,12 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::Picture};
+use bevy_playbot::{floor_plan::FloorPlan, prelude::*, vision::Picture};
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
     demonstrator_bot::DemonstratorBot,
+    generate,
     picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
     rules::ACTIONS,
@@ -99,6 +100,15 @@ impl Game for CoinRun {
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         spawn_agent(world, index)
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        let level = generate(mode.parse().ok()?, u32::try_from(level).ok()?);
+        Some(level.floor_plan())
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<PlayerBody>(agent).map(|body| Vec2::new(body.0.x, body.0.y))
     }
 
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {

@@ -7,6 +7,7 @@
 pub mod arena;
 pub mod components;
 mod demonstrator_bot;
+mod floor_plan;
 pub mod game;
 pub mod generator;
 pub mod level;

@@ -10,6 +10,7 @@ mod draw;
 mod ends;
 mod error;
 pub mod fixed;
+mod floor_plan;
 mod generator;
 mod layout;
 mod map;

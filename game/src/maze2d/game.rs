@@ -3,11 +3,13 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{mode::ModeError, prelude::*, vision::Picture};
+use bevy_playbot::{floor_plan::FloorPlan, mode::ModeError, prelude::*, vision::Picture};
 
 use super::{
     components::{MazeBall, PlaysIn},
     demonstrator_bot::DemonstratorBot,
+    floor_plan::point,
+    level::Maze2dLevel,
     mode::Maze2dMode,
     picture::{Maze2dPicturePlugin, VIEW},
     play::OBSERVED,
@@ -97,6 +99,14 @@ impl Game for Maze2d {
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         spawn_agent(world, index)
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Some(Maze2dLevel::new(&mode.parse().ok()?, level).ok()?.floor_plan())
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<MazeBall>(agent).map(|ball| point(ball.0.position))
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

@@ -11,6 +11,7 @@ pub mod components;
 pub mod demonstrator;
 mod demonstrator_bot;
 mod draws;
+mod floor_plan;
 pub mod game;
 pub mod level;
 pub mod mode;

@@ -86,8 +86,8 @@ proptest! {
 
 #[test]
 fn the_seeds_for_the_test_give_mazes_that_nobody_trained_on() {
-    let mazes = |seeds| -> BTreeSet<Vec<String>> {
-        Iterator::map(seeds, |seed| generate(&MazeSpec::default(), seed).expect("a maze").to_rows()).collect()
+    let mazes = |seeds: std::ops::RangeInclusive<u64>| -> BTreeSet<Vec<String>> {
+        seeds.map(|seed| generate(&MazeSpec::default(), seed).expect("a maze").to_rows()).collect()
     };
     let (train, held_out) = (mazes(TRAIN_SEEDS), mazes(HELD_OUT_SEEDS));
     assert_eq!((train.len(), held_out.len()), (64, 64), "all of them differ");

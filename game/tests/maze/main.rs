@@ -1,5 +1,6 @@
 //! Mazes: the fixed maps against golden data, the generator's promises, and the planner on both.
 
+mod cli;
 mod fixed;
 mod generator;
 mod planner;

@@ -18,11 +18,12 @@ macro_rules! presets {
 }
 
 /// All of them.
-pub const PRESETS: [Preset; 8] = presets![
+pub const PRESETS: [Preset; 9] = presets![
     "coinrun-ppo",
     "coinrun-sac",
     "d4rl-ppo",
     "d4rl-sac",
+    "maze-hour",
     "skill-paper",
     "skill-released",
     "score-released-coinrun",

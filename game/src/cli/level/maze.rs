@@ -2,11 +2,16 @@
 
 use std::{fs::File, io::Read, path::Path};
 
+use bevy::math::{Rect, Vec2};
+use bevy_playbot::report::{Drawing, MarkForm, Rgb, Shape};
 use serde_json::json;
 
 use super::Args;
 use crate::{
-    cli::error::{CliError, Outcome, print_line},
+    cli::{
+        error::{CliError, Outcome, print_line},
+        plot::PlotFile,
+    },
     maze::{Cell, MAX_CELLS, Map, MapError, Maze},
 };
 
@@ -18,7 +23,11 @@ pub fn show(args: &Args) -> Result<Outcome, CliError> {
     if args.mode.is_some() {
         return Err(CliError::Usage("mazes are named by --map and --seed, without the rest of a mode".to_owned()));
     }
+    let file = args.png.as_deref().map(PlotFile::new).transpose()?;
     let maze = maze(args)?;
+    if let Some(file) = file {
+        file.write(&draw(&maze)?)?;
+    }
     if args.json {
         print_line(json!({
             "rows": maze.to_rows(),
@@ -79,4 +88,29 @@ fn picture(maze: &Maze) -> Vec<String> {
         rows[row][col] = '.';
     }
     rows.into_iter().map(String::from_iter).collect()
+}
+
+/// Side of a cell in a drawing, pixels.
+const SIDE: f32 = 16.0;
+/// Most cells to a side of a drawing.
+const MOST_DRAWN: usize = 256;
+const WALL: Rgb = [190, 195, 201];
+const PATH: Rgb = [0, 114, 178];
+const INK: Rgb = [31, 35, 40];
+
+/// The maze with its shortest path, the first row at the top.
+fn draw(maze: &Maze) -> Result<Drawing, CliError> {
+    if maze.rows().max(maze.columns()) > MOST_DRAWN {
+        return Err(CliError::Usage(format!("no more than {MOST_DRAWN} cells to a side are drawn: leave --png out")));
+    }
+    let place = |cell: Cell| Vec2::new(cell.col as f32 + 0.5, cell.row as f32 + 0.5) * SIDE;
+    let square = |cell| Rect::from_center_size(place(cell), Vec2::splat(SIDE));
+    let mut shapes: Vec<_> = maze.wall_cells().map(|cell| Shape::Block { area: square(cell), fill: WALL }).collect();
+    let points = maze.shortest_path().into_iter().map(place).collect();
+    shapes.push(Shape::Line { points, width: 3.0, colour: PATH, opacity: 1.0 });
+    for (form, cell, fill) in [(MarkForm::Disc, maze.start(), [255; 3]), (MarkForm::Diamond, maze.goal(), INK)] {
+        shapes.push(Shape::Mark { form, centre: place(cell), radius: SIDE / 3.0, fill, outline: INK });
+    }
+    let size = Vec2::new(maze.columns() as f32, maze.rows() as f32) * SIDE;
+    Ok(Drawing { label: "A maze with its shortest path".to_owned(), size, shapes })
 }

@@ -17,7 +17,7 @@ use crate::registry;
   playbot level antmaze --map large
   playbot level maze2d --seed 7 --json
   playbot level maze2d --map random+size=21x21+loops=0.2 --seed 7
-  playbot level maze2d --map my-maze.txt")]
+  playbot level maze2d --map my-maze.txt --png my-maze.png")]
 pub struct Args {
     /// Name of the game.
     game: String,
@@ -33,7 +33,7 @@ pub struct Args {
     /// Print one line of JSON instead of a picture.
     #[arg(long)]
     json: bool,
-    /// Also draw the whole level into this file.
+    /// Also draw the whole level into this .png; mazes into a .svg too.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 }

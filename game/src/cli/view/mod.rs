@@ -2,7 +2,7 @@
 
 mod caption;
 pub mod film;
-mod font;
+pub mod font;
 mod options;
 pub mod screen;
 mod stage;

@@ -31,6 +31,15 @@ impl Screen {
         }
     }
 
+    /// Mixes a colour into a pixel on the screen: with 0 it stays as it is, with 1 the colour replaces it.
+    pub fn blend(&mut self, x: usize, y: usize, colour: Colour, share: f32) {
+        let pixel = &mut self.pixels[y * self.width + x];
+        for (old, new) in pixel.iter_mut().zip(colour) {
+            let (from, to) = (f32::from(*old), f32::from(new));
+            *old = (from + share * (to - from)).round() as u8;
+        }
+    }
+
     /// Draws planes of pixels `[1 or 3, height, width]`, enlarged, with the upper left corner at (x, y).
     pub fn planes(&mut self, planes: &[u8], width: usize, height: usize, scale: usize, (x, y): (usize, usize)) {
         let plane = width * height;

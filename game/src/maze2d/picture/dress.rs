@@ -19,9 +19,9 @@ use crate::{
 /// Layers above the tiles.
 const GOAL: f32 = 1.0;
 const BALL: f32 = 2.0;
-/// Diameters, cells.
-const GOAL_SIZE: f32 = 0.8;
-const BALL_SIZE: f32 = 0.55;
+/// Diameters of goal and ball in small mazes and in large ones, cells; and what they aim at in between, world units.
+const GOAL_SIZES: ([f32; 2], f32) = ([0.8, 1.2], 1.1);
+const BALL_SIZES: ([f32; 2], f32) = ([0.55, 0.9], 0.75);
 
 /// From one arena to the next: further than an agent sees.
 const SPACING: f32 = 4.0 * VIEW;
@@ -52,11 +52,11 @@ pub(super) fn players(
         let (column, row) = (stages.0 % ARENAS_PER_ROW, stages.0 / ARENAS_PER_ROW);
         stages.0 += 1;
         let tiles = commands.spawn((ChildOf(plays_in.0), Transform::default(), Visibility::default())).id();
-        let mut figure = |image: &Handle<Image>, size: f32| {
-            let sprite = Sprite { custom_size: Some(Vec2::splat(size)), ..Sprite::from_image(image.clone()) };
+        let mut figure = |image: &Handle<Image>| {
+            let sprite = Sprite { custom_size: Some(Vec2::ONE), ..Sprite::from_image(image.clone()) };
             commands.spawn((ChildOf(tiles), sprite, Transform::default())).id()
         };
-        let (goal, ball) = (figure(&art.goal, GOAL_SIZE), figure(&art.ball, BALL_SIZE));
+        let (goal, ball) = (figure(&art.goal), figure(&art.ball));
         let place = Vec3::new(column as f32, row as f32, 0.0) * SPACING;
         commands.entity(plays_in.0).insert((Stage, Transform::from_translation(place), Board { tiles, goal, ball }));
         let middle = Transform::from_xyz(VIEW / 2.0, VIEW / 2.0, 0.0);
@@ -86,9 +86,18 @@ pub(super) fn levels(
         let (columns, rows) = (maze.columns() as u32, maze.rows() as u32);
         commands.entity(board.tiles).insert((TileLayer { tileset, columns, rows, cells, outside: WALL }, place));
         if let Ok(mut goal) = places.get_mut(board.goal) {
-            goal.translation = on_board(&arena.level, arena.level.goal()).extend(GOAL);
+            *goal = figure_at(on_board(&arena.level, arena.level.goal()).extend(GOAL), GOAL_SIZES, scale);
+        }
+        if let Ok(mut ball) = places.get_mut(board.ball) {
+            *ball = figure_at(on_board(&arena.level, arena.level.start.position).extend(BALL), BALL_SIZES, scale);
         }
     }
+}
+
+/// A figure that can be seen, whatever the scale of the tiles.
+fn figure_at(place: Vec3, ([least, most], wanted): ([f32; 2], f32), scale: f32) -> Transform {
+    let size = (wanted / scale).clamp(least, most);
+    Transform::from_translation(place).with_scale(Vec3::new(size, size, 1.0))
 }
 
 /// Tile numbers of all cells, bottom row first: the last row of the maze.

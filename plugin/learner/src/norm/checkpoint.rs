@@ -1,6 +1,6 @@
-//! Normalisers in a checkpoint.
+//! Normalisers in files.
 
-use super::{ObsNormalizer, RewardNormalizer, RunningStats};
+use super::{ObsNormalizer, ObsStats, RewardNormalizer, RunningStats};
 use crate::FileError;
 use crate::file::TensorFile;
 
@@ -33,6 +33,26 @@ pub(crate) fn take_normalizers(
         normalizer.returns = file.take_f64("reward_norm.returns", None)?;
     }
     Ok(())
+}
+
+/// Adds frozen statistics called `name` to a file.
+pub(crate) fn put_obs_stats(file: &mut TensorFile, name: &str, stats: &ObsStats) {
+    file.put_f64(&format!("{name}.mean"), &stats.mean);
+    file.put_f64(&format!("{name}.inv_std"), &stats.inv_std);
+}
+
+/// Takes the frozen statistics of `dim` numbers called `name` out of a file.
+pub(crate) fn take_obs_stats(file: &mut TensorFile, name: &str, dim: usize) -> Result<ObsStats, FileError> {
+    let mean = file.take_f64(&format!("{name}.mean"), Some(dim))?;
+    let inv_std = file.take_f64(&format!("{name}.inv_std"), Some(dim))?;
+    let usable = |(mean, scale): (&f64, &f64)| mean.is_finite() && scale.is_finite() && *scale > 0.0;
+    match mean.iter().zip(&inv_std).position(|pair| !usable(pair)) {
+        None => Ok(ObsStats { mean, inv_std }),
+        Some(at) => {
+            let text = format!("`{name}` cannot normalise number {at}: {} · (x - {})", inv_std[at], mean[at]);
+            Err(file.format(text))
+        }
+    }
 }
 
 fn put_stats(file: &mut TensorFile, name: &str, stats: &RunningStats) {

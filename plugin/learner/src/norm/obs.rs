@@ -1,4 +1,4 @@
-//! Running normalisation of observations.
+//! Normalisation of observations: frozen, or running.
 
 use super::RunningStats;
 
@@ -6,6 +6,8 @@ use super::RunningStats;
 const EPS: f64 = 1e-8;
 /// Normalised observations are clipped to ± this.
 const CLIP: f64 = 10.0;
+/// A dimension that deviates by less than this counts as constant.
+const CONSTANT: f64 = 1e-3;
 
 /// Mean and scale per dimension, fixed at one moment.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,11 +17,43 @@ pub struct ObsStats {
 }
 
 impl ObsStats {
-    /// Adds the normalised `observation` to the end of `out`: clip((x - mean)/√(var + 1e-8), ±10).
+    /// Mean and deviation of all `rows` of `dim` numbers, the same on any number of threads.
+    ///
+    /// A dimension that deviates by less than 1e-3 counts as constant and is centred only, since what it would be
+    /// divided by is not known: a value that the rows do not hold stays as far from the mean as it is.
+    pub(crate) fn of<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone, dim: usize) -> Self {
+        let sums = |add: &dyn Fn(usize, f64) -> f64| {
+            let (mut sums, mut n) = (vec![0.0; dim], 0u64);
+            for row in rows.clone() {
+                sums.iter_mut().zip(row).enumerate().for_each(|(d, (sum, &x))| *sum += add(d, f64::from(x)));
+                n += 1;
+            }
+            sums.iter_mut().for_each(|sum| *sum /= n.max(1) as f64);
+            sums
+        };
+        let mean = sums(&|_, x| x);
+        let inv_std = sums(&|d, x| (x - mean[d]).powi(2)).iter().map(|var| inverse_deviation(*var)).collect();
+        Self { mean, inv_std }
+    }
+
+    /// All of `rows` normalised.
+    pub(crate) fn normalize(&self, rows: &[f32]) -> Vec<f32> {
+        let mut out = Vec::with_capacity(rows.len());
+        rows.chunks_exact(self.mean.len().max(1)).for_each(|row| self.normalize_into(row, &mut out));
+        out
+    }
+
+    /// Adds the normalised `observation` to the end of `out`: clip((x - mean) / deviation, ±10).
     pub fn normalize_into(&self, observation: &[f32], out: &mut Vec<f32>) {
         let dims = observation.iter().zip(&self.mean).zip(&self.inv_std);
         out.extend(dims.map(|((&x, m), s)| ((f64::from(x) - m) * s).clamp(-CLIP, CLIP) as f32));
     }
+}
+
+/// 1/√var, or 1 where that is next to constant.
+fn inverse_deviation(var: f64) -> f64 {
+    let deviation = var.sqrt();
+    if deviation < CONSTANT { 1.0 } else { 1.0 / deviation }
 }
 
 /// Keeps the running mean and variance of observations.
@@ -41,11 +75,28 @@ impl ObsNormalizer {
         self.stats.update(rows.iter().map(|&x| f64::from(x)), n);
     }
 
-    /// The present mean and scale.
+    /// The present mean and scale 1/√(var + 1e-8).
     pub fn snapshot(&self) -> ObsStats {
         ObsStats {
             mean: self.stats.mean.clone(),
             inv_std: self.stats.var.iter().map(|v| 1.0 / (v + EPS).sqrt()).collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frozen_statistics_by_hand() {
+        // The second dimension is constant, the third nearly so.
+        let rows = [[1.0, 60.0, 0.5], [5.0, 60.0, 0.5002], [3.0, 60.0, 0.5001], [7.0, 60.0, 0.4997]];
+        let stats = ObsStats::of(rows.iter().map(<[f32; 3]>::as_slice), 3);
+        let got = stats.normalize(&[6.0, 60.0, 0.5, -400.0, 63.0, 1.5]);
+        // Mean 4, variance 5.
+        let want = [2.0 / 5.0f32.sqrt(), 0.0, 0.0, -10.0, 3.0, 1.0];
+        assert!(got.iter().zip(want).all(|(g, w)| (g - w).abs() < 1e-4), "{got:?}, expected {want:?}");
+        assert_eq!(ObsStats::of(std::iter::empty(), 2).normalize(&[3.0, -4.0]), [3.0, -4.0]);
     }
 }

@@ -3,14 +3,17 @@
 use super::Policy;
 use super::shape::{PolicyShape, SkillsShape};
 use crate::file::TensorFile;
-use crate::norm::ObsStats;
+use crate::norm::{put_obs_stats, take_obs_stats};
 use crate::skill::{Prior, SkillDraw};
 use crate::{DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 const KIND: &str = "policy";
 const VERSION: u32 = 1;
+/// The frozen normaliser of decoder and prior.
+pub(super) const SKILL_STATS: &str = "skill.obs_norm";
 /// The examples' observations.
 const OBSERVATIONS: &str = "examples.obs";
 
@@ -143,13 +146,15 @@ impl PolicyFile {
             file.put_network("critic", critic)?;
         }
         if let Some(stats) = &policy.stats {
-            file.put_f64("obs_norm.mean", &stats.mean);
-            file.put_f64("obs_norm.inv_std", &stats.inv_std);
+            put_obs_stats(&mut file, "obs_norm", stats);
         }
         if let Some(skills) = &self.skills {
             file.put_network("decoder", &skills.decoder.actor)?;
-            if let Some((net, ..)) = &skills.prior.net {
-                file.put_network("prior", net)?;
+            if let Some(net) = &skills.prior.net {
+                file.put_network("prior", &net.actor)?;
+            }
+            if let Some(stats) = &skills.decoder.stats {
+                put_obs_stats(&mut file, SKILL_STATS, stats);
             }
         }
         let shape = [n, policy.obs_dim()];
@@ -204,10 +209,7 @@ impl PolicyFile {
         let net = &shape.actor.net;
         let stats = match shape.normalised {
             false => None,
-            true => Some(ObsStats {
-                mean: file.take_f64("obs_norm.mean", Some(net.obs_dim))?,
-                inv_std: file.take_f64("obs_norm.inv_std", Some(net.obs_dim))?,
-            }),
+            true => Some(Arc::new(take_obs_stats(&mut file, "obs_norm", net.obs_dim)?)),
         };
         let widths = (observation, net.latent);
         let policy = Policy::new(&actor, critic.as_ref(), stats, shape.action_space, widths, plain);

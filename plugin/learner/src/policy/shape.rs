@@ -1,13 +1,16 @@
 //! What the header of a policy file says about its networks.
 
+use super::file::SKILL_STATS;
 use super::{Actor, Critic, LogStd, NetShape, Policy, SkillSource, StdKind};
 use crate::file::TensorFile;
 use crate::layout::{check_actor, check_cnn, check_mlp, joined_width};
 use crate::nn::{CnnKind, ImageNet, Mlp, path};
+use crate::norm::take_obs_stats;
 use crate::rng::Streams;
 use crate::skill::{Prior, SkillDraw};
 use crate::{ActionSpace, DeviceKind, FileError, ImageShape, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -49,6 +52,9 @@ pub(super) struct SkillsShape {
     decoder: ActorShape,
     horizon: usize,
     draw: SkillDraw,
+    /// Whether decoder and prior see normalised observations.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    normalised: bool,
 }
 
 impl PolicyShape {
@@ -78,7 +84,7 @@ impl PolicyShape {
         let net = &self.actor.net;
         self.actor.check(file, "actor", self.action_space, self.image)?;
         if self.normalised && self.image.is_some() {
-            return Err(file.format("normalises images, whose pixels are divided by 255 instead".to_owned()));
+            return Err(file.format(NORMALISED_IMAGES.to_owned()));
         }
         let Some(critic) = &self.critic else { return Ok(()) };
         same_widths(file, "critic", (critic.obs_dim, critic.latent), (net.obs_dim, net.latent))?;
@@ -99,19 +105,24 @@ impl SkillsShape {
     /// The shape of `skills`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if they are held for no time.
+    /// [`LearnError::Config`] if they are held for no time, or if prior and decoder do not see the same.
     pub(super) fn of(skills: &SkillSource) -> Result<Self, LearnError> {
         if skills.horizon == 0 {
             return Err(LearnError::Config(NO_HORIZON.to_owned()));
         }
-        let decoder = &skills.decoder;
+        let (decoder, prior) = (&skills.decoder, &skills.prior.net);
+        if prior.as_ref().is_some_and(|prior| prior.stats != decoder.stats) {
+            let text = "prior and decoder normalise observations in different ways: they must be of one skill model";
+            return Err(LearnError::Config(text.to_owned()));
+        }
         Ok(Self {
             latent: skills.prior.latent(),
             tanh: skills.prior.tanh,
-            prior: skills.prior.net.as_ref().map(|(net, ..)| ActorShape::of(net, net.obs_dim(0))),
+            prior: prior.as_ref().map(|net| ActorShape::of(&net.actor, net.actor.obs_dim(0))),
             decoder: ActorShape::of(&decoder.actor, decoder.actor.obs_dim(decoder.latent)),
             horizon: skills.horizon,
             draw: skills.draw,
+            normalised: decoder.stats.is_some(),
         })
     }
 
@@ -119,6 +130,9 @@ impl SkillsShape {
     pub(super) fn check(&self, file: &TensorFile, policy: &PolicyShape) -> Result<(), FileError> {
         if self.horizon == 0 {
             return Err(file.format(NO_HORIZON.to_owned()));
+        }
+        if self.normalised && policy.image.is_some() {
+            return Err(file.format(NORMALISED_IMAGES.to_owned()));
         }
         let (net, latent) = (&policy.actor.net, self.latent);
         self.decoder.check(file, "decoder", policy.action_space, policy.image)?;
@@ -142,15 +156,19 @@ impl SkillsShape {
     ) -> Result<SkillSource, FileError> {
         let (plain, space, observation) = (device.plain(), policy.action_space, policy.observation());
         let decoder = self.decoder.take(file, "decoder", space, policy.image, device)?;
+        let stats = match self.normalised {
+            false => None,
+            true => Some(Arc::new(take_obs_stats(file, SKILL_STATS, observation.numbers())?)),
+        };
         let prior = match &self.prior {
             None => Prior::standard_normal(self.latent, self.tanh),
             Some(shape) => {
                 let space = ActionSpace::Continuous(self.latent);
                 let net = shape.take(file, "prior", space, policy.image, device)?;
-                Prior::learned(&net, observation, self.latent, self.tanh, plain.clone())
+                Prior::learned(&net, stats.clone(), observation, (self.latent, self.tanh), plain.clone())
             }
         };
-        let decoder = Policy::new(&decoder, None, None, space, (observation, self.latent), plain);
+        let decoder = Policy::new(&decoder, None, stats, space, (observation, self.latent), plain);
         Ok(SkillSource { prior, decoder, horizon: self.horizon, draw: self.draw })
     }
 }
@@ -216,6 +234,7 @@ impl ActorShape {
     }
 }
 
+const NORMALISED_IMAGES: &str = "normalises images, whose pixels are divided by 255 instead";
 const NO_HORIZON: &str = "a skill must be held for at least 1 tick, not 0";
 
 /// `Ok` if the network `name` reads observations and skills as wide as the others do.

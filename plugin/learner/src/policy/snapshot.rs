@@ -32,7 +32,7 @@ impl Policy {
     pub(crate) fn new(
         actor: &Actor,
         critic: Option<&Critic>,
-        stats: Option<ObsStats>,
+        stats: Option<Arc<ObsStats>>,
         space: ActionSpace,
         (observation, latent): (impl Into<ObsKind>, usize),
         device: Device,
@@ -40,7 +40,7 @@ impl Policy {
         Self {
             actor: frozen(actor),
             critic: critic.map(frozen),
-            stats: stats.map(Arc::new),
+            stats,
             space,
             observation: observation.into(),
             latent,
@@ -66,6 +66,11 @@ impl Policy {
     /// Numbers in the observation it reads.
     pub fn obs_dim(&self) -> usize {
         self.observation.numbers()
+    }
+
+    /// Whether its networks see normalised observations. It takes raw ones all the same.
+    pub fn normalises(&self) -> bool {
+        self.stats.is_some()
     }
 
     /// The convolutions that read its images; `None` for vectors.

@@ -7,6 +7,7 @@ use crate::policy::{HostStates, NetInput};
 use crate::score::{DecoderBatch, DecoderRows};
 use crate::{Actions, Rollout};
 use burn::tensor::Device;
+use std::sync::Arc;
 
 /// Everything an update reads, one entry per row.
 #[derive(Debug)]
@@ -17,7 +18,7 @@ pub(super) struct Prepared<'a> {
     pub(super) decoder: Option<DecoderRows>,
     /// How many of the rollout's skill numbers the networks read: all or none.
     pub(super) latent: usize,
-    pub(super) stats: Option<ObsStats>,
+    pub(super) stats: Option<Arc<ObsStats>>,
     pub(super) norm_adv: bool,
 }
 
@@ -41,7 +42,7 @@ impl Prepared<'_> {
             latent: self.latent,
             obs: rollout.obs.as_slice(),
             kind: &rollout.obs_kind,
-            stats: self.stats.as_ref(),
+            stats: self.stats.as_deref(),
         };
         let mut advantages = pick(&self.advantages);
         if self.norm_adv {

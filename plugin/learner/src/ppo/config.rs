@@ -45,8 +45,10 @@ pub struct PpoConfig {
     pub reward_gamma: Option<f64>,
     /// When the end of an episode resets that return.
     pub reward_reset: RewardReset,
-    /// Whether actor and critic see normalised observations. Not together with a copied decoder, which reads raw ones, and
-    /// not for images, whose pixels are divided by 255.
+    /// Whether actor and critic see observations through a normaliser of their own, which goes on learning. Not together
+    /// with a copied decoder, which reads raw ones or, by [`SkillConfig::norm_obs`](crate::SkillConfig::norm_obs), those of
+    /// a frozen normaliser that actor and critic then read through too; and not for images, whose pixels are divided by
+    /// 255.
     pub norm_obs: bool,
     /// Hidden layers of actor and critic. A copied decoder brings its own.
     pub hidden: Vec<usize>,

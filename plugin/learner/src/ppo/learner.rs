@@ -7,7 +7,7 @@ use crate::nn::{Adam, AdamConfig, ImageNet, tracked};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
 use crate::policy::{Actor, Critic, Policy, SkillSource, StdKind};
 use crate::rng::{Streams, shuffle};
-use crate::score::{DecoderRows, FrozenSkill, ScoreConfig};
+use crate::score::{DecoderRows, FrozenSkill, ScoreConfig, present_stats};
 use crate::skill::{Prior, SkillModel};
 use crate::{DeviceKind, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout};
 use burn::tensor::Device;
@@ -142,7 +142,7 @@ impl PpoLearner {
 
     /// A snapshot of the policy that plays, with its critic.
     pub fn policy(&self) -> Policy {
-        let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
+        let stats = present_stats(self.skill.as_ref(), self.observations.as_ref());
         let widths = (self.spec.obs, self.spec.latent);
         let (actor, critic) = (&self.nets.actor, Some(&self.nets.critic));
         Policy::new(actor, critic, stats, self.spec.action_space, widths, self.device.plain())
@@ -181,7 +181,7 @@ impl PpoLearner {
             returns: estimate.returns,
             decoder: self.decoder_rows(rollout)?,
             latent: self.spec.latent,
-            stats: self.observations.as_ref().map(ObsNormalizer::snapshot),
+            stats: present_stats(self.skill.as_ref(), self.observations.as_ref()),
             norm_adv: config.norm_adv,
         };
         let lr = config.lr_at(self.updates);

@@ -2,10 +2,9 @@
 
 use super::SacLearner;
 use crate::nn::{ActionRows, matrix, vector};
-use crate::norm::ObsNormalizer;
 use crate::policy::joined_rows;
 use crate::rng::{ChaCha8Rng, normal};
-use crate::score::DecoderBatch;
+use crate::score::{DecoderBatch, present_stats};
 use crate::{ActionSpace, LearnError};
 use burn::tensor::Tensor;
 
@@ -37,11 +36,11 @@ impl SacLearner {
     /// The transitions in `slots` on the device, normalised; with the decoder's side of them if the actor needs it.
     pub(super) fn batch(&self, slots: &[usize], with_actor: bool) -> Result<SacBatch, LearnError> {
         let (buffer, device, n) = (&self.buffer, self.device.plain(), slots.len());
-        let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
+        let stats = present_stats(self.skill.as_ref(), self.observations.as_ref());
         let (latent, obs_dim) = (self.spec.latent, buffer.obs_dim);
         let inputs = |z: &[f32], obs: &[f32]| {
             let rows = slots.iter().copied();
-            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_ref(), rows);
+            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), rows);
             matrix(rows, n, self.inputs(), &device)
         };
         let reward = |&slot: &usize| match &self.rewards {

@@ -65,7 +65,9 @@ pub struct SacConfig {
     pub log_std: (f64, f64),
     /// What a step that ran into the time limit leads to.
     pub time_limit: TimeLimit,
-    /// Whether actor and critics see normalised observations. Not together with a copied decoder, which reads raw ones.
+    /// Whether actor and critics see observations through a normaliser of their own, which goes on learning. Not together
+    /// with a copied decoder or one with [`SkillConfig::norm_obs`](crate::SkillConfig::norm_obs), whose frozen normaliser
+    /// actor and critics read through too.
     pub norm_obs: bool,
     /// Whether rewards are divided by the running deviation of the discounted return.
     pub norm_reward: bool,

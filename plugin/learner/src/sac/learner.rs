@@ -9,7 +9,7 @@ use crate::nn::{Adam, AdamConfig};
 use crate::norm::{ObsNormalizer, RewardNormalizer};
 use crate::policy::{Actor, Policy, SkillSource};
 use crate::rng::{ChaCha8Rng, Streams};
-use crate::score::{FrozenSkill, ScoreConfig};
+use crate::score::{FrozenSkill, ScoreConfig, present_stats};
 use crate::skill::{Prior, SkillModel};
 use crate::{ActionSpace, DeviceKind, LearnError, ObsSlice, PolicySpec, Rollout};
 
@@ -181,7 +181,7 @@ impl SacLearner {
     }
 
     fn snapshot(&self, actor: &Actor) -> Policy {
-        let stats = self.observations.as_ref().map(ObsNormalizer::snapshot);
+        let stats = present_stats(self.skill.as_ref(), self.observations.as_ref());
         let widths = (self.spec.obs, self.spec.latent);
         Policy::new(actor, None, stats, self.spec.action_space, widths, self.device.plain())
     }

@@ -4,10 +4,12 @@ use super::decoder::DecoderRows;
 use super::{PriorKind, ScoreConfig, decoder_kl, row_weights, unsquashed};
 use crate::file::TensorFile;
 use crate::nn::{HostDist, scalar};
+use crate::norm::{ObsNormalizer, ObsStats, put_obs_stats};
 use crate::policy::{Actor, Policy, SkillSource};
 use crate::skill::{Prior, SkillDescription, SkillModel};
 use crate::{Actions, DeviceKind, FileError, LearnError, ObsSlice, PolicyOutput, PolicySpec};
 use rand::Rng;
+use std::sync::Arc;
 
 /// A skill model's decoder and prior, which do not learn any more.
 #[derive(Clone, Debug)]
@@ -16,6 +18,18 @@ pub(crate) struct FrozenSkill {
     pub(crate) description: SkillDescription,
     decoder: Actor,
     prior: Actor,
+    /// How decoder and prior see observations, and the policy that is tied to them.
+    stats: Option<Arc<ObsStats>>,
+}
+
+/// The frozen normaliser in a checkpoint.
+const STATS: &str = "skill.obs_norm";
+
+/// How the networks of a learner see observations now: through the frozen normaliser of its skill model if that has
+/// one, else through its own running one, else raw.
+pub(crate) fn present_stats(skill: Option<&FrozenSkill>, running: Option<&ObsNormalizer>) -> Option<Arc<ObsStats>> {
+    let frozen = skill.and_then(|skill| skill.stats.clone());
+    frozen.or_else(|| running.map(|normalizer| Arc::new(normalizer.snapshot())))
 }
 
 impl FrozenSkill {
@@ -26,6 +40,7 @@ impl FrozenSkill {
             description: model.description.clone(),
             decoder: model.nets.decoder.clone(),
             prior: model.nets.prior.clone(),
+            stats: model.stats.clone(),
         }
     }
 
@@ -41,7 +56,7 @@ impl FrozenSkill {
         let Some((config, description)) = config.zip(description) else { return Ok(None) };
         description.check_actors(file)?;
         let (decoder, prior) = description.actors(device).map_err(|e| file.learner(e))?;
-        let skill = Self { config, description, decoder, prior };
+        let skill = Self { config, description, decoder, prior, stats: None };
         let tied = skill.spec();
         if tied != spec {
             return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));
@@ -54,14 +69,18 @@ impl FrozenSkill {
         self.config.init_from_decoder
     }
 
-    /// Adds the weights of decoder and prior to a file.
+    /// Adds the weights of decoder and prior to a file, and their normaliser.
     pub(crate) fn put(&self, file: &mut TensorFile) -> Result<(), FileError> {
+        if let Some(stats) = &self.stats {
+            put_obs_stats(file, STATS, stats);
+        }
         file.put_network("decoder", &self.decoder)?;
         file.put_network("prior", &self.prior)
     }
 
-    /// Takes the weights of decoder and prior out of a file.
+    /// Takes the weights of decoder and prior out of a file, and their normaliser.
     pub(crate) fn take(&mut self, file: &mut TensorFile, device: DeviceKind) -> Result<(), FileError> {
+        self.stats = self.description.take_stats(file, STATS)?;
         file.take_network("decoder", &mut self.decoder, &device.plain())?;
         file.take_network("prior", &mut self.prior, &device.plain())
     }
@@ -86,7 +105,8 @@ impl FrozenSkill {
         match self.config.prior {
             PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
             PriorKind::Learned => {
-                Prior::learned(&self.prior, self.description.observation, latent, tanh, device.plain())
+                let (stats, observation) = (self.stats.clone(), self.description.observation);
+                Prior::learned(&self.prior, stats, observation, (latent, tanh), device.plain())
             }
         }
     }
@@ -99,18 +119,25 @@ impl FrozenSkill {
 
     fn decoder_policy(&self, device: DeviceKind) -> Policy {
         let widths = (self.description.observation, self.latent());
-        Policy::new(&self.decoder, None, None, self.description.action_space, widths, device.plain())
+        Policy::new(&self.decoder, None, self.stats.clone(), self.description.action_space, widths, device.plain())
     }
 
-    /// The copy of the decoder that a policy starts as, if it shall.
+    /// The copy of the decoder that a policy starts as, if it shall. `norm_obs`: the learner would normalise observations
+    /// itself.
     pub(crate) fn copy(&self, norm_obs: bool) -> Result<Option<Actor>, LearnError> {
         self.config.validate()?;
         self.config.check_space(self.description.action_space)?;
+        if norm_obs && self.description.config.norm_obs {
+            let text = "norm_obs does not go with a skill model that normalises observations: the policy sees them \
+                        through the same frozen normaliser, not through a running one of its own";
+            return Err(LearnError::Config(text.to_owned()));
+        }
         if !self.config.init_from_decoder {
             return Ok(None);
         }
         if norm_obs {
-            let text = "norm_obs does not go with score init_from_decoder: the decoder reads raw observations";
+            let text = "norm_obs does not go with score init_from_decoder: the decoder reads raw observations; a skill \
+                        model with norm_obs of its own normalises for both";
             return Err(LearnError::Config(text.to_owned()));
         }
         Ok(Some(self.decoder.clone()))
@@ -184,7 +211,7 @@ mod tests {
         let config = SkillConfig { gru_hidden: 1, encoder_hidden: 1, ..SkillConfig::default() };
         let description = SkillDescription { config, observation: ObsKind::Vector(obs_dim), action_space: space };
         let nets = description.nets(device).expect("good settings");
-        let model = SkillModel::new(description, &nets, device);
+        let model = SkillModel::new(description, &nets, None, device);
         let skill = FrozenSkill::new(ScoreConfig::default(), &model);
         let mut rng = Streams::new(1).stream("rows", 0);
         let n = VECTORS_AT_A_TIME + 1;

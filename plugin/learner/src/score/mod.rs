@@ -17,7 +17,7 @@ pub use alpha::{alphas, own_samples, row_weights};
 pub use config::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use decoder::DecoderBatch;
 pub(crate) use decoder::DecoderRows;
-pub(crate) use frozen::FrozenSkill;
+pub(crate) use frozen::{FrozenSkill, present_stats};
 pub use legacy::{legacy_coinrun, legacy_d4rl, marginal_densities};
 pub use penalty::{Penalty, decoder_kl, penalty};
 pub use unsquash::unsquashed;

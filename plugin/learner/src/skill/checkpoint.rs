@@ -3,9 +3,11 @@
 use super::{Dataset, SkillDescription, SkillTrainer};
 use crate::file::TensorFile;
 use crate::nn::tracked;
+use crate::norm::{put_obs_stats, take_obs_stats};
 use crate::{DeviceKind, FileError, LearnError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 const KIND: &str = "skill checkpoint";
 const VERSION: u32 = 1;
@@ -54,6 +56,9 @@ impl SkillTrainer {
         let mut file = TensorFile::new(path, &header)?;
         file.put_network("", &self.nets)?;
         file.put_adam(&self.adam);
+        if let Some(stats) = &self.stats {
+            put_obs_stats(&mut file, "obs_norm", stats);
+        }
         file.put_f64("epoch_sums", &self.sums.total);
         file.write()
     }
@@ -88,6 +93,9 @@ impl SkillTrainer {
         file.take_network("", &mut trainer.nets, &device.plain())?;
         trainer.nets = tracked(&trainer.nets);
         file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;
+        if let Some(stats) = &mut trainer.stats {
+            *stats = Arc::new(take_obs_stats(&mut file, "obs_norm", trainer.dataset.obs_dim())?);
+        }
         trainer.sums.count = header.batches;
         let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
         trainer.sums.total.copy_from_slice(&sums);

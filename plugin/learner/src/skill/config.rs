@@ -1,9 +1,9 @@
 //! Settings of the skill model.
 
 use super::{ActionInput, WindowRule};
-use crate::LearnError;
 use crate::nn::CnnKind;
 use crate::policy::StdKind;
+use crate::{LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
 /// How the terms of the loss are summed.
@@ -64,6 +64,11 @@ pub struct SkillConfig {
     pub action_noise: f64,
     /// How the terms of the loss are summed.
     pub reduction: Reduction,
+    /// Whether the three networks see normalised observations, for games whose values differ in scale (a place in metres
+    /// beside an angle in radians): clip((x - mean) / deviation, ±10), by the mean and deviation of each value over all
+    /// demonstrations, which are computed once and never change. Values that do not vary are centred only. A policy that
+    /// is tied to the skill model sees the same numbers, its critic too. Vectors only.
+    pub norm_obs: bool,
 }
 
 impl Default for SkillConfig {
@@ -89,6 +94,7 @@ impl Default for SkillConfig {
             decoder_std: StdKind::Vector,
             action_noise: 0.0,
             reduction: Reduction::Standard,
+            norm_obs: false,
         }
     }
 }
@@ -125,6 +131,20 @@ impl SkillConfig {
             return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
         }
         Ok(())
+    }
+
+    /// `Ok` if a model of these settings can see `observation`s.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images shall be normalised.
+    pub fn check_observation(&self, observation: ObsKind) -> Result<(), LearnError> {
+        match observation {
+            ObsKind::Image(_) if self.norm_obs => {
+                let text = "skill norm_obs is for vectors: the pixels of images are divided by 255 instead";
+                Err(LearnError::Config(text.to_owned()))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

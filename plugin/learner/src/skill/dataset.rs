@@ -1,6 +1,7 @@
 //! Demonstrations.
 
 use super::Window;
+use crate::norm::ObsStats;
 use crate::rng::fnv1a;
 use crate::{ActionSpace, Actions, LearnError, ObsKind, Observations};
 use rayon::prelude::*;
@@ -70,6 +71,16 @@ impl Dataset {
     /// Steps in all episodes together.
     pub fn steps(&self) -> usize {
         self.episodes.iter().map(|episode| episode.actions.len()).sum()
+    }
+
+    /// Mean and deviation of each number of the observations over all steps; `None` for images.
+    pub(super) fn stats(&self) -> Option<ObsStats> {
+        let ObsKind::Vector(width) = self.observation else { return None };
+        let rows = self.episodes.iter().flat_map(|episode| match &episode.observations {
+            Observations::Vector(values) => values.chunks_exact(width),
+            Observations::Image(_) => [].chunks_exact(width),
+        });
+        Some(ObsStats::of(rows, width))
     }
 
     /// A hash of all observations and actions, the same on any number of threads.

@@ -7,8 +7,9 @@
 //! Observations are vectors or images ([`crate::ObsKind`]). For images each of the three networks has a trunk of
 //! convolutions of its own ([`SkillConfig::cnn`]), which comes before the layers that would read a vector.
 //!
-//! There is one pipeline everywhere: observations are used raw (pixels divided by 255), and the decoder sees tanh(z) (or z, by
-//! [`SkillConfig::tanh_latent`]) in training and in use.
+//! There is one pipeline everywhere: the networks see observations raw (pixels divided by 255) or through one frozen
+//! normaliser ([`SkillConfig::norm_obs`]), and the decoder sees tanh(z) (or z, by [`SkillConfig::tanh_latent`]), in
+//! training, in use, and in the policies that are tied to it.
 
 mod action_input;
 mod checkpoint;

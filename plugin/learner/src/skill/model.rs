@@ -4,11 +4,13 @@ use super::{Prior, SkillConfig, SkillNets};
 use crate::file::TensorFile;
 use crate::layout::{check_actor, check_cnn, check_mlp, check_tensor, product};
 use crate::nn::{Activation, frozen};
+use crate::norm::{ObsStats, put_obs_stats, take_obs_stats};
 use crate::policy::{Actor, NetShape, PictureCard, Policy, StdKind};
 use crate::rng::Streams;
 use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What a skill model's weights need to be understood.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
@@ -38,18 +40,25 @@ const VERSION: u32 = 1;
 /// Encoder, decoder and prior after training, with the settings they were trained with.
 ///
 /// The file is safetensors with names such as `decoder.l0.weight` (`[inputs, outputs]`) or `decoder.cnn.s0.conv.weight`
-/// (`[outputs, inputs, rows, columns]`) and the settings as JSON in its header, so that one file is all there is.
+/// (`[outputs, inputs, rows, columns]`), the frozen normaliser (`obs_norm.mean`, `obs_norm.inv_std`) by
+/// [`SkillConfig::norm_obs`], and the settings as JSON in its header, so that one file is all there is.
 #[derive(Clone, Debug)]
 pub struct SkillModel {
     pub(crate) description: SkillDescription,
     pub(crate) nets: SkillNets,
+    pub(crate) stats: Option<Arc<ObsStats>>,
     pub(crate) device: DeviceKind,
     picture: Option<PictureCard>,
 }
 
 impl SkillModel {
-    pub(crate) fn new(description: SkillDescription, nets: &SkillNets, device: DeviceKind) -> Self {
-        Self { description, nets: frozen(nets), device, picture: None }
+    pub(crate) fn new(
+        description: SkillDescription,
+        nets: &SkillNets,
+        stats: Option<Arc<ObsStats>>,
+        device: DeviceKind,
+    ) -> Self {
+        Self { description, nets: frozen(nets), stats, device, picture: None }
     }
 
     /// The model with a note on how the images that it observes are made; `None` for vectors.
@@ -87,27 +96,34 @@ impl SkillModel {
         self.description.config.latent
     }
 
-    /// The networks, for inference.
+    /// How its networks see observations, by [`SkillConfig::norm_obs`]; `None` for raw ones.
+    pub fn obs_stats(&self) -> Option<&ObsStats> {
+        self.stats.as_deref()
+    }
+
+    /// The networks, for inference. They read observations as [`Self::obs_stats`] makes them.
     pub fn nets(&self) -> &SkillNets {
         &self.nets
     }
 
-    /// The decoder π(a | s, z).
+    /// The decoder π(a | s, z), which reads observations as [`Self::obs_stats`] makes them.
     pub fn decoder(&self) -> &Actor {
         &self.nets.decoder
     }
 
-    /// The prior p(z | s), giving skills as the decoder takes them.
+    /// The prior p(z | s) of raw observations, giving skills as the decoder takes them.
     pub fn prior(&self) -> Prior {
         let config = self.config();
         let device = self.device.plain();
-        Prior::learned(&self.nets.prior, self.observation(), config.latent, config.tanh_latent, device)
+        let (stats, latent) = (self.stats.clone(), (config.latent, config.tanh_latent));
+        Prior::learned(&self.nets.prior, stats, self.observation(), latent, device)
     }
 
-    /// The decoder as a policy without a critic. Under the prior this is behaviour cloning.
+    /// The decoder as a policy of raw observations without a critic. Under the prior this is behaviour cloning.
     pub fn policy(&self) -> Policy {
         let widths = (self.observation(), self.latent());
-        Policy::new(self.decoder(), None, None, self.action_space(), widths, self.device.plain())
+        let stats = self.stats.clone();
+        Policy::new(self.decoder(), None, stats, self.action_space(), widths, self.device.plain())
     }
 
     /// Writes the file, in one step: under a temporary name first.
@@ -123,6 +139,9 @@ impl SkillModel {
         let header = Header { kind: KIND.to_owned(), version: VERSION, skill, picture };
         let mut file = TensorFile::new(path, &header)?;
         file.put_network("", &self.nets)?;
+        if let Some(stats) = &self.stats {
+            put_obs_stats(&mut file, "obs_norm", stats);
+        }
         file.write()
     }
 
@@ -140,8 +159,9 @@ impl SkillModel {
         }
         let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
         file.take_network("", &mut nets, &device.plain())?;
+        let stats = description.take_stats(&mut file, "obs_norm")?;
         file.finish()?;
-        Ok(Self { description, nets, device, picture: header.picture })
+        Ok(Self { description, nets, stats, device, picture: header.picture })
     }
 }
 
@@ -151,6 +171,14 @@ impl SkillDescription {
         self.config.validate()?;
         let (config, space) = (&self.config, self.action_space);
         SkillNets::new(config, self.observation, space, &Streams::new(0), &device.plain())
+    }
+
+    /// The frozen normaliser called `name` out of a file, if the networks read through one.
+    pub(crate) fn take_stats(&self, file: &mut TensorFile, name: &str) -> Result<Option<Arc<ObsStats>>, FileError> {
+        if !self.config.norm_obs {
+            return Ok(None);
+        }
+        Ok(Some(Arc::new(take_obs_stats(file, name, self.observation.numbers())?)))
     }
 
     /// Decoder and prior alone.
@@ -189,6 +217,7 @@ impl SkillDescription {
     pub(crate) fn check_actors(&self, file: &TensorFile) -> Result<(), FileError> {
         let config = &self.config;
         config.validate().map_err(|e| file.learner(e))?;
+        config.check_observation(self.observation).map_err(|e| file.learner(e))?;
         let prior = (0, ActionSpace::Continuous(config.latent), config.prior_std);
         for (name, (latent, space, std)) in
             [("decoder", (config.latent, self.action_space, config.decoder_std)), ("prior", prior)]

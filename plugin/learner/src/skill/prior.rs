@@ -1,10 +1,12 @@
 //! p(z | s₀) in use.
 
 use crate::nn::frozen;
+use crate::norm::ObsStats;
 use crate::policy::{Actor, HostStates};
 use crate::{LearnError, ObsKind, ObsSlice};
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// How z is taken from the prior.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -19,21 +21,30 @@ pub enum SkillDraw {
 /// Draws skills for states. Clones share the weights.
 #[derive(Clone, Debug)]
 pub struct Prior {
-    pub(crate) net: Option<(Actor, ObsKind, Device)>,
+    pub(crate) net: Option<PriorNet>,
     latent: usize,
     pub(crate) tanh: bool,
 }
 
+/// The network of a learned prior, and how it sees observations.
+#[derive(Clone, Debug)]
+pub(crate) struct PriorNet {
+    pub(crate) actor: Actor,
+    observation: ObsKind,
+    pub(crate) stats: Option<Arc<ObsStats>>,
+    device: Device,
+}
+
 impl Prior {
-    /// The learned prior `net`, which reads the given observations.
+    /// The learned prior `actor`, which reads the given observations, normalised by `stats` if given.
     pub(crate) fn learned(
-        net: &Actor,
-        observation: impl Into<ObsKind>,
-        latent: usize,
-        tanh: bool,
+        actor: &Actor,
+        stats: Option<Arc<ObsStats>>,
+        observation: ObsKind,
+        (latent, tanh): (usize, bool),
         device: Device,
     ) -> Self {
-        Self { net: Some((frozen(net), observation.into(), device)), latent, tanh }
+        Self { net: Some(PriorNet { actor: frozen(actor), observation, stats, device }), latent, tanh }
     }
 
     /// A prior that ignores the state: standard normal, then tanh if `tanh`.
@@ -43,7 +54,7 @@ impl Prior {
 
     /// What it observes; nothing if it ignores the state.
     pub fn observation(&self) -> Option<ObsKind> {
-        self.net.as_ref().map(|(_, kind, _)| *kind)
+        self.net.as_ref().map(|net| net.observation)
     }
 
     /// Width of z.
@@ -73,16 +84,16 @@ impl Prior {
         let numbers = n * self.latent;
         let (mut z, log_std) = match &self.net {
             None => (vec![0.0; numbers], vec![0.0; numbers]),
-            Some((net, kind, device)) => {
+            Some(PriorNet { actor, observation: kind, stats, device }) => {
                 let obs = obs.into();
                 obs.check("observations of the prior", kind, n)?;
-                let states = HostStates { z: &[], latent: 0, obs, kind, stats: None };
-                let mut x = net.join(&states.input(&(0..n).collect::<Vec<_>>(), device))?;
+                let states = HostStates { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
+                let mut x = actor.join(&states.input(&(0..n).collect::<Vec<_>>(), device))?;
                 if n == 1 {
                     // As in `Policy`: a single row would be summed in another order.
                     x = x.repeat_dim(0, 2);
                 }
-                let dist = net.forward(x).to_host()?;
+                let dist = actor.forward(x).to_host()?;
                 (dist.head, dist.log_std.unwrap_or_default())
             }
         };

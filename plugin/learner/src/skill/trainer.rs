@@ -4,9 +4,11 @@ use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, Sk
 use crate::nn::{
     ActionRows, Adam, AdamConfig, Dist, NamedGrads, ObsRows, argmax, check_loss, host, matrix, scalar, tracked,
 };
+use crate::norm::ObsStats;
 use crate::rng::{Streams, normal};
-use crate::{Actions, DeviceKind, LearnError};
+use crate::{Actions, DeviceKind, LearnError, Observations};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// What one batch, or the mean over an epoch's batches, looked like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,6 +47,8 @@ pub struct SkillTrainer {
     pub(super) dataset: Dataset,
     /// The hash of `dataset`.
     pub(super) fingerprint: u64,
+    /// How the networks see observations, if not raw.
+    pub(super) stats: Option<Arc<ObsStats>>,
     pub(super) nets: SkillNets,
     pub(super) adam: Adam,
     pub(super) streams: Streams,
@@ -71,10 +75,12 @@ impl SkillTrainer {
     /// episode is long enough.
     pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         config.validate()?;
+        config.check_observation(dataset.observation)?;
         let streams = Streams::new(seed);
         let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &device.plain())?;
         let windows = dataset.windows(config.window, config.windows, &streams, 0)?;
         Ok(Self {
+            stats: if config.norm_obs { dataset.stats().map(Arc::new) } else { None },
             nets: tracked(&nets),
             adam: Adam::new(AdamConfig { eps: 1e-8, ..AdamConfig::default() }),
             epoch: 0,
@@ -160,7 +166,7 @@ impl SkillTrainer {
 
     /// The model as it is now.
     pub fn model(&self) -> SkillModel {
-        SkillModel::new(self.description(), &self.nets, self.device)
+        SkillModel::new(self.description(), &self.nets, self.stats.clone(), self.device)
     }
 
     pub(super) fn cut_windows(&self, epoch: u64) -> Result<Vec<Window>, LearnError> {
@@ -207,7 +213,10 @@ impl SkillTrainer {
         let (batch, steps) = (windows.len(), self.config.window);
         let (input, space) = (self.config.action_input, self.dataset.space);
         let device = self.device.plain();
-        let (observations, actions) = self.dataset.gather(windows, steps)?;
+        let (mut observations, actions) = self.dataset.gather(windows, steps)?;
+        if let (Some(stats), Observations::Vector(values)) = (&self.stats, &mut observations) {
+            *values = stats.normalize(values);
+        }
         let states = ObsRows::new(observations, &self.dataset.observation, &device);
         let encoded = matrix(input.encode(&actions, space)?, steps * batch, input.width(space), &device);
         let mut rng = self.streams.stream("skill.noise", self.adam.steps());

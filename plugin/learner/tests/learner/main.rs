@@ -11,6 +11,7 @@ mod pixel_files;
 mod pixels;
 mod point;
 mod sac;
+mod scaled;
 mod score;
 mod score_sac;
 mod skill;

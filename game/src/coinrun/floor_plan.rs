@@ -1,0 +1,21 @@
+//! A level as the plan that trajectories are drawn on.
+
+use bevy::math::{Rect, Vec2};
+use bevy_playbot::floor_plan::FloorPlan;
+
+use super::{Level, rules::Body};
+
+impl Level {
+    /// The ground of the used part of the level, from the side, in tiles.
+    pub fn floor_plan(&self) -> FloorPlan {
+        let [columns, rows] = self.used_size().map(|tiles| tiles.unsigned_abs() as usize);
+        let square = |row: usize, column: usize| {
+            let corner = Vec2::new(column as f32, row as f32);
+            Rect::from_corners(corner, corner + 1.0)
+        };
+        let is_wall = |row: usize, column: usize| self.tiles.get(column as i32, row as i32).is_wall();
+        let (player, [x, y]) = (Body::player(), self.coin);
+        let ends = [Vec2::new(player.x, player.y), Vec2::new(x as f32 + 0.5, y as f32 + 0.5)];
+        FloorPlan::of_tiles([rows, columns], is_wall, square, ends)
+    }
+}

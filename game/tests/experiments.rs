@@ -1,0 +1,85 @@
+//! The experiments that come with the program can be run: names, modes, levels and values fit.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::train::{Experiment, config_file::read_experiment, study::study_runs};
+use playbot_games::registry;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments")
+}
+
+fn read(name: &str) -> Experiment {
+    read_experiment(&folder().join(format!("{name}.ron"))).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn names() -> Vec<String> {
+    let entries = std::fs::read_dir(folder()).expect("the folder");
+    let stem = |path: PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let mut names: Vec<_> = entries.filter_map(|entry| stem(entry.expect("an entry").path())).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn every_experiment_and_every_variant_fits_its_game() {
+    for name in names() {
+        for run in study_runs(&read(&name)).unwrap_or_else(|error| panic!("{name}: {error}")) {
+            let game = registry::game(&run.experiment.game).expect("a game");
+            for split in [&run.experiment.train, &run.experiment.test] {
+                game.check_mode(&split.mode).unwrap_or_else(|error| panic!("{name}, {}: {error}", run.variant));
+            }
+            run.experiment.score.check_space(game.actions()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+    }
+}
+
+/// Mazes of the paper's tables and figures, with the methods that are compared there.
+const MAZES: [(&str, &[&str]); 10] = [
+    ("antmaze-medium", &["score-ppo", "sac", "ppo"]),
+    ("antmaze-large", &["score-ppo", "sac", "ppo"]),
+    ("antmaze-xl", &["score-ppo", "sac", "ppo"]),
+    ("antmaze-to-large", &["score-medium", "score-large", "ppo-medium"]),
+    ("antmaze-to-xl", &["score-medium", "score-large", "score-xl", "ppo-large"]),
+    ("antmaze-ablation", &["score-ppo", "no-init", "no-kl", "no-alpha", "ppo"]),
+    ("antmaze-random", &["score-ppo", "ppo"]),
+    ("maze2d-medium", &["score-ppo", "sac", "ppo"]),
+    ("maze2d-large", &["score-ppo", "sac", "ppo"]),
+    ("maze2d-random", &["score-ppo", "ppo"]),
+];
+
+#[test]
+fn mazes_come_at_the_papers_size_and_at_one_for_an_hour() {
+    for (name, methods) in MAZES {
+        let (paper, hour) = (read(name), read(&format!("{name}-hour")));
+        for experiment in [&paper, &hour] {
+            let variants: Vec<_> = experiment.variants.iter().map(|variant| variant.name.as_str()).collect();
+            assert_eq!(variants, methods, "{name}");
+            assert_eq!((&experiment.train, &experiment.test), (&paper.train, &paper.test), "{name}");
+        }
+        assert_eq!((paper.arenas, paper.ppo.num_steps, paper.skills.gru_layers), (1, 2048, 4), "{name}");
+        assert_eq!((hour.steps, hour.arenas, hour.skills.gru_layers), (1_024_000, 64, 1), "{name}");
+        let steps = |experiment: &Experiment| -> Vec<u64> {
+            study_runs(experiment).expect("valid").iter().map(|run| run.experiment.steps).collect()
+        };
+        assert!(steps(&paper).iter().all(|&steps| [3_500_000, 17_500_000].contains(&steps)), "{name}");
+        assert!(steps(&hour).iter().all(|&steps| steps == 1_024_000), "{name}");
+    }
+}
+
+#[test]
+fn what_is_measured_elsewhere_was_learned_where_the_variant_says() {
+    for (name, test) in [("antmaze-to-large", "large"), ("antmaze-to-xl", "xl")] {
+        for name in [name.to_owned(), format!("{name}-hour")] {
+            for run in study_runs(&read(&name)).expect("valid") {
+                let (_, map) = run.variant.split_once('-').expect("method and map");
+                assert_eq!(
+                    (run.experiment.train.mode.as_str(), run.experiment.test.mode.as_str()),
+                    (map, test),
+                    "{name}"
+                );
+                assert!(run.experiment.demos.to_string_lossy().contains(map), "{name}, {}", run.variant);
+            }
+        }
+    }
+}

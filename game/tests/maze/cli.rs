@@ -1,0 +1,130 @@
+//! `playbot level` and `playbot eval --plot` as their users call them.
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+use playbot_games::maze::{MazeSpec, generate};
+use serde_json::{Value, json};
+
+fn playbot(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
+}
+
+fn text(output: &Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn level(args: &[&str]) -> Value {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = playbot(folder.path(), &[&["level"], args, &["--json"]].concat());
+    serde_json::from_str(&text(&output)).expect("a line of JSON")
+}
+
+#[test]
+fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
+    let medium = level(&["maze2d", "--map", "medium"]);
+    let rows = ["########", "#SO##OO#", "#OO#OOO#", "##OOO###", "#OO#OOO#", "#O#OO#O#", "#OOO#OG#", "########"];
+    assert_eq!(medium, json!({ "rows": rows, "start": [1, 1], "goal": [6, 6], "shortest_path_length": 10 }));
+    assert_eq!(level(&["antmaze", "--map", "medium"]), medium);
+    assert_eq!(level(&["antmaze", "--map", "xl"])["shortest_path_length"], 29);
+    let (ball, ant) = (level(&["maze2d", "--map", "umaze"]), level(&["antmaze", "--map", "umaze"]));
+    assert_eq!((&ball["goal"], &ant["goal"]), (&json!([1, 1]), &json!([3, 1])));
+}
+
+#[test]
+fn a_seed_makes_a_maze_and_options_shape_it() {
+    let usual = generate(&MazeSpec::default(), 7).expect("a maze");
+    assert_eq!(level(&["maze2d", "--seed", "7"])["rows"], json!(usual.to_rows()));
+    let wide = MazeSpec { rows: 9, columns: 13, corridor: 2, ..MazeSpec::default() };
+    let map = "random+size=9x13+corridor=2";
+    let rows = json!(generate(&wide, 64).expect("a maze").to_rows());
+    assert_eq!(level(&["antmaze", "--map", map, "--seed", "64"])["rows"], rows);
+}
+
+#[test]
+fn people_see_the_path() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shown = text(&playbot(folder.path(), &["level", "antmaze", "--map", "umaze"]));
+    assert!(shown.starts_with("#####\n#S..#\n###.#\n#G..#\n#####\n") && shown.contains("6 moves"), "{shown}");
+}
+
+#[test]
+fn a_file_of_rows_is_a_map() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("mine.txt"), "11111\r\n1r0g1\r\n11111\r\n\n").expect("writable");
+    let args = ["level", "maze2d", "--map", "mine.txt", "--json", "--png", "mine.png"];
+    let shown: Value = serde_json::from_str(&text(&playbot(folder.path(), &args))).expect("JSON");
+    assert_eq!((&shown["rows"][1], &shown["shortest_path_length"]), (&json!("#SOG#"), &json!(2)));
+    let file = std::fs::File::open(folder.path().join("mine.png")).expect("drawn");
+    let size = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG").info().size();
+    assert_eq!(size, (160, 96), "five by three cells, 32 pixels each");
+}
+
+#[test]
+fn what_is_wrong_with_a_map_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, rows) in [
+        ("no-start", "####\n#OG#\n####"),
+        ("no-goal", "####\n#SO#\n####"),
+        ("cut", "#####\n#S#G#\n#####"),
+        ("ragged", "####\n#SG#\n###"),
+        ("letter", "####\n#SX#\n####"),
+        ("open", "####\n#SGO\n####"),
+        ("empty", "\n"),
+    ] {
+        std::fs::write(folder.path().join(name), rows).expect("writable");
+    }
+    for (args, words) in [
+        (&["--map", "no-start"][..], &["no-start", "no start"][..]),
+        (&["--map", "no-goal"], &["no goal"]),
+        (&["--map", "cut"], &["(1, 3)", "cannot be reached", "(1, 1)"]),
+        (&["--map", "ragged"], &["row 2"]),
+        (&["--map", "letter"], &["row 1, column 2", "`X`"]),
+        (&["--map", "open"], &["(1, 3)", "border"]),
+        (&["--map", "empty"], &["empty"]),
+        (&["--map", "medum"], &["did you mean `medium`?", "no file"]),
+        (&["--map", "medium", "--seed", "1"], &["no seed"]),
+        (&["--map", "random+size=5000x5000"], &["too large"]),
+        (&["--map", "random+lops=1"], &["did you mean `loops"]),
+        (&["--mode", "medium"], &["--map"]),
+        (&["--map", "medium", "--png", "a.gif"], &[".png or .svg"]),
+    ] {
+        let output = playbot(folder.path(), &[&["level", "maze2d"], args].concat());
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{args:?}: {errors}");
+        assert!(words.iter().all(|word| errors.contains(word)), "{args:?}: {errors}");
+    }
+}
+
+#[test]
+fn eval_draws_where_players_went() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let base =
+        ["eval", "--bot", "random", "--bot", "right-jump", "--levels", "hard:64..65", "--episodes-per-level", "1"];
+    for file in ["where.svg", "where.png"] {
+        let output = playbot(folder.path(), &[&base[..], &["--json", "--plot", file]].concat());
+        assert_eq!(text(&output).lines().count(), 2);
+    }
+    let svg = std::fs::read_to_string(folder.path().join("where.svg")).expect("drawn");
+    assert!(
+        ["hard:64", "hard:65", "random: goal", "right-jump: goal", "<polyline"].iter().all(|part| svg.contains(part))
+    );
+    let file = std::fs::File::open(folder.path().join("where.png")).expect("drawn");
+    let reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
+    assert!(reader.info().width > 1000, "{}", reader.info().width);
+    for (args, words) in [
+        (&["eval", "--bot", "random", "--plot", "where.gif"][..], ".png or .svg"),
+        (
+            &["eval", "--bot", "random", "--set", "game=\"ant\"", "--levels", "goal:0..0", "--plot", "a.png"],
+            "no floor plan",
+        ),
+    ] {
+        let output = playbot(folder.path(), args);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{errors}");
+        assert!(errors.contains(words), "{errors}");
+    }
+}

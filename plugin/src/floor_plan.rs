@@ -1,0 +1,59 @@
+//! A level from above, to draw what agents did in it.
+
+use bevy::math::{Rect, Vec2};
+
+/// What a level looks like from above, or from the side, in any units: x to the right, y up.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FloorPlan {
+    /// What is drawn of it.
+    pub bounds: Rect,
+    /// Walls, ground and whatever else nobody walks through.
+    pub walls: Vec<Rect>,
+    /// Where agents start.
+    pub start: Vec2,
+    /// Where they should go.
+    pub goal: Vec2,
+}
+
+impl FloorPlan {
+    /// The plan of a level of tiles. `square` says what a tile, by row and column, covers; walls side by side in a row
+    /// become one rectangle. There must be a tile.
+    pub fn of_tiles(
+        [rows, columns]: [usize; 2],
+        is_wall: impl Fn(usize, usize) -> bool,
+        square: impl Fn(usize, usize) -> Rect,
+        [start, goal]: [Vec2; 2],
+    ) -> Self {
+        let mut walls: Vec<Rect> = Vec::new();
+        for row in 0..rows {
+            let mut goes_on = false;
+            for column in 0..columns {
+                let is_wall = is_wall(row, column);
+                match walls.last_mut() {
+                    Some(wall) if is_wall && goes_on => *wall = wall.union(square(row, column)),
+                    _ if is_wall => walls.push(square(row, column)),
+                    _ => {}
+                }
+                goes_on = is_wall;
+            }
+        }
+        Self { bounds: square(0, 0).union(square(rows - 1, columns - 1)), walls, start, goal }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walls_side_by_side_become_one() {
+        let rows = ["##.#", "...."];
+        let square = |row: usize, column: usize| {
+            Rect::from_center_size(Vec2::new(2.0 * column as f32, 2.0 * row as f32), Vec2::splat(2.0))
+        };
+        let is_wall = |row: usize, column: usize| rows[row].as_bytes()[column] == b'#';
+        let plan = FloorPlan::of_tiles([2, 4], is_wall, square, [Vec2::ZERO, Vec2::ONE]);
+        assert_eq!(plan.walls, [Rect::new(-1.0, -1.0, 3.0, 1.0), Rect::new(5.0, -1.0, 7.0, 1.0)]);
+        assert_eq!(plan.bounds, Rect::new(-1.0, -1.0, 7.0, 3.0));
+    }
+}

@@ -1,0 +1,34 @@
+//! Where a floor lies on the paper.
+
+use bevy::math::{Rect, Vec2};
+
+/// A floor on the paper: from its units to pixels, with y turned around.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    bounds: Rect,
+    corner: Vec2,
+    scale: f32,
+}
+
+impl Frame {
+    /// The floor with its upper left corner here, this wide.
+    pub fn new(bounds: Rect, corner: Vec2, width: f32) -> Self {
+        Self { bounds, corner, scale: width / bounds.width().max(f32::MIN_POSITIVE) }
+    }
+
+    /// Where a place of the floor is drawn.
+    pub fn place(&self, at: Vec2) -> Vec2 {
+        self.corner + Vec2::new(at.x - self.bounds.min.x, self.bounds.max.y - at.y) * self.scale
+    }
+
+    /// Where a part of the floor is drawn, as far as it is within the bounds.
+    pub fn area(&self, area: Rect) -> Rect {
+        let seen = area.intersect(self.bounds);
+        Rect::from_corners(self.place(seen.min), self.place(seen.max))
+    }
+
+    /// The whole floor.
+    pub fn whole(&self) -> Rect {
+        self.area(self.bounds)
+    }
+}

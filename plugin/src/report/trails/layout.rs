@@ -1,0 +1,117 @@
+//! Where the drawings of a chart stand.
+
+use bevy::math::{Rect, Vec2};
+
+use super::{
+    Floor, TrailChart, Walker,
+    colours::{INK, SOFT, heat},
+    frame::Frame,
+    panel::{Content, goal_mark, start_mark},
+};
+use crate::{
+    floor_plan::FloorPlan,
+    report::{
+        drawing::{Drawing, Shape},
+        text_width::text_width,
+    },
+};
+
+/// Floors that are drawn.
+const MOST_FLOORS: usize = 6;
+/// Space around everything and between drawings, pixels.
+const GAP: f32 = 20.0;
+/// Font size and distance of lines, pixels.
+const TEXT: f32 = 13.0;
+const TITLE: f32 = 16.0;
+const LINE: f32 = 19.0;
+
+/// A chart on paper.
+struct Paper {
+    shapes: Vec<Shape>,
+    width: f32,
+    y: f32,
+}
+
+pub fn draw(chart: &TrailChart) -> Drawing {
+    let mut paper = Paper { shapes: Vec::new(), width: 0.0, y: GAP };
+    paper.text(0.0, TITLE, INK, &chart.title);
+    paper.legend();
+    for floor in chart.floors.iter().take(MOST_FLOORS) {
+        paper.floor(floor);
+    }
+    let left_out = chart.floors.len().saturating_sub(MOST_FLOORS);
+    if left_out > 0 {
+        paper.text(0.0, TEXT, SOFT, &format!("{left_out} more floors are not drawn"));
+    }
+    let size = Vec2::new(paper.width + GAP, paper.y + GAP / 2.0);
+    Drawing { label: chart.title.clone(), size, shapes: paper.shapes }
+}
+
+impl Paper {
+    /// Writes a line of text, and goes on below it.
+    fn text(&mut self, x: f32, size: f32, colour: [u8; 3], words: &str) {
+        self.words(x, size, colour, words);
+        self.y += LINE;
+    }
+
+    /// Writes on this line, and stays there.
+    fn words(&mut self, x: f32, size: f32, colour: [u8; 3], words: &str) -> f32 {
+        let at = Vec2::new(GAP + x, self.y + TEXT);
+        self.shapes.push(Shape::Text { at, size, colour, words: words.to_owned() });
+        let right = GAP + x + text_width(words, f64::from(size)) as f32;
+        self.width = self.width.max(right);
+        right - GAP
+    }
+
+    fn legend(&mut self) {
+        let middle = self.y + TEXT - 4.5;
+        self.shapes.push(start_mark(Vec2::new(GAP + 8.0, middle), 6.0));
+        let x = self.words(20.0, TEXT, SOFT, "start") + 24.0;
+        self.shapes.push(goal_mark(Vec2::new(GAP + x, middle), 6.0));
+        let mut x = self.words(x + 12.0, TEXT, SOFT, "goal") + 16.0;
+        for step in 0..8 {
+            let corner = Vec2::new(GAP + x, middle - 6.0);
+            let fill = heat(f64::from(step) / 7.0);
+            self.shapes.push(Shape::Block { area: Rect::from_corners(corner, corner + Vec2::new(9.0, 12.0)), fill });
+            x += 9.0;
+        }
+        self.text(x + 8.0, TEXT, SOFT, "few to most ticks in a place, logarithmic");
+        self.y += GAP / 2.0;
+    }
+
+    /// All players on a floor: one of them with both drawings side by side, several side by side with the drawings below
+    /// each other.
+    fn floor(&mut self, floor: &Floor) {
+        self.text(0.0, TEXT, INK, &floor.name);
+        let width = panel_width(&floor.plan);
+        let contents = [Content::Trajectories, Content::Visits];
+        let rows: Vec<Vec<(&Walker, Content)>> = match floor.walkers.as_slice() {
+            [one] => vec![contents.map(|content| (one, content)).to_vec()],
+            several => contents.map(|content| several.iter().map(|walker| (walker, content)).collect()).to_vec(),
+        };
+        for row in rows {
+            let top = self.y;
+            for (column, (walker, content)) in row.into_iter().enumerate() {
+                self.y = top;
+                self.panel(floor, walker, content, column as f32 * (width + GAP), width);
+            }
+        }
+    }
+
+    fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, x: f32, width: f32) {
+        let reached = walker.trails.iter().filter(|trail| trail.result.end.is_success()).count();
+        let words = format!("{}: goal reached in {reached} of {}", walker.name, walker.trails.len());
+        self.text(x, TEXT, INK, &words);
+        self.text(x, TEXT, SOFT, &content.caption(walker));
+        let frame = Frame::new(floor.plan.bounds, Vec2::new(GAP + x, self.y + 2.0), width);
+        content.draw(floor, walker, &frame, &mut self.shapes);
+        self.width = self.width.max(GAP + x + width);
+        self.y = frame.whole().max.y + GAP;
+    }
+}
+
+/// Wide floors get more room.
+fn panel_width(plan: &FloorPlan) -> f32 {
+    let shape = plan.bounds.width() / plan.bounds.height().max(f32::MIN_POSITIVE);
+    (330.0 * shape.sqrt()).clamp(260.0, 900.0)
+}

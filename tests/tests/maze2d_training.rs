@@ -1,0 +1,111 @@
+//! Learning with continuous actions, from recording to measurement, on Maze2D.
+
+use std::path::Path;
+
+use bevy_playbot::{
+    demo::{
+        dataset::Demonstrations,
+        file::{DemoHeader, DemoWriter},
+        recorder::demo_actions,
+    },
+    eval::{EvalPlan, Player, evaluate, summarize},
+    game::build_world,
+    learner::{DeviceKind, SkillModel, SkillTrainer},
+    policy::ActionDraw,
+    prelude::*,
+    train::{Algorithm, Experiment, Trainer, config_file::parse_experiment},
+    vision::Sight,
+};
+use playbot_games::maze2d::Maze2d;
+
+const GAME: Maze2d = Maze2d { physics: false };
+
+const EXPERIMENT: &str = r#"(
+    game: "maze2d", train: "umaze:0..63", test: "umaze:64..127", demos: "unused",
+    steps: 200000, arenas: 32, worlds: 2,
+    skills: (
+        window: 10, epochs: 3, batch: 64, hidden: [64, 64], encoder_hidden: 32, gru_hidden: 32, gru_layers: 1, lr: 0.001,
+    ),
+    ppo: (num_steps: 128, minibatches: 8, epochs: 4, hidden: [64, 64], lr: 0.001, ent_coef: 0.0, gamma: 0.99),
+    sac: (
+        num_steps: 4, batch: 64, buffer: 20000, learning_starts: 1000, hidden: [32, 32], updates_per_step: 0.02,
+    ),
+    score: (horizon: 8),
+)"#;
+
+fn experiment(algorithm: Algorithm) -> Experiment {
+    let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
+    // Off-policy learning is slow by comparison: here it is enough that it runs.
+    let steps = if algorithm.is_sac() { 8_000 } else { experiment.steps };
+    Experiment { algorithm, steps, ..experiment }
+}
+
+/// Skills from 20,000 steps of the demonstrator.
+fn skills() -> SkillModel {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, mode) = (folder.path().join("umaze.demo"), "umaze+retarget");
+    let header = DemoHeader::new("maze2d", GAME.version(), mode, GAME.tick_hz(), demo_actions(&GAME.actions()));
+    let (mut world, agents) = build_world(&GAME, mode, 1, 0, 1);
+    world.insert_resource(
+        Recorder::new(DemoWriter::create(&path, header).expect("a fresh file")).with_step_limit(20_000),
+    );
+    GAME.arm_demonstrator(&mut world, agents[0], 0.5);
+    let queue = LevelQueue::Uniform { first: 1000, last: 1999 };
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
+    while world.resource::<Recorder>().steps() < 20_000 {
+        world.tick().expect("sound");
+    }
+    let demos = Demonstrations::read(&GAME, &Sight::default(), &path, None).expect("readable");
+    let dataset = demos.dataset(&GAME, 2, |_| {}).expect("replays");
+    let config = experiment(Algorithm::ScorePpo).skills;
+    let epochs = config.epochs;
+    let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");
+    for _ in 0..epochs {
+        trainer.train_epoch(&mut |_| std::ops::ControlFlow::Continue(())).expect("learns");
+    }
+    trainer.into_model()
+}
+
+/// Mean return and success rate on the held-out levels.
+fn measure(player: &Player) -> (f64, f64) {
+    let split: LevelSplit = experiment(Algorithm::Ppo).test;
+    let plan = EvalPlan {
+        split: split.clone(),
+        sight: Sight::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 32,
+        worlds: 2,
+        threads: 2,
+    };
+    let summary = summarize("player", &split, &evaluate(&GAME, player, &plan, |_| {}).expect("sound"));
+    (summary.return_mean, summary.success)
+}
+
+fn train(algorithm: Algorithm, skills: &SkillModel) -> Player {
+    let skills = algorithm.needs_skills().then_some(skills);
+    let mut trainer = Trainer::new(&GAME, &experiment(algorithm), skills, DeviceKind::Flex, 2).expect("fits");
+    let mut clipped = None;
+    while !trainer.is_done() {
+        clipped = trainer.update().expect("learns").clipped_share.or(clipped);
+    }
+    // A Gaussian has tails beyond the range, a squashed one has not.
+    let clipped = clipped.unwrap_or_else(|| panic!("{algorithm}: clipped actions are counted"));
+    assert!(if algorithm.is_sac() { clipped == 0.0 } else { clipped > 0.01 }, "{algorithm}: {clipped}");
+    Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw: ActionDraw::Sample }
+}
+
+#[test]
+fn every_algorithm_learns_with_continuous_actions_and_both_ppos_beat_chance() {
+    let skills = skills();
+    let (chance, chance_success) = measure(&Player::Blind(BlindBot::Uniform));
+    for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo] {
+        let (mean, success) = measure(&train(algorithm, &skills));
+        println!("{algorithm}: {mean} against {chance}, success {success} against {chance_success}");
+        assert!(mean > 2.0 * chance && success > chance_success + 0.4, "{algorithm}: {mean} against {chance}");
+    }
+    for algorithm in [Algorithm::Sac, Algorithm::ScoreSac] {
+        let (mean, _) = measure(&train(algorithm, &skills));
+        assert!(mean.is_finite() && mean > 0.0, "{algorithm}: {mean}");
+    }
+}

@@ -1,0 +1,159 @@
+//! Where agents went, as the evaluation notes it and the picture shows it.
+
+use bevy::math::Vec2;
+use bevy_playbot::{
+    eval::{EvalPlan, Player, Trail, evaluate, evaluate_with_trails},
+    floor_plan::FloorPlan,
+    game::Game,
+    report::{Floor, Shape, TrailChart, Visits, Walker},
+    vision::Sight,
+};
+use playbot_games::{
+    maze::{Cell, Planner, fixed},
+    registry,
+};
+
+fn game(name: &str) -> &'static dyn Game {
+    registry::game(name).expect("a game")
+}
+
+fn plan(levels: &str, threads: usize) -> EvalPlan {
+    EvalPlan {
+        split: levels.parse().expect("a split"),
+        sight: Sight::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 4,
+        worlds: 2,
+        threads,
+    }
+}
+
+fn right_jump() -> Player {
+    let bots = game("coinrun").blind_bots();
+    Player::Blind(bots.into_iter().find(|(name, _)| *name == "right-jump").expect("CoinRun's bot").1)
+}
+
+fn trails(name: &str, player: &Player, levels: &str) -> Vec<Trail> {
+    evaluate_with_trails(game(name), player, &plan(levels, 2), |_| {}).expect("sound")
+}
+
+#[test]
+fn a_trail_has_the_place_after_every_tick_of_its_own_episode() {
+    let trails = trails("coinrun", &right_jump(), "hard:0..5");
+    let levels: Vec<u64> = trails.iter().map(|trail| trail.result.level).collect();
+    assert_eq!(levels, [0, 1, 2, 3, 4, 5]);
+    let mut reached = 0;
+    for trail in &trails {
+        let plan = game("coinrun").floor_plan("hard", trail.result.level).expect("a plan");
+        assert_eq!(trail.places.len() as u32, trail.result.ticks);
+        assert!(trail.places[0].distance(plan.start) < 1.0, "level {}", trail.result.level);
+        assert!(trail.places.windows(2).all(|pair| pair[0].x <= pair[1].x), "it only goes right");
+        assert!(trail.places.iter().all(|&place| plan.bounds.contains(place)));
+        let end = trail.places[trail.places.len() - 1];
+        assert_eq!(end.distance(plan.goal) < 1.7, trail.result.end.is_success(), "level {}", trail.result.level);
+        reached += usize::from(trail.result.end.is_success());
+    }
+    assert!((1..6).contains(&reached), "both endings occur, but {reached} of 6 reached the coin");
+}
+
+#[test]
+fn following_changes_no_result_and_threads_change_nothing() {
+    let player = right_jump();
+    let followed = trails("coinrun", &player, "hard:0..7");
+    let plain = evaluate(game("coinrun"), &player, &plan("hard:0..7", 1), |_| {}).expect("sound");
+    assert_eq!(followed.iter().map(|trail| trail.result).collect::<Vec<_>>(), plain);
+    let alone = evaluate_with_trails(game("coinrun"), &player, &plan("hard:0..7", 1), |_| {}).expect("sound");
+    assert_eq!(alone, followed);
+}
+
+/// The cells in which a ball was, one after the other. D4RL's walls stand 0.2 aside.
+fn cells(trail: &Trail) -> Vec<Cell> {
+    let cell = |place: &Vec2| Cell::new((place.x + 0.2).round() as usize, (place.y + 0.2).round() as usize);
+    let mut cells: Vec<Cell> = trail.places.iter().map(cell).collect();
+    cells.dedup();
+    cells
+}
+
+#[test]
+fn the_planners_ball_is_seen_in_every_cell_of_its_way_and_in_no_wall() {
+    let maze = fixed::maze2d::medium();
+    let way = Planner::new(&maze, maze.goal()).path(maze.start()).expect("a way");
+    for trail in trails("maze2d", &Player::Demonstrator, "medium+fixed-start+end-at-goal:0..3") {
+        assert!(trail.result.end.is_success(), "level {}", trail.result.level);
+        let seen = cells(&trail);
+        assert!(seen.iter().all(|&cell| maze.is_free(cell)), "{seen:?}");
+        let mut rest = seen.iter();
+        assert!(way.iter().all(|cell| rest.any(|other| other == cell)), "{seen:?} is not along {way:?}");
+    }
+}
+
+#[test]
+fn the_ants_plan_has_its_start_at_the_origin_and_the_goal_of_the_original() {
+    let plan = game("antmaze").floor_plan("large", 0).expect("a plan");
+    assert_eq!((plan.start, plan.goal), (Vec2::ZERO, Vec2::new(32.0, 24.0)));
+    assert_eq!((plan.bounds.min, plan.bounds.max), (Vec2::splat(-6.0), Vec2::new(42.0, 30.0)));
+    let in_wall = |place: Vec2| plan.walls.iter().any(|wall| wall.contains(place));
+    let maze = fixed::antmaze::large();
+    let centre = |cell: Cell| Vec2::new(4.0 * (cell.col as f32 - 1.0), 4.0 * (cell.row as f32 - 1.0));
+    assert!(maze.wall_cells().all(|cell| in_wall(centre(cell))));
+    assert!(maze.free_cells().all(|cell| !in_wall(centre(cell))));
+}
+
+#[test]
+fn an_ants_trail_begins_at_its_start() {
+    let idle = Player::Blind(bevy_playbot::bot::BlindBot::Uniform);
+    let trail = &trails("antmaze", &idle, "medium+limit=20:0..0")[0];
+    assert_eq!(trail.places.len(), 20);
+    assert!(trail.places.iter().all(|place| place.length() < 3.0), "{:?}", trail.places);
+}
+
+#[test]
+fn every_tick_is_counted_in_the_square_where_it_was() {
+    let trails = trails("coinrun", &right_jump(), "hard:0..0");
+    let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");
+    let visits = Visits::count(plan.bounds, &trails);
+    assert_eq!(visits.total(), trails[0].places.len() as u64);
+    assert!(trails[0].places.iter().all(|&place| visits.at(place) > 0));
+    assert!(visits.visited().all(|(square, _)| trails[0].places.iter().any(|&place| square.contains(place))));
+    assert_eq!(visits.at(plan.bounds.max), 0, "nobody was in the upper corner");
+    assert_eq!(visits.at(plan.bounds.max + 1.0), 0, "nor outside");
+}
+
+fn walkers(names: &[&str], trails: &[Trail]) -> Vec<Walker> {
+    names.iter().map(|name| Walker { name: (*name).to_owned(), trails: trails.to_vec() }).collect()
+}
+
+fn floor(plan: FloorPlan, walkers: Vec<Walker>) -> Floor {
+    let (starts, goals) = (vec![plan.start], vec![plan.goal]);
+    Floor { name: "hard:0".to_owned(), plan, starts, goals, walkers }
+}
+
+#[test]
+fn the_picture_has_a_line_for_each_episode_and_everything_on_the_paper() {
+    let trails = trails("coinrun", &right_jump(), "hard:0..0");
+    let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");
+    for (names, copies) in [(&["right-jump"][..], 3), (&["one", "two", "<three>"], 40)] {
+        let copied: Vec<Trail> = (0..copies).flat_map(|_| trails.clone()).collect();
+        let chart =
+            TrailChart { title: "CoinRun".to_owned(), floors: vec![floor(plan.clone(), walkers(names, &copied))] };
+        let drawing = chart.draw();
+        let long = |shape: &&Shape| matches!(shape, Shape::Line { points, .. } if points.len() > 5);
+        let lines = drawing.shapes.iter().filter(long).count();
+        assert_eq!(lines, names.len() * copies.min(24));
+        for shape in &drawing.shapes {
+            let (min, max) = match shape {
+                Shape::Block { area, .. } => (area.min, area.max),
+                Shape::Line { points, .. } => {
+                    points.iter().fold((points[0], points[0]), |(min, max), point| (min.min(*point), max.max(*point)))
+                }
+                Shape::Mark { centre, .. } => (*centre, *centre),
+                Shape::Text { at, .. } => (*at, *at),
+            };
+            assert!(min.min_element() >= 0.0 && max.cmple(drawing.size).all(), "{shape:?} on {}", drawing.size);
+        }
+        let svg = drawing.to_svg();
+        assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n") && !svg.contains("<three>"));
+        assert_eq!(svg, chart.draw().to_svg());
+    }
+}
