@@ -65,15 +65,13 @@ pub struct Walker {
     pub body: AntBody,
     /// The goal, in metres.
     pub goal: Vec2,
-    /// Action values that were out of range and have been clipped, over all episodes.
-    pub clipped: u64,
     /// Draws the goals of this level.
     draws: ChaCha8Rng,
 }
 
 impl Default for Walker {
     fn default() -> Self {
-        Self { body: AntBody::new(&[]), goal: Vec2::ZERO, clipped: 0, draws: ChaCha8Rng::seed_from_u64(0) }
+        Self { body: AntBody::new(&[]), goal: Vec2::ZERO, draws: ChaCha8Rng::seed_from_u64(0) }
     }
 }
 
@@ -106,12 +104,9 @@ pub(super) fn walk(
         if !control.is_active() || !episode.is_running() {
             continue;
         }
-        let Some(action) = action.continuous().and_then(|values| <[f32; JOINTS]>::try_from(values).ok()) else {
-            continue;
-        };
-        walker.clipped += action.iter().filter(|value| value.abs() > 1.0).count() as u64;
+        let asked = action.continuous().unwrap_or_default();
         let before = walker.place().distance(walker.goal);
-        walker.body.step(&action);
+        walker.body.step(&torques(action, &mut episode));
         let state = walker.body.state();
         if !state.is_finite() {
             faults.report(format!(
@@ -122,7 +117,7 @@ pub(super) fn walk(
         }
         *hash = state.hash();
         let distance = walker.place().distance(walker.goal);
-        let effort: f32 = action.iter().map(|value| value.powi(2).min(MOST_EFFORT)).sum();
+        let effort: f32 = asked.iter().map(|value| value.powi(2).min(MOST_EFFORT)).sum();
         reward.add(PROGRESS_REWARD * (before - distance) + UPRIGHT_REWARD - EFFORT_PRICE * effort);
         if distance <= GOAL_RADIUS {
             match *task {
@@ -140,6 +135,18 @@ pub(super) fn walk(
             episode.truncate();
         }
     }
+}
+
+/// The action within -1..=1, and a note if it was not.
+pub(crate) fn torques(action: &Action, episode: &mut Episode) -> [f32; JOINTS] {
+    let mut torques = [0.0; JOINTS];
+    for (torque, asked) in torques.iter_mut().zip(action.continuous().unwrap_or_default()) {
+        *torque = asked.clamp(-1.0, 1.0);
+    }
+    if action.continuous() != Some(&torques[..]) {
+        episode.note_clipped();
+    }
+    torques
 }
 
 pub(super) fn observe(mut walkers: Query<(&Episode, &Walker, &mut Observation), With<VectorSensor>>) {

@@ -10,7 +10,7 @@ use super::{
     mode::Pay,
     view,
 };
-use crate::ant::AntState;
+use crate::ant::{AntState, walk::torques};
 
 /// An ant this near to the goal has reached it, metres.
 pub const GOAL_RADIUS: f32 = 0.5;
@@ -45,18 +45,6 @@ pub(super) fn play(
             episode.truncate();
         }
     }
-}
-
-/// The action within -1..=1, and a note if it was not.
-fn torques(action: &Action, episode: &mut Episode) -> [f32; 8] {
-    let mut torques = [0.0; 8];
-    for (torque, asked) in torques.iter_mut().zip(action.continuous().unwrap_or_default()) {
-        *torque = asked.clamp(-1.0, 1.0);
-    }
-    if action.continuous() != Some(&torques[..]) {
-        episode.note_clipped();
-    }
-    torques
 }
 
 fn pay(pay: Pay, away: f32) -> f32 {
