@@ -36,7 +36,7 @@ const EXPERIMENT: &str = r#"(
 fn experiment(algorithm: Algorithm) -> Experiment {
     let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
     // Off-policy learning is slow by comparison: here it is enough that it runs.
-    let steps = if algorithm.is_sac() { 8_000 } else { experiment.steps };
+    let steps = if algorithm.is_sac() { 4_000 } else { experiment.steps };
     Experiment { algorithm, steps, ..experiment }
 }
 
@@ -102,7 +102,7 @@ fn every_algorithm_learns_with_continuous_actions_and_both_ppos_beat_chance() {
     for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo] {
         let (mean, success) = measure(&train(algorithm, &skills));
         println!("{algorithm}: {mean} against {chance}, success {success} against {chance_success}");
-        assert!(mean > 2.0 * chance && success > chance_success + 0.4, "{algorithm}: {mean} against {chance}");
+        assert!(mean > 2.0 * chance && success > 2.0 * chance_success, "{algorithm}: {mean} against {chance}");
     }
     for algorithm in [Algorithm::Sac, Algorithm::ScoreSac] {
         let (mean, _) = measure(&train(algorithm, &skills));
