@@ -35,9 +35,12 @@ const EXPERIMENT: &str = r#"(
 
 fn experiment(algorithm: Algorithm) -> Experiment {
     let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
-    // Off-policy learning is slow by comparison: here it is enough that it runs.
-    let steps = if algorithm.is_sac() { 4_000 } else { experiment.steps };
-    Experiment { algorithm, steps, ..experiment }
+    // Off-policy learning is slow by comparison: here it is enough that it runs, past the end of some episodes.
+    let (steps, arenas) = if algorithm.is_sac() { (4_000, 8) } else { (experiment.steps, experiment.arenas) };
+    let mut experiment = Experiment { algorithm, steps, arenas, ..experiment };
+    // SAC squashes its actions, so its policy cannot be a copy of the decoder.
+    experiment.score.init_from_decoder = !algorithm.is_sac();
+    experiment
 }
 
 /// Skills from 20,000 steps of the demonstrator.
