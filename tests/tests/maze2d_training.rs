@@ -35,9 +35,12 @@ const EXPERIMENT: &str = r#"(
 
 fn experiment(algorithm: Algorithm) -> Experiment {
     let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
-    // Off-policy learning is slow by comparison: here it is enough that it runs.
-    let steps = if algorithm.is_sac() { 8_000 } else { experiment.steps };
-    Experiment { algorithm, steps, ..experiment }
+    // Off-policy learning is slow by comparison: here it is enough that it runs, past the end of some episodes.
+    let (steps, arenas) = if algorithm.is_sac() { (4_000, 8) } else { (experiment.steps, experiment.arenas) };
+    let mut experiment = Experiment { algorithm, steps, arenas, ..experiment };
+    // SAC squashes its actions, so its policy cannot be a copy of the decoder.
+    experiment.score.init_from_decoder = !algorithm.is_sac();
+    experiment
 }
 
 /// Skills from 20,000 steps of the demonstrator.
@@ -102,7 +105,7 @@ fn every_algorithm_learns_with_continuous_actions_and_both_ppos_beat_chance() {
     for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo] {
         let (mean, success) = measure(&train(algorithm, &skills));
         println!("{algorithm}: {mean} against {chance}, success {success} against {chance_success}");
-        assert!(mean > 2.0 * chance && success > chance_success + 0.4, "{algorithm}: {mean} against {chance}");
+        assert!(mean > 2.0 * chance && success > 2.0 * chance_success, "{algorithm}: {mean} against {chance}");
     }
     for algorithm in [Algorithm::Sac, Algorithm::ScoreSac] {
         let (mean, _) = measure(&train(algorithm, &skills));

@@ -49,7 +49,6 @@ fn a_trail_has_the_place_after_every_tick_of_its_own_episode() {
         assert_eq!(trail.places.len() as u32, trail.result.ticks);
         assert!(trail.places[0].distance(plan.start) < 1.0, "level {}", trail.result.level);
         assert!(trail.places.windows(2).all(|pair| pair[0].x <= pair[1].x), "it only goes right");
-        assert!(trail.places.iter().all(|&place| plan.bounds.contains(place)));
         let end = trail.places[trail.places.len() - 1];
         assert_eq!(end.distance(plan.goal) < 1.7, trail.result.end.is_success(), "level {}", trail.result.level);
         reached += usize::from(trail.result.end.is_success());
@@ -113,8 +112,9 @@ fn every_tick_is_counted_in_the_square_where_it_was() {
     let trails = trails("coinrun", &right_jump(), "hard:0..0");
     let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");
     let visits = Visits::count(plan.bounds, &trails);
-    assert_eq!(visits.total(), trails[0].places.len() as u64);
-    assert!(trails[0].places.iter().all(|&place| visits.at(place) > 0));
+    let inside = trails[0].places.iter().filter(|&&place| plan.bounds.contains(place));
+    assert!(inside.clone().count() > 40 && visits.total() == inside.clone().count() as u64);
+    assert!(inside.clone().all(|&place| visits.at(place) > 0));
     assert!(visits.visited().all(|(square, _)| trails[0].places.iter().any(|&place| square.contains(place))));
     assert_eq!(visits.at(plan.bounds.max), 0, "nobody was in the upper corner");
     assert_eq!(visits.at(plan.bounds.max + 1.0), 0, "nor outside");

@@ -98,7 +98,7 @@ impl Shape {
         let _ = match self {
             Self::Block { area, fill } => writeln!(
                 out,
-                "<rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{:.2}\" fill=\"{}\"/>",
+                "<rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{:.2}\" fill=\"{}\" shape-rendering=\"crispEdges\"/>",
                 area.min.x,
                 area.min.y,
                 area.width(),

@@ -43,7 +43,7 @@ Animated PNGs play in browsers and in most viewers of pictures.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; `hard`, or that of the recording.
+    /// Mode of the game; its last one, or that of the recording.
     #[arg(long, conflicts_with = "demo")]
     mode: Option<String>,
     /// Seed of the level.

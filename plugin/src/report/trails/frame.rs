@@ -16,6 +16,11 @@ impl Frame {
         Self { bounds, corner, scale: width / bounds.width().max(f32::MIN_POSITIVE) }
     }
 
+    /// What is drawn of the floor, in its units.
+    pub fn bounds(&self) -> Rect {
+        self.bounds
+    }
+
     /// Where a place of the floor is drawn.
     pub fn place(&self, at: Vec2) -> Vec2 {
         self.corner + Vec2::new(at.x - self.bounds.min.x, self.bounds.max.y - at.y) * self.scale

@@ -8,12 +8,9 @@ use super::{
     frame::Frame,
     panel::{Content, goal_mark, start_mark},
 };
-use crate::{
-    floor_plan::FloorPlan,
-    report::{
-        drawing::{Drawing, Shape},
-        text_width::text_width,
-    },
+use crate::report::{
+    drawing::{Drawing, Shape},
+    text_width::text_width,
 };
 
 /// Floors that are drawn.
@@ -24,6 +21,8 @@ const GAP: f32 = 20.0;
 const TEXT: f32 = 13.0;
 const TITLE: f32 = 16.0;
 const LINE: f32 = 19.0;
+/// Room for the words above a drawing.
+const HEAD: f32 = 2.0 * LINE + 2.0;
 
 /// A chart on paper.
 struct Paper {
@@ -83,7 +82,8 @@ impl Paper {
     /// each other.
     fn floor(&mut self, floor: &Floor) {
         self.text(0.0, TEXT, INK, &floor.name);
-        let width = panel_width(&floor.plan);
+        let extent = floor.extent();
+        let width = panel_width(extent);
         let contents = [Content::Trajectories, Content::Visits];
         let rows: Vec<Vec<(&Walker, Content)>> = match floor.walkers.as_slice() {
             [one] => vec![contents.map(|content| (one, content)).to_vec()],
@@ -93,25 +93,27 @@ impl Paper {
             let top = self.y;
             for (column, (walker, content)) in row.into_iter().enumerate() {
                 self.y = top;
-                self.panel(floor, walker, content, column as f32 * (width + GAP), width);
+                let frame = Frame::new(extent, Vec2::new(GAP + column as f32 * (width + GAP), top + HEAD), width);
+                self.panel(floor, walker, content, &frame);
             }
         }
     }
 
-    fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, x: f32, width: f32) {
+    /// A drawing in its frame, with words above it, and goes on below it.
+    fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, frame: &Frame) {
+        let area = frame.whole();
         let reached = walker.trails.iter().filter(|trail| trail.result.end.is_success()).count();
         let words = format!("{}: goal reached in {reached} of {}", walker.name, walker.trails.len());
-        self.text(x, TEXT, INK, &words);
-        self.text(x, TEXT, SOFT, &content.caption(walker));
-        let frame = Frame::new(floor.plan.bounds, Vec2::new(GAP + x, self.y + 2.0), width);
-        content.draw(floor, walker, &frame, &mut self.shapes);
-        self.width = self.width.max(GAP + x + width);
-        self.y = frame.whole().max.y + GAP;
+        self.text(area.min.x - GAP, TEXT, INK, &words);
+        self.text(area.min.x - GAP, TEXT, SOFT, &content.caption(walker));
+        content.draw(floor, walker, frame, &mut self.shapes);
+        self.width = self.width.max(area.max.x);
+        self.y = area.max.y + GAP;
     }
 }
 
 /// Wide floors get more room.
-fn panel_width(plan: &FloorPlan) -> f32 {
-    let shape = plan.bounds.width() / plan.bounds.height().max(f32::MIN_POSITIVE);
+fn panel_width(extent: Rect) -> f32 {
+    let shape = extent.width() / extent.height().max(f32::MIN_POSITIVE);
     (330.0 * shape.sqrt()).clamp(260.0, 900.0)
 }

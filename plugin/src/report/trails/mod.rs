@@ -8,7 +8,7 @@ mod visits;
 
 pub use visits::Visits;
 
-use bevy::math::Vec2;
+use bevy::math::{Rect, Vec2};
 
 use super::drawing::Drawing;
 use crate::{eval::Trail, floor_plan::FloorPlan};
@@ -44,6 +44,14 @@ pub struct Walker {
     pub name: String,
     /// Its episodes.
     pub trails: Vec<Trail>,
+}
+
+impl Floor {
+    /// The bounds of the plan, and around them whatever else was walked on.
+    fn extent(&self) -> Rect {
+        let places = self.walkers.iter().flat_map(|walker| &walker.trails).flat_map(|trail| &trail.places);
+        places.filter(|place| place.is_finite()).fold(self.plan.bounds, |extent, &place| extent.union_point(place))
+    }
 }
 
 impl TrailChart {

@@ -10,7 +10,6 @@ use super::{
 };
 use crate::{
     eval::Trail,
-    floor_plan::FloorPlan,
     report::drawing::{MarkForm, Shape},
 };
 
@@ -43,7 +42,7 @@ impl Content {
     /// Draws it.
     pub fn draw(self, floor: &Floor, walker: &Walker, frame: &Frame, out: &mut Vec<Shape>) {
         if self == Self::Visits {
-            visits(&floor.plan, &walker.trails, frame, out);
+            visits(&walker.trails, frame, out);
         }
         out.extend(
             floor
@@ -64,8 +63,8 @@ impl Content {
     }
 }
 
-fn visits(plan: &FloorPlan, trails: &[Trail], frame: &Frame, out: &mut Vec<Shape>) {
-    let visits = Visits::count(plan.bounds, trails);
+fn visits(trails: &[Trail], frame: &Frame, out: &mut Vec<Shape>) {
+    let visits = Visits::count(frame.bounds(), trails);
     let most = (visits.most() as f64).ln_1p();
     out.extend(visits.visited().map(|(square, ticks)| {
         let fill = heat((ticks as f64).ln_1p() / most);
