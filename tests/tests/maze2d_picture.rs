@@ -58,8 +58,8 @@ fn walls_floor_ball_and_goal_are_where_they_are() {
         let mode: Maze2dMode = text.parse().expect("a mode");
         // A level on which the goal does not hide the ball, nor the ball the goal.
         let apart = |level: &Maze2dLevel| level.start_cell.row.abs_diff(level.goal_cell.row) > 1;
-        let levels = (0..).map(|seed| (seed, Maze2dLevel::new(&mode, seed).expect("a level")));
-        let (seed, level) = levels.into_iter().find(|(_, level)| apart(level)).expect("some level");
+        let mut levels = (0..).map(|seed| (seed, Maze2dLevel::new(&mode, seed).expect("a level")));
+        let (seed, level) = levels.find(|(_, level)| apart(level)).expect("some level");
         let (mut world, agent) = seeing(text, seed);
         world.tick().expect("drawn");
         for (what, colour, place) in [("ball", BALL, level.start.position), ("goal", GOAL, level.goal())] {
