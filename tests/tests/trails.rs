@@ -1,6 +1,6 @@
 //! Where agents went, as the evaluation notes it and the picture shows it.
 
-use bevy::math::Vec2;
+use bevy::math::{Rect, Vec2};
 use bevy_playbot::{
     eval::{EvalPlan, Player, Trail, evaluate, evaluate_with_trails},
     floor_plan::FloorPlan,
@@ -47,8 +47,9 @@ fn a_trail_has_the_place_after_every_tick_of_its_own_episode() {
     for trail in &trails {
         let plan = game("coinrun").floor_plan("hard", trail.result.level).expect("a plan");
         assert_eq!(trail.places.len() as u32, trail.result.ticks);
-        assert!(trail.places[0].distance(plan.start) < 1.0, "level {}", trail.result.level);
-        assert!(trail.places.windows(2).all(|pair| pair[0].x <= pair[1].x), "it only goes right");
+        // A jump begins with 1.5 tiles a tick; the place of another episode would be farther away.
+        assert!(trail.places[0].distance(plan.start) < 1.7, "level {}", trail.result.level);
+        assert!(trail.places.windows(2).all(|pair| pair[0].distance(pair[1]) < 1.7), "level {}", trail.result.level);
         let end = trail.places[trail.places.len() - 1];
         assert_eq!(end.distance(plan.goal) < 1.7, trail.result.end.is_success(), "level {}", trail.result.level);
         reached += usize::from(trail.result.end.is_success());
@@ -115,7 +116,8 @@ fn every_tick_is_counted_in_the_square_where_it_was() {
     let inside = trails[0].places.iter().filter(|&&place| plan.bounds.contains(place));
     assert!(inside.clone().count() > 40 && visits.total() == inside.clone().count() as u64);
     assert!(inside.clone().all(|&place| visits.at(place) > 0));
-    assert!(visits.visited().all(|(square, _)| trails[0].places.iter().any(|&place| square.contains(place))));
+    let holds = |square: Rect| trails[0].places.iter().any(|&place| square.inflate(1e-3).contains(place));
+    assert!(visits.visited().all(|(square, _)| holds(square)));
     assert_eq!(visits.at(plan.bounds.max), 0, "nobody was in the upper corner");
     assert_eq!(visits.at(plan.bounds.max + 1.0), 0, "nor outside");
 }
@@ -133,7 +135,7 @@ fn floor(plan: FloorPlan, walkers: Vec<Walker>) -> Floor {
 fn the_picture_has_a_line_for_each_episode_and_everything_on_the_paper() {
     let trails = trails("coinrun", &right_jump(), "hard:0..0");
     let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");
-    for (names, copies) in [(&["right-jump"][..], 3), (&["one", "two", "<three>"], 40)] {
+    for (names, copies) in [(&["right-jump"][..], 3_usize), (&["one", "two", "<three>"], 40)] {
         let copied: Vec<Trail> = (0..copies).flat_map(|_| trails.clone()).collect();
         let chart =
             TrailChart { title: "CoinRun".to_owned(), floors: vec![floor(plan.clone(), walkers(names, &copied))] };
