@@ -78,7 +78,11 @@ fn what_is_measured_elsewhere_was_learned_where_the_variant_says() {
                     (map, test),
                     "{name}"
                 );
-                assert!(run.experiment.demos.to_string_lossy().contains(map), "{name}, {}", run.variant);
+                assert!(
+                    run.experiment.recordings().expect("some").to_string_lossy().contains(map),
+                    "{name}, {}",
+                    run.variant
+                );
             }
         }
     }

@@ -63,7 +63,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let experiment = args.from.load([option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
     let checkpoint = prepare(&args)?;
     let game = registry::game(&experiment.game)?;
-    let demos = args.demos.clone().unwrap_or_else(|| experiment::resolve(&experiment.demos));
+    let demos = match &args.demos {
+        Some(demos) => demos.clone(),
+        None => experiment::resolve(experiment.recordings()?),
+    };
     let dataset = read_demos(game, &experiment, &demos, args.threads)?;
     if args.force {
         // Not earlier: what there is stays if there is nothing to learn from.
@@ -133,9 +136,10 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 ///
 /// # Errors
 ///
-/// A recording cannot be read, belongs to another game, shows a held-out level or does not replay, or the pictures would
+/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a held-out level or does not replay, or the pictures would
 /// need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
+    experiment.check_actions(game.actions())?;
     let sight = experiment.sight();
     let mut demos = Demonstrations::read(game, &sight, path, Some(&experiment.test))?;
     if let Some(steps) = experiment.demo_steps {

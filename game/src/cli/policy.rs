@@ -113,7 +113,11 @@ fn from_skills(path: &Path, from: &ExperimentArgs) -> Result<Exported, CliError>
     let game = registry::game(&experiment.game)?;
     let model = SkillModel::load(path, DeviceKind::default())?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
-    let about = ("bc".to_owned(), format!("demonstrations in {}", experiment.demos.display()), code);
+    let training = match &experiment.demos {
+        Some(demos) => format!("demonstrations in {}", demos.display()),
+        None => "demonstrations".to_owned(),
+    };
+    let about = ("bc".to_owned(), training, code);
     let sight = Sight::from_card(model.picture(), &model.observation())?;
     let file = policy_file(game, &sight, model.policy(), Some(cloning_skills(&model, &experiment)), about);
     Ok((game, experiment, file))
@@ -130,7 +134,7 @@ fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliEr
     if as_json {
         print_line(json!({
             "card": card, "action_space": policy.action_space(), "latent": policy.latent(),
-            "horizon": skills.map(|skills| skills.horizon),
+            "horizon": skills.map(|skills| skills.horizon), "normalised": policy.normalises(),
         }))?;
         return Ok(Outcome::Pass);
     }
@@ -140,7 +144,12 @@ fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliEr
     print_line(format!("code          {}", card.code))?;
     print_line(match policy_sight(&file)? {
         sight if sight.is_image() => format!("observation   {sight}"),
-        _ => format!("observation   {} values: {}", policy.obs_dim(), listed(&card.observations)),
+        _ => format!(
+            "observation   {} values{}: {}",
+            policy.obs_dim(),
+            if policy.normalises() { ", normalised" } else { "" },
+            listed(&card.observations)
+        ),
     })?;
     print_line(format!("actions       {:?}: {}", policy.action_space(), listed(&card.actions)))?;
     print_line(match skills {

@@ -143,7 +143,8 @@ fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Optio
     std::fs::create_dir_all(&args.run)
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}", args.run.display())))?;
     interrupt::listen();
-    let dataset = learn_skills::read_demos(game, experiment, &experiment::resolve(&experiment.demos), args.threads)?;
+    let demos = experiment::resolve(experiment.recordings()?);
+    let dataset = learn_skills::read_demos(game, experiment, &demos, args.threads)?;
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });

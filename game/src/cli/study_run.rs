@@ -205,8 +205,9 @@ impl Runner {
     }
 
     fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
-        let Experiment { game: name, demos, test, demo_steps, .. } = experiment;
-        let key = (name.clone(), experiment::resolve(demos), test.clone(), experiment.sight(), *demo_steps);
+        let Experiment { game: name, test, demo_steps, .. } = experiment;
+        let path = experiment::resolve(experiment.recordings()?);
+        let key = (name.clone(), path, test.clone(), experiment.sight(), *demo_steps);
         match &self.demos {
             Some((known, dataset)) if *known == key => Ok(dataset.clone()),
             _ => {

@@ -8,7 +8,11 @@ use serde::{Deserialize, Serialize};
 pub enum ActionSpace {
     /// One of `n` choices, numbered from 0.
     Discrete(usize),
-    /// A vector of `n` real numbers.
+    /// A vector of `n` real numbers, of which games take those in [-1, 1] and clip the others.
+    ///
+    /// Gaussian policies (PPO's, and the skill model's decoder) draw numbers beyond. To a learner clipping is part of the
+    /// game: it keeps an action as it was drawn, with the density of that draw, and the decoder's confidence in it is
+    /// measured there too. Squashed policies (SAC's) stay within.
     Continuous(usize),
 }
 

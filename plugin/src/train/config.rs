@@ -1,9 +1,9 @@
 //! What an experiment is.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use playbot_learner::{PpoConfig, SacConfig, ScoreConfig, SkillConfig};
-use serde::{Deserialize, Serialize};
+use playbot_learner::{ActionSpace, PpoConfig, SacConfig, ScoreConfig, SkillConfig};
+use serde::{Deserialize, Serialize, Serializer};
 use thiserror::Error;
 
 pub use super::algorithm::Algorithm;
@@ -38,8 +38,9 @@ pub struct Experiment {
     pub train: LevelSplit,
     /// Held-out levels to evaluate on; never trained on.
     pub test: LevelSplit,
-    /// File or folder of demonstrations.
-    pub demos: PathBuf,
+    /// File or folder of demonstrations; `None` for algorithms that learn no skills.
+    #[serde(default, serialize_with = "plain")]
+    pub demos: Option<PathBuf>,
     /// Learn skills from at most so many recorded steps: whole episodes, drawn evenly over the recordings. From all of
     /// them if none is named.
     #[serde(default)]
@@ -83,6 +84,14 @@ pub struct Experiment {
     /// What a study compares; empty in the experiment of a single run.
     #[serde(default)]
     pub variants: Vec<Variant>,
+}
+
+/// A path as text, as files have it, and not as `Some(text)`.
+fn plain<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+    match path {
+        Some(path) => path.serialize(serializer),
+        None => serializer.serialize_none(),
+    }
 }
 
 fn score_ppo() -> Algorithm {
@@ -163,6 +172,9 @@ pub enum ExperimentError {
         /// What it must be.
         why: String,
     },
+    /// There is nothing to learn skills from.
+    #[error("`demos` is missing: skills are learned from recordings, so name a file or a folder of them")]
+    NoDemos,
     /// The learner refuses its settings.
     #[error("{0}")]
     Settings(String),
@@ -206,7 +218,68 @@ impl Experiment {
         self.score.validate().map_err(settings)?;
         self.sac.validate().map_err(settings)?;
         self.ppo_config().validate().map_err(settings)?;
+        if self.algorithm.needs_skills() {
+            self.recordings()?;
+        }
+        self.check_normalisers()?;
         self.check_batches()
+    }
+
+    /// Checks what goes with the game's actions, before hours are spent on skills.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the key to change.
+    pub fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
+        let settings = |error: playbot_learner::LearnError| ExperimentError::Settings(error.to_string());
+        self.skills.check_space(space).map_err(settings)?;
+        if !(self.algorithm.needs_skills() && self.algorithm.is_trained()) {
+            return Ok(());
+        }
+        self.score.check_space(space).map_err(settings)?;
+        let squashed = self.algorithm.is_sac() && matches!(space, ActionSpace::Continuous(_));
+        if squashed && self.score.init_from_decoder {
+            let why = "SAC squashes continuous actions, so its policy cannot start as a copy of the decoder; set it to \
+                       false (the penalty still ties the two together)";
+            return refuse("score.init_from_decoder", true, why);
+        }
+        Ok(())
+    }
+
+    /// The demonstrations.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::NoDemos`] if none are named.
+    pub fn recordings(&self) -> Result<&Path, ExperimentError> {
+        self.demos.as_deref().ok_or(ExperimentError::NoDemos)
+    }
+
+    /// Found out here, since the learner only says so once its skills are learned.
+    fn check_normalisers(&self) -> Result<(), ExperimentError> {
+        if self.skills.norm_obs && self.sight().is_image() {
+            return refuse("skills.norm_obs", true, "is for vectors; the pixels of images are divided by 255 instead");
+        }
+        let (key, running) = match self.algorithm.is_sac() {
+            true => ("sac.norm_obs", self.sac.norm_obs),
+            false => ("ppo.norm_obs", self.ppo.norm_obs),
+        };
+        if !(running && self.algorithm.needs_skills() && self.algorithm.is_trained()) {
+            return Ok(());
+        }
+        if self.skills.norm_obs {
+            return refuse(
+                key,
+                true,
+                "with `skills.norm_obs` the policy sees through the frozen normaliser of its skills",
+            );
+        }
+        if self.score.init_from_decoder {
+            let why = "a policy that starts as a copy of the decoder must see what the decoder saw; set \
+                       `skills.norm_obs` instead, which normalises for both";
+            return refuse(key, true, why);
+        }
+        Ok(())
     }
 
     fn check_batches(&self) -> Result<(), ExperimentError> {
@@ -281,7 +354,80 @@ fn nearest_divisor(n: u64, wanted: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+    use crate::train::config_file::parse_experiment;
+
+    fn check(changes: &str) -> Result<(), String> {
+        let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, {changes})"#);
+        parse_experiment(&text, Path::new("x.ron")).expect("valid").check().map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn only_those_who_learn_skills_need_demonstrations() {
+        for algorithm in Algorithm::ALL {
+            let without = check(&format!(r#"algorithm: "{algorithm}""#));
+            assert_eq!(without, check(&format!(r#"algorithm: "{algorithm}", demos: None"#)));
+            match algorithm.needs_skills() {
+                true => {
+                    assert!(without.expect_err("nothing to learn from").contains("`demos` is missing"), "{algorithm}")
+                }
+                false => assert_eq!(without, Ok(())),
+            }
+            let score = "score: (init_from_decoder: false)";
+            assert_eq!(check(&format!(r#"algorithm: "{algorithm}", demos: "d", {score}"#)), Ok(()));
+        }
+    }
+
+    #[test]
+    fn one_normaliser_at_a_time() {
+        let frozen = r#"demos: "d", skills: (norm_obs: true)"#;
+        assert_eq!(check(frozen), Ok(()));
+        for (changes, words) in [
+            (r#"observation: Raster"#, "`skills.norm_obs` is true: is for vectors"),
+            (r#"ppo: (norm_obs: true)"#, "`ppo.norm_obs` is true: with `skills.norm_obs`"),
+            (
+                r#"ppo: (norm_obs: true), score: (init_from_decoder: false)"#,
+                "`ppo.norm_obs` is true: with `skills.norm_obs`",
+            ),
+            (r#"algorithm: "score-sac", sac: (norm_obs: true)"#, "`sac.norm_obs` is true: with `skills.norm_obs`"),
+        ] {
+            let text = check(&format!("{frozen}, {changes}")).expect_err(changes);
+            assert!(text.starts_with(words), "{text}");
+        }
+        let text = check(r#"demos: "d", ppo: (norm_obs: true)"#).expect_err("the decoder sees raw ones");
+        assert!(text.starts_with("`ppo.norm_obs` is true") && text.contains("set `skills.norm_obs`"), "{text}");
+        // Those without a tie may do as they like, and the other family's key says nothing.
+        for changes in [
+            r#"algorithm: "ppo", ppo: (norm_obs: true)"#,
+            r#"algorithm: "bc", ppo: (norm_obs: true)"#,
+            r#"sac: (norm_obs: true)"#,
+        ] {
+            assert_eq!(check(&format!("{frozen}, {changes}")), Ok(()), "{changes}");
+        }
+        assert_eq!(check(r#"demos: "d", ppo: (norm_obs: true), score: (init_from_decoder: false)"#), Ok(()));
+    }
+
+    #[test]
+    fn actions_are_checked_before_skills_are_learned() {
+        let check = |changes: &str, space| {
+            let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, demos: "d", {changes})"#);
+            let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
+            experiment.check_actions(space).map_err(|error| error.to_string())
+        };
+        for (changes, words) in [
+            ("skills: (action_noise: 0.2)", "action_noise"),
+            ("score: (penalty: LegacyCoinrun)", "LegacyCoinrun is for discrete actions only"),
+            (r#"algorithm: "score-sac""#, "`score.init_from_decoder` is true: SAC squashes"),
+        ] {
+            let text = check(changes, ActionSpace::Continuous(8)).expect_err(changes);
+            assert!(text.contains(words), "{text}");
+            assert_eq!(check(changes, ActionSpace::Discrete(3)), Ok(()), "{changes}");
+        }
+        let untied = r#"algorithm: "sac", score: (penalty: LegacyCoinrun)"#;
+        assert_eq!(check(untied, ActionSpace::Continuous(8)), Ok(()));
+    }
 
     #[test]
     fn the_nearest_divisor_is_one() {

@@ -76,7 +76,7 @@ pub(super) struct Keys(BTreeMap<String, Value>);
 /// All keys there are, with an example of each value.
 static ALL: LazyLock<Keys> = LazyLock::new(|| {
     let least = r#"(game: "-", train: "-:0..0", test: "-:1..1", demos: "-", steps: 1)"#;
-    let example: Experiment = ron::from_str(least).expect("every required key is there");
+    let example: Experiment = reader().from_str(least).expect("every required key is there");
     Keys::of_experiment(&example, &Origin::start_of(Path::new("example"))).expect("it was just read")
 });
 

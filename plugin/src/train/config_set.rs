@@ -40,6 +40,14 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
     let Some(example) = Keys::all().text(key) else {
         return Err(refuse(unknown_key(key)));
     };
+    if text == "None" {
+        // Text may lack its quotes, but a key that can do without a value has none.
+        let mut without = keys.clone();
+        without.put(key.to_owned(), Value { text: text.to_owned(), origin: origin.clone() });
+        if let Ok(experiment) = without.parse(&origin) {
+            return Ok(experiment);
+        }
+    }
     let text = if example.starts_with('"') && !text.starts_with('"') {
         ron::to_string(text).map_err(|error| refuse(error.to_string()))?
     } else {
@@ -115,7 +123,7 @@ mod tests {
         expected.sac.log_std = (-4.0, 1.0);
         expected.train = "hard:0..31".parse().expect("a split");
         expected.test = "hard:70..80".parse().expect("a split");
-        expected.demos = "my recordings/a".into();
+        expected.demos = Some("my recordings/a".into());
         expected.demo_steps = Some(5000);
         expected.observation = ObservationKind::Raster;
         expected.image = ImageOptions { stack: 4, grayscale: true, width: 84, ..ImageOptions::default() };
@@ -127,6 +135,9 @@ mod tests {
         assert_eq!(changed, expected);
         let back = changed.with_set(&["ppo.total_updates=None"]).expect("valid");
         assert_eq!(back.ppo.total_updates, None);
+        let without = changed.with_set(&["demos=None"]).expect("not all need some");
+        assert_eq!(without.demos, None);
+        assert_eq!(without.with_set(&["demos=None/a"]).expect("a path").demos, Some("None/a".into()));
         assert_eq!(back.with_set(&["ppo.total_updates=9"]).expect("Some is understood").ppo.total_updates, Some(9));
     }
 

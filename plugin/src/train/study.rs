@@ -1,6 +1,6 @@
 //! A study: the variants of an experiment, each with every seed.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, path::Path};
 
 use thiserror::Error;
 
@@ -72,7 +72,12 @@ impl StudyRun {
     /// The path of the demonstrations is not Unicode.
     pub fn skill_file(&self) -> Result<String, ron::Error> {
         let run = &self.experiment;
-        let mut settings = ron::to_string(&(&run.game, run.observation, &run.demos, &run.skills))?;
+        let demos = run.demos.as_deref().unwrap_or(Path::new(""));
+        let mut settings = ron::to_string(&(&run.game, run.observation, demos, &run.skills))?;
+        if !run.skills.norm_obs {
+            // As it was before there was the key, so that studies find the files they have.
+            settings = settings.replace(",norm_obs:false", "");
+        }
         if run.sight().is_image() {
             settings += &ron::to_string(&run.image)?;
         }
@@ -176,6 +181,19 @@ mod tests {
         assert!(skills[0] != skills[8] && skills[8] != skills[10], "other eyes");
         assert_eq!(skills[0], skills[12], "nobody looks at pictures");
         assert_ne!(skills[0], skills[14], "fewer demonstrations");
+    }
+
+    #[test]
+    fn names_of_skill_files_stay_as_they_were() {
+        let file = |text: &str| study_runs(&experiment(text)).expect("valid")[0].skill_file().expect("Unicode");
+        // As of the first release with studies; new keys must not change it.
+        assert_eq!(file(""), "skills-72e1ee68-seed3.safetensors");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments/coinrun-ablation.ron");
+        let runs = study_runs(&crate::train::config_file::read_experiment(&shipped).expect("valid")).expect("valid");
+        assert_eq!(runs[0].skill_file().expect("Unicode"), "skills-1b4ea9c2-seed1.safetensors");
+        assert_ne!(file(""), file(r#"(name: "a", set: ["skills.norm_obs=true"])"#));
+        let without = study_runs(&experiment(r#"(name: "a", set: ["algorithm=ppo", "demos=None"])"#)).expect("valid");
+        assert_ne!(without[0].skill_file().expect("Unicode"), file(""));
     }
 
     #[test]

@@ -72,7 +72,8 @@ impl Dist {
         }
     }
 
-    /// Entropy in nats, `[n]` (or `[1]` if it is the same for all rows), summed over dimensions.
+    /// Entropy in nats, `[n]` (or `[1]` if it is the same for all rows), summed over dimensions. That of a Gaussian is
+    /// Σ (ln σ + ½ ln 2πe), which may be negative.
     pub fn entropy(&self) -> Tensor<1> {
         match self {
             Self::Categorical { log_probs } => {

@@ -163,6 +163,23 @@ mod tests {
     }
 
     #[test]
+    fn gaussian_draws_carry_their_own_density_beyond_the_range_too() {
+        let output = PolicyOutput { squashed: false, ..output(0.9, 0.5) };
+        let mut rng = Streams::new(1).stream("draw", 0);
+        let mut beyond = 0;
+        for _ in 0..1000 {
+            let (action, log_prob) = output.sample(0, &mut rng);
+            let Action::Continuous(a) = &action else { panic!("continuous") };
+            beyond += usize::from(a[0] > 1.0);
+            let density = (-0.5 * ((a[0] - 0.9) / 0.5).powi(2)).exp() / (0.5 * std::f32::consts::TAU.sqrt());
+            assert!((log_prob - density.ln()).abs() < 1e-4, "{a:?}");
+            assert_eq!(output.log_prob(0, &action).expect("fits"), log_prob);
+        }
+        // P(z > 0.2) = 0.42.
+        assert!((370..470).contains(&beyond), "{beyond} of 1000 lie beyond 1");
+    }
+
+    #[test]
     fn the_edge_of_a_squashed_action_has_a_finite_density() {
         let output = output(9.0, 1.0);
         assert!(output.log_prob(0, &Action::Continuous(vec![1.0])).expect("fits").is_finite());

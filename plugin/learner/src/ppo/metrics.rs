@@ -9,7 +9,8 @@ pub struct UpdateMetrics {
     pub policy_loss: f32,
     /// Value loss, with its ½ and without its weight.
     pub value_loss: f32,
-    /// Entropy in nats.
+    /// Entropy in nats. Of continuous actions it is that of the Gaussian before the game clips: Σ ln σ + 1.42 for each
+    /// dimension, which may be negative.
     pub entropy: f32,
     /// Estimate of KL(old ‖ new) in nats: mean(ratio - 1 - ln ratio).
     pub approx_kl: f32,

@@ -18,7 +18,9 @@ pub enum KlDirection {
 pub enum AlphaKind {
     /// Always 1.
     Off,
-    /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous.
+    /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous. The latter
+    /// scatters around (1 + 1/d)^(-d/2) for d dimensions in every state, since a Gaussian is equally sure of its own draws
+    /// everywhere: only the other kinds tell states apart there.
     OwnSample,
     /// The same for the action of the rollout.
     PolicyAction,

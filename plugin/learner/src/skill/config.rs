@@ -3,7 +3,7 @@
 use super::{ActionInput, WindowRule};
 use crate::nn::CnnKind;
 use crate::policy::StdKind;
-use crate::{LearnError, ObsKind};
+use crate::{ActionSpace, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
 /// How the terms of the loss are summed.
@@ -57,10 +57,20 @@ pub struct SkillConfig {
     /// How the prior's standard deviation is made. By state, so that it can be narrow where players agree and wide
     /// where they do not.
     pub prior_std: StdKind,
-    /// How the decoder's standard deviation is made; only for continuous actions.
+    /// How the decoder's standard deviation σ is made; only for continuous actions.
+    ///
+    /// σ starts at 1 and becomes the spread of what players did in a state under a skill, their noise included: of a
+    /// demonstrator's Gaussian noise of deviation n it keeps n, or less where actions were clipped. A policy that starts
+    /// as a copy of the decoder explores with this σ and learns it further.
+    ///
+    /// By `Vector` a dimension has one σ for all states. It falls by a factor of about exp(-lr) a batch at most, so that
+    /// short trainings leave it too large. By `State` a state has its own, in e⁻¹⁰..e², which is found sooner, but where
+    /// players always do the very same (a bot without noise, or at the end of its range) nothing but that bound keeps it
+    /// from shrinking: gradients grow with 1/σ, and a copy of such a decoder hardly explores.
     pub decoder_std: StdKind,
     /// Share of the demonstrator's discrete actions that were replaced by uniformly random ones, as the recording's
-    /// header says; 0 to imitate the noise too, as the paper does.
+    /// header says; 0 to imitate the noise too, as the paper does. Must be 0 for continuous actions, of whose recordings
+    /// the header gives the deviation of Gaussian noise: that becomes part of σ (see `decoder_std`).
     pub action_noise: f64,
     /// How the terms of the loss are summed.
     pub reduction: Reduction,
@@ -131,6 +141,21 @@ impl SkillConfig {
             return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
         }
         Ok(())
+    }
+
+    /// `Ok` if a model of these settings can learn actions of `space`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if a share of continuous actions shall have been replaced.
+    pub fn check_space(&self, space: ActionSpace) -> Result<(), LearnError> {
+        match space {
+            ActionSpace::Continuous(_) if self.action_noise > 0.0 => Err(LearnError::Config(format!(
+                "skill action_noise is the share of discrete actions that were replaced and must be 0 for continuous \
+                 ones, not {}: Gaussian noise on those becomes part of the decoder's standard deviation",
+                self.action_noise
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// `Ok` if a model of these settings can see `observation`s.

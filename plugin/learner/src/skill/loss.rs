@@ -40,7 +40,8 @@ pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
 }
 
 /// Negative log-likelihood of each recorded action when a share ε of discrete actions was replaced by uniformly random
-/// ones: −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns what was meant, not the noise.
+/// ones: −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns what was meant, not the noise. Continuous
+/// actions, which were not replaced, count as they are.
 fn nll_under_noise(forward: &SkillForward, noise: f64) -> Tensor<1> {
     let nll = forward.nll_per_step.clone();
     match &forward.decoded {

@@ -76,6 +76,7 @@ impl SkillTrainer {
     pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         config.validate()?;
         config.check_observation(dataset.observation)?;
+        config.check_space(dataset.space)?;
         let streams = Streams::new(seed);
         let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &device.plain())?;
         let windows = dataset.windows(config.window, config.windows, &streams, 0)?;

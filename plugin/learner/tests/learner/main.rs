@@ -7,6 +7,7 @@ mod errors;
 mod files;
 mod half;
 mod images;
+mod noisy;
 mod pixel_files;
 mod pixels;
 mod point;

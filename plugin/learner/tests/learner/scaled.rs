@@ -77,11 +77,11 @@ fn normalised_numbers_are_learned_from_faster() {
     for decoder_std in [StdKind::Vector, StdKind::State] {
         let last = |norm_obs| {
             let mut trainer = trainer(SkillConfig { decoder_std, ..config(norm_obs) }, PLANE);
-            (train(&mut trainer, 30).nll, trainer.into_model())
+            (train(&mut trainer, 20).nll, trainer.into_model())
         };
         let ((raw, _), (normalised, model)) = (last(false), last(true));
-        // Five steps of two dimensions; with nothing but the noise left it would be -8.8.
-        assert!(normalised < raw - 3.0, "{decoder_std:?}: {normalised} normalised, {raw} raw");
+        // Five steps of two dimensions; -8.8 would leave nothing but the noise.
+        assert!(normalised < raw - 2.5, "{decoder_std:?}: {normalised} normalised, {raw} raw");
         // In use, as in training, they are given raw.
         let obs = hall(50, 1000);
         let output = model.policy().forward(&skills(&model, &obs), &obs, 50).expect("finite");
