@@ -23,7 +23,10 @@ pub(super) fn start_episode(
     let Ok(agent) = agents.get(event.entity) else { return };
     match generate(&rules.0, event.level) {
         Ok(level) => build(&mut commands, event.entity, level),
-        Err(error) => faults.report(format!("agent {}, level {}: {error}", agent.index, event.level)),
+        Err(error) => {
+            faults.report(format!("agent {}, level {}: {error}", agent.index, event.level));
+            commands.entity(event.entity).insert(Control::Idle);
+        }
     }
 }
 
