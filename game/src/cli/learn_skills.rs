@@ -136,8 +136,8 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 ///
 /// # Errors
 ///
-/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a held-out level or does not replay, or the pictures would
-/// need more than [`MAX_PICTURE_BYTES`].
+/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a
+/// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_actions(game.actions())?;
     let sight = experiment.sight();
