@@ -84,7 +84,6 @@ fn returns_are_of_the_size_that_d4rl_publishes() {
     for (map, random, expert) in [("umaze", 68.54, 193.66), ("medium", 44.26, 297.46), ("large", 30.57, 303.49)] {
         let ours = mean_return(map, play_at_random);
         let demonstrator = mean_return(map, |mode, seed| play(mode, seed, 0.5).total_reward);
-        println!("{map}: random {ours:.1} ({random}), demonstrator {demonstrator:.1} ({expert})");
         assert!((random / 1.5..random * 1.5).contains(&ours), "{map}: {ours} instead of about {random}");
         assert!(demonstrator > expert, "{map}: {demonstrator} is less than {expert}");
     }

@@ -167,7 +167,6 @@ fn rapier_s_contact_stays_near_the_original() {
     }
     errors.sort_by(f64::total_cmp);
     let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
-    println!("rapier against MuJoCo over 10 steps: median {median} m, worst {worst} m");
     assert!(median <= 0.01 && worst <= 0.35, "median {median} m, worst {worst} m");
 }
 
@@ -196,7 +195,6 @@ fn the_ball_never_leaves_the_free_cells_nor_sinks_into_walls() {
             cells.insert(level.walls.cell_at(sim.ball.position));
             deepest = deepest.max(depth(&level, &sim.ball));
         }
-        println!("{contact:?}: at most {deepest} m deep, {} cells seen", cells.len());
         assert!(deepest <= 0.06, "{contact:?}: {deepest} m deep");
         assert!(cells.len() > 20, "{contact:?}: only {} cells were seen", cells.len());
     }

@@ -99,12 +99,11 @@ fn train(algorithm: Algorithm, skills: &SkillModel) -> Player {
 }
 
 #[test]
-fn every_algorithm_learns_with_continuous_actions_and_both_ppos_beat_chance() {
+fn with_continuous_actions_both_ppos_beat_chance_and_both_sacs_run() {
     let skills = skills();
     let (chance, chance_success) = measure(&Player::Blind(BlindBot::Uniform));
     for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo] {
         let (mean, success) = measure(&train(algorithm, &skills));
-        println!("{algorithm}: {mean} against {chance}, success {success} against {chance_success}");
         assert!(mean > 2.0 * chance && success > 2.0 * chance_success, "{algorithm}: {mean} against {chance}");
     }
     for algorithm in [Algorithm::Sac, Algorithm::ScoreSac] {

@@ -21,6 +21,8 @@ const GAP: f32 = 20.0;
 const TEXT: f32 = 13.0;
 const TITLE: f32 = 16.0;
 const LINE: f32 = 19.0;
+/// Letters of pictures made of pixels are wider than those of drawings by this.
+const WIDEST: f32 = 1.4;
 /// Room for the words above a drawing.
 const HEAD: f32 = 2.0 * LINE + 2.0;
 
@@ -102,8 +104,9 @@ impl Paper {
     /// A drawing in its frame, with words above it, and goes on below it.
     fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, frame: &Frame) {
         let area = frame.whole();
-        let reached = walker.trails.iter().filter(|trail| trail.result.end.is_success()).count();
-        let words = format!("{}: goal reached in {reached} of {}", walker.name, walker.trails.len());
+        let reached = walker.trails.iter().filter(|trail| trail.result.success).count();
+        let result = format!(": goal reached in {reached} of {}", walker.trails.len());
+        let words = fitted(&walker.name, &result, area.width());
         self.text(area.min.x - GAP, TEXT, INK, &words);
         self.text(area.min.x - GAP, TEXT, SOFT, &content.caption(walker));
         content.draw(floor, walker, frame, &mut self.shapes);
@@ -112,8 +115,33 @@ impl Paper {
     }
 }
 
+/// A name and what is said of it on one line of this width. Of a name that is too long the end is kept, where paths differ.
+fn fitted(name: &str, said: &str, width: f32) -> String {
+    let fits = |words: &str| text_width(words, f64::from(TEXT * WIDEST)) <= f64::from(width);
+    let whole = format!("{name}{said}");
+    if fits(&whole) {
+        return whole;
+    }
+    let ends = name.char_indices().skip(1).map(|(at, _)| format!("..{}{said}", &name[at..]));
+    ends.into_iter().find(|words| fits(words)).unwrap_or_else(|| format!("..{said}"))
+}
+
 /// Wide floors get more room.
 fn panel_width(extent: Rect) -> f32 {
     let shape = extent.width() / extent.height().max(f32::MIN_POSITIVE);
     (330.0 * shape.sqrt()).clamp(260.0, 900.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_keep_their_ends() {
+        let name = "score-ppo runs/some/folder/of/many/runs/score-ppo-seed1";
+        let short = fitted(name, ": goal reached in 7 of 9", 420.0);
+        assert!(short.starts_with("..") && short.ends_with("-seed1: goal reached in 7 of 9"), "{short}");
+        assert_eq!(fitted("ppo", ": goal reached in 7 of 9", 420.0), "ppo: goal reached in 7 of 9");
+        assert_eq!(fitted(name, ": goal", 1.0), "..: goal");
+    }
 }

@@ -97,13 +97,13 @@ fn evenly(trails: &[Trail], most: usize) -> impl Iterator<Item = &Trail> {
 /// The points of a trajectory on the paper, without those that nobody could see.
 fn points(trail: &Trail, frame: &Frame) -> Vec<Vec2> {
     let mut points: Vec<Vec2> = Vec::new();
-    let all = trail.places.iter().map(|&place| frame.place(place)).filter(|point| point.is_finite());
+    let mut all = trail.places.iter().map(|&place| frame.place(place)).filter(|point| point.is_finite());
     for point in all.clone() {
         if points.last().is_none_or(|last| last.distance(point) >= STEP) {
             points.push(point);
         }
     }
-    points.extend(all.last());
+    points.extend(all.next_back());
     points
 }
 
