@@ -2,10 +2,15 @@
 
 use bevy_playbot::game::{Game, UnknownName};
 
-use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
+use crate::{
+    ant::Ant,
+    antmaze::{AntMaze, SightedAntMaze},
+    coinrun::CoinRun,
+    maze2d::Maze2d,
+};
 
 /// The games, by name.
-pub const GAMES: [&str; 4] = ["coinrun", "maze2d", "ant", "antmaze"];
+pub const GAMES: [&str; 5] = ["coinrun", "maze2d", "ant", "antmaze", "antmaze-sighted"];
 
 /// The game with this name.
 ///
@@ -18,6 +23,7 @@ pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
         "maze2d" => Ok(&Maze2d { physics: false }),
         "ant" => Ok(&Ant),
         "antmaze" => Ok(&AntMaze),
+        "antmaze-sighted" => Ok(&SightedAntMaze),
         _ => Err(UnknownName::new("game", name, &GAMES)),
     }
 }
