@@ -24,7 +24,7 @@ const LINE: f32 = 19.0;
 /// Letters of pictures made of pixels are wider than those of drawings by this.
 const WIDEST: f32 = 1.4;
 /// Room for the words above a drawing.
-const HEAD: f32 = 2.0 * LINE + 2.0;
+const HEAD: f32 = 3.0 * LINE + 2.0;
 
 /// A chart on paper.
 struct Paper {
@@ -105,9 +105,8 @@ impl Paper {
     fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, frame: &Frame) {
         let area = frame.whole();
         let reached = walker.trails.iter().filter(|trail| trail.result.success).count();
-        let result = format!(": goal reached in {reached} of {}", walker.trails.len());
-        let words = fitted(&walker.name, &result, area.width());
-        self.text(area.min.x - GAP, TEXT, INK, &words);
+        self.text(area.min.x - GAP, TEXT, INK, &fitted(&walker.name, area.width()));
+        self.text(area.min.x - GAP, TEXT, INK, &format!("goal reached in {reached} of {}", walker.trails.len()));
         self.text(area.min.x - GAP, TEXT, SOFT, &content.caption(walker));
         content.draw(floor, walker, frame, &mut self.shapes);
         self.width = self.width.max(area.max.x);
@@ -115,15 +114,14 @@ impl Paper {
     }
 }
 
-/// A name and what is said of it on one line of this width. Of a name that is too long the end is kept, where paths differ.
-fn fitted(name: &str, said: &str, width: f32) -> String {
+/// A name on one line of this width. Of one that is too long the end is kept, where paths differ.
+fn fitted(name: &str, width: f32) -> String {
     let fits = |words: &str| text_width(words, f64::from(TEXT * WIDEST)) <= f64::from(width);
-    let whole = format!("{name}{said}");
-    if fits(&whole) {
-        return whole;
+    if fits(name) {
+        return name.to_owned();
     }
-    let ends = name.char_indices().skip(1).map(|(at, _)| format!("..{}{said}", &name[at..]));
-    ends.into_iter().find(|words| fits(words)).unwrap_or_else(|| format!("..{said}"))
+    let ends = name.char_indices().skip(1).map(|(at, _)| format!("..{}", &name[at..]));
+    ends.into_iter().find(|words| fits(words)).unwrap_or_else(|| "..".to_owned())
 }
 
 /// Wide floors get more room.
@@ -139,9 +137,9 @@ mod tests {
     #[test]
     fn long_names_keep_their_ends() {
         let name = "score-ppo runs/some/folder/of/many/runs/score-ppo-seed1";
-        let short = fitted(name, ": goal reached in 7 of 9", 420.0);
-        assert!(short.starts_with("..") && short.ends_with("-seed1: goal reached in 7 of 9"), "{short}");
-        assert_eq!(fitted("ppo", ": goal reached in 7 of 9", 420.0), "ppo: goal reached in 7 of 9");
-        assert_eq!(fitted(name, ": goal", 1.0), "..: goal");
+        let short = fitted(name, 300.0);
+        assert!(short.starts_with("..") && short.ends_with("/score-ppo-seed1"), "{short}");
+        assert_eq!(fitted("ppo", 300.0), "ppo");
+        assert_eq!(fitted(name, 1.0), "..");
     }
 }
