@@ -1,6 +1,6 @@
 //! Shakes ants between walls with random torques for as long as asked, and stops at the first thing that should not be.
 //!
-//! `cargo run --release --example ant_soak -- 10000000` takes about five minutes on two cores.
+//! `cargo run --release --example ant_soak -- 10000000` takes about six minutes on two cores.
 
 use std::{
     process::ExitCode,
