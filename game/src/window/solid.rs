@@ -8,8 +8,8 @@ use bevy::{
 use super::{camera::Zoom, seats::Seats};
 use crate::antview::{SolidAnt, SolidViewPlugin};
 
-/// From the ant to the eye at the nearest zoom, metres.
-const BEHIND: Vec3 = Vec3::new(0.0, -5.0, 5.5);
+/// From the ant to the eye at the nearest zoom, metres: so steep that the wall behind an ant does not hide it.
+const BEHIND: Vec3 = Vec3::new(0.0, -3.2, 8.0);
 /// Share of the way to the ant that the eye makes in a second is 1 - exp(-HASTE).
 const HASTE: f32 = 6.0;
 
