@@ -84,6 +84,22 @@ fn one_observation_is_what_the_bot_sees_enlarged() {
     assert!(grey.frames[0].iter().all(|[r, g, b]| r == g && g == b));
 }
 
+#[cfg(feature = "camera")]
+#[test]
+fn a_camera_sees_what_the_raster_sees() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for game in [&["coinrun", "--seed", "5"][..], &["maze2d"], &["antmaze"], &["ant", "--mode", "goal"]] {
+        let [raster, camera] = [&["--out", "raster.png"][..], &["--camera", "--out", "camera.png"]].map(|args| {
+            written(folder.path(), &[&["view"], game, &["--tick", "3", "--scale", "1"], args].concat());
+            read(&folder.path().join(args[args.len() - 1])).frames.swap_remove(0)
+        });
+        let apart = |(one, other): &(&[u8; 3], &[u8; 3])| (0..3).any(|i| one[i].abs_diff(other[i]) > 8);
+        let apart = raster.iter().zip(&camera).filter(apart).count();
+        assert!(apart < 64 * 64 * 3 / 100, "{game:?}: {apart} pixels differ");
+        assert!(raster.iter().any(|colour| *colour != raster[0]), "{game:?}: it shows something");
+    }
+}
+
 #[test]
 fn an_episode_becomes_a_moving_picture() {
     let folder = tempfile::tempdir().expect("a folder");

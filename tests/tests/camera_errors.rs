@@ -106,6 +106,9 @@ fn things_without_an_image_are_named() {
     world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 2, rows: 2, cells: vec![0], outside: 0 });
     let told = fault(&mut world);
     assert!(told.contains("has 1 cells; with 2 columns and 2 rows"), "{told}");
+    // As many as there should be.
+    world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 0, rows: 2, cells: vec![], outside: 0 });
+    world.tick().expect("a grid without cells");
 }
 
 fn five_ticks(mut agents: Query<&mut Episode>) {

@@ -149,8 +149,8 @@ impl Gathering<'_, '_, '_> {
     }
 
     fn tiles(&mut self, entity: Entity, layer: &TileLayer, pose: &Pose) -> Result<Item, Undrawable> {
-        let TileLayer { columns, rows, ref cells, .. } = *layer;
-        if cells.len() != columns as usize * rows as usize {
+        if !layer.is_complete() {
+            let TileLayer { columns, rows, ref cells, .. } = *layer;
             return Err(Undrawable::Cells { cells: cells.len(), columns, rows });
         }
         let texture = self.textures.find(&layer.tileset, &self.stages.images)?;
