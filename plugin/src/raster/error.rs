@@ -3,6 +3,8 @@
 use bevy::prelude::*;
 use thiserror::Error;
 
+use crate::vision::NO_IMAGE;
+
 /// Why a picture cannot be drawn. Entities are named where this is reported.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(super) enum RasterError {
@@ -21,7 +23,7 @@ pub(super) enum RasterError {
 /// Why an entity cannot be drawn.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(super) enum Undrawable {
-    #[error("the sprite has no image; set `Sprite::image`, or `custom_size` for a rectangle of one colour")]
+    #[error("the sprite has no image: {NO_IMAGE}")]
     NoImage,
     #[error("the image is not loaded; wait for it before the first episode, or add it to `Assets<Image>`")]
     NotLoaded,
