@@ -11,7 +11,7 @@ use bevy_playbot::{
     vision::{Difference, Frame, ImageOptions, TileLayer},
 };
 use playbot_games::{
-    ant::{Ant, Walker},
+    ant::{Ant, walk::Walker},
     coinrun::{CoinRun, picture::VIEW},
 };
 use playbot_tests::scene::{camera_world, draw, image, spawn_eye};
