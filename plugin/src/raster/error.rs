@@ -29,6 +29,8 @@ pub(super) enum Undrawable {
     NotLoaded,
     #[error("the image's pixels were given to the GPU and dropped; load it with `RenderAssetUsages::default()`")]
     NoPixels,
+    #[error("the image has no pixels: its size is {width}x{height}; it must have at least one")]
+    Empty { width: u32, height: u32 },
     #[error("images of format {0} cannot be drawn; use Rgba8UnormSrgb, Bgra8UnormSrgb or Rgba8Unorm")]
     Format(String),
     #[error(

@@ -155,7 +155,7 @@ impl Gathering<'_, '_, '_> {
         }
         let texture = self.textures.find(&layer.tileset, &self.stages.images)?;
         let strip = self.textures.get(texture);
-        if strip.width == 0 || strip.height == 0 || !strip.height.is_multiple_of(strip.width) {
+        if !strip.height.is_multiple_of(strip.width) {
             return Err(Undrawable::Strip { width: strip.width, height: strip.height });
         }
         let quad = Quad { corner: pose.at.truncate(), across: pose.x.truncate(), up: pose.y.truncate() };
