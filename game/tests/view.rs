@@ -186,6 +186,16 @@ fn bad_wishes_are_refused_in_words() {
         (&["--image", "widht=64"], 3, "did you mean `width`?"),
         (&["--image", "height=tall"], 3, "must be a whole number, not tall"),
         (&["--scale", "0"], 3, "0 is not in 1..=32"),
+        (
+            &["--scale", "32", "--image", "width=1024", "--image", "height=1024", "--image", "stack=16"],
+            3,
+            "smaller --scale",
+        ),
+        (
+            &["--episode", "--image", "width=1024", "--image", "height=1024", "--image", "stack=16"],
+            3,
+            "smaller pictures",
+        ),
         (&["--tick", "5000"], 3, "there is no tick 5000: the episode has"),
         (&["--demo", "none.demo"], 3, "none.demo"),
         (&["--demo", "file"], 3, "file"),

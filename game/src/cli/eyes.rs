@@ -217,7 +217,7 @@ fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), Cli
         })
         .collect();
     let step = side * ENLARGE + GAP;
-    let mut screen = Screen::new(3 * step - GAP, side * ENLARGE, [255; 3]);
+    let mut screen = Screen::new(3 * step - GAP, side * ENLARGE, [255; 3])?;
     for (place, picture) in [raster, camera, &apart].into_iter().enumerate() {
         screen.frame(picture, side, ENLARGE, (place * step, 0));
     }
