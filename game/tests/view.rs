@@ -100,6 +100,20 @@ fn a_camera_sees_what_the_raster_sees() {
     }
 }
 
+/// `playbot eyes` says where its worst frame is to be found.
+#[cfg(feature = "camera")]
+#[test]
+fn the_worst_frame_is_of_the_moment_that_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let eyes = ["eyes", "coinrun", "--levels", "hard:3..7", "--frames", "5", "--out", "."];
+    let worst = &written(folder.path(), &eyes)["worst"];
+    let [level, tick] = ["level", "tick"].map(|key| worst[key].to_string());
+    written(folder.path(), &["view", "coinrun", "--seed", &level, "--tick", &tick, "--scale", "1"]);
+    let seen = &read(&folder.path().join("view.png")).frames[0];
+    // The raster's picture is the left one, enlarged five times.
+    assert!(reduced(&read(&folder.path().join("worst.png")), 0, 64, 5) == *seen, "level {level}, tick {tick}");
+}
+
 #[test]
 fn an_episode_becomes_a_moving_picture() {
     let folder = tempfile::tempdir().expect("a folder");
