@@ -91,6 +91,10 @@ fn a_person_wins_hands_over_and_takes_over() {
 fn an_ant_on_the_open_floor_is_played_with_keys() {
     let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
     let mut seat = desk.open(folder.path(), &["play", "ant", "--mode", "goal", "--record", "a.demo"]);
+    if cfg!(feature = "view3d") {
+        // From above, as the bots see it.
+        seat.tap("v");
+    }
     seat.hold(&["Left"]);
     seat.pass_ticks(25);
     let picture = desk.pixels(SIDE);

@@ -8,6 +8,7 @@ use bevy::{
     prelude::*,
 };
 
+use super::puffs;
 use crate::coinrun::Tile;
 
 macro_rules! drawing {
@@ -63,6 +64,8 @@ const BACKDROPS: [&[u8]; 16] = [
 static IMAGES: LazyLock<Vec<Image>> =
     LazyLock::new(|| [FIGURES].into_iter().chain(GROUNDS).chain(BACKDROPS).map(decode).collect());
 
+static PUFFS: LazyLock<Image> = LazyLock::new(puffs::drawing);
+
 fn decode(png: &[u8]) -> Image {
     let kind = ImageType::Extension("png");
     let (formats, usages) = (CompressedImageFormats::NONE, RenderAssetUsages::default());
@@ -86,6 +89,8 @@ pub enum Pose {
 pub struct Art {
     /// The sheet of everything that lives in a level.
     pub figures: Handle<Image>,
+    /// What enemies leave behind.
+    pub(super) puffs: Handle<Image>,
     grounds: Vec<Handle<Image>>,
     backdrops: Vec<Handle<Image>>,
 }
@@ -97,7 +102,7 @@ impl Art {
         let backdrops = handles.split_off(1 + GROUNDS.len());
         let grounds = handles.split_off(1);
         let figures = handles.remove(0);
-        Self { figures, grounds, backdrops }
+        Self { figures, puffs: images.add(PUFFS.clone()), grounds, backdrops }
     }
 
     /// The strip of tiles of a ground theme.
@@ -134,11 +139,6 @@ impl Art {
     /// A crate on the sheet of figures: one of four.
     pub fn wooden_crate(sprite: u8) -> Rect {
         Self::cell(9 + usize::from(sprite), 2, 1)
-    }
-
-    /// What an enemy leaves behind, on the sheet of figures: white.
-    pub fn puff() -> Rect {
-        Self::cell(9, 3, 1)
     }
 
     /// A saw on the sheet of figures, in one of its two positions.
@@ -181,8 +181,7 @@ mod tests {
         let players = (0..AGENT_THEMES as u8).flat_map(|colour| poses.map(|pose| Art::player(colour, pose)));
         let enemies = (0..ENEMY_SPRITES as u8).flat_map(|sprite| [0, 1].map(|step| Art::enemy(sprite, step)));
         let crates = (0..CRATE_SPRITES as u8).map(Art::wooden_crate);
-        let rects: Vec<_> =
-            players.chain(enemies).chain(crates).chain([0, 1].map(Art::saw)).chain([Art::puff()]).collect();
+        let rects: Vec<_> = players.chain(enemies).chain(crates).chain([0, 1].map(Art::saw)).collect();
         let texels = |rect: &Rect| -> Vec<[u8; 4]> {
             let (x, y) = (rect.min.x as u32..rect.max.x as u32, rect.min.y as u32..rect.max.y as u32);
             let bytes = |x, y| sheet.pixel_bytes(UVec3::new(x, y, 0)).expect("inside");

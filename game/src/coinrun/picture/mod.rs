@@ -7,6 +7,7 @@
 mod animate;
 mod art;
 mod dress;
+mod puffs;
 mod trail;
 
 pub use art::{Art, Pose};

@@ -1,33 +1,21 @@
 //! Puffs that enemies leave behind. They are there to be seen and do nothing.
-//!
-//! In each tick an enemy leaves one behind its feet. It rises, grows and fades, and is gone after [`LIFE`] ticks.
 
 use bevy::prelude::*;
 
 use super::{
     art::Art,
     dress::{BLOCKS, Scenery},
+    puffs::{PUFFS, Row},
 };
 use crate::coinrun::{
     components::{Arena, ArenaBody, InArena, PlayerBody},
     rules::Body,
 };
 
-/// Ticks until a puff is gone.
-const LIFE: u32 = 8;
-/// Puffs of an enemy: with the one that has just appeared.
-const PUFFS: u32 = LIFE + 1;
-/// Width and height of a new puff, tiles, and the factor by which it grows in each tick.
-const SIZE: Vec2 = Vec2::new(0.6, 0.4);
-const GROWTH: f32 = 1.05;
-/// Opacity of a new puff, and the factor by which it fades.
-const ALPHA: f32 = 0.5;
-const FADING: f32 = 0.8;
-/// Tiles by which a puff rises in each tick.
-const RISE: f32 = 0.01;
-/// Enemies at least this many tiles to the left or to the right of the player have no puffs: they are far outside of
-/// what agents see ([`VIEW`](super::VIEW)), and sprites cost time wherever they are. Only people see it who look farther.
-const REACH: f32 = 10.0;
+/// Enemies at least this many tiles to the left or to the right of the player have no puffs: they are outside of what
+/// agents see, half of [`VIEW`](super::VIEW) and the length of a trail, and sprites cost time wherever they are. Only
+/// people see it who look farther.
+const REACH: f32 = 9.0;
 
 /// In front of saws and crates, which lie within this of [`BLOCKS`], and behind enemies and player; older puffs lie
 /// farther back, and those of one age as their enemies.
@@ -35,12 +23,16 @@ const DEPTH: f32 = 0.5;
 const OLDER: f32 = 1.0 / 32.0;
 const NEXT: f32 = 1.0 / 16384.0;
 
-/// Where an enemy was.
+/// Steps that differ by less, in tiles, are of one speed.
+const ALIKE: f32 = 1e-3;
+
+/// Where an enemy was, and what is drawn there.
 #[derive(Component)]
 pub(super) struct Trail {
-    /// Feet and sprite of the last puffs: that of tick t is number t % [`PUFFS`].
-    places: [Vec2; PUFFS as usize],
-    puffs: [Option<Entity>; PUFFS as usize],
+    /// Where new puffs were: that of tick t is number t % [`PUFFS`].
+    places: [Vec2; PUFFS],
+    /// A sprite for each row of puffs, the newest first.
+    sprites: Vec<Entity>,
     /// The tick in which the enemy was first seen; its first puff is the next one's.
     since: Option<u32>,
     /// Its number among those in the arena.
@@ -50,14 +42,26 @@ pub(super) struct Trail {
 impl Trail {
     /// The trail of an enemy that has not moved yet.
     pub fn new(number: u32) -> Self {
-        Self { places: default(), puffs: default(), since: None, number }
+        Self { places: default(), sprites: Vec::new(), since: None, number }
     }
 
     /// Notes where the enemy is in a tick, and returns how many puffs there are then.
-    fn note(&mut self, tick: u32, body: &Body) -> u32 {
+    fn note(&mut self, tick: u32, body: &Body) -> usize {
         let since = *self.since.get_or_insert(tick);
-        self.places[(tick % PUFFS) as usize] = Vec2::new(body.x, body.y - body.ry / 2.0);
-        tick.saturating_sub(since).min(PUFFS)
+        self.places[tick as usize % PUFFS] = Vec2::new(body.x, body.y - body.ry / 2.0);
+        tick.saturating_sub(since).min(PUFFS as u32) as usize
+    }
+
+    /// Where the puff was new that is this old.
+    fn place(&self, tick: u32, age: usize) -> Vec2 {
+        self.places[(tick as usize - age) % PUFFS]
+    }
+
+    /// The longest row at one speed whose newest puff is `first` ticks old, of `count` puffs in all.
+    fn row(&self, tick: u32, first: usize, count: usize) -> Row {
+        let step = |age| self.place(tick, age) - self.place(tick, age + 1);
+        let alike = (first..count - 1).take_while(|&age| (step(age) - step(first)).length_squared() < ALIKE * ALIKE);
+        Row { first, count: 1 + alike.count() }
     }
 }
 
@@ -66,41 +70,38 @@ pub(super) fn trails(
     mut enemies: Query<(Entity, &InArena, &ArenaBody, &Transform, &mut Trail)>,
     arenas: Query<(&Arena, &Scenery)>,
     players: Query<&PlayerBody>,
-    mut puffs: Query<(&mut Transform, &mut Sprite), Without<Trail>>,
+    mut sprites: Query<(&mut Transform, &mut Sprite), Without<Trail>>,
     art: Res<Art>,
     mut commands: Commands,
 ) {
     for (enemy, in_arena, ArenaBody(body), at, mut trail) in &mut enemies {
         let Ok((arena, &Scenery { tick, .. })) = arenas.get(in_arena.0) else { continue };
         let count = trail.note(tick, body);
-        if players.get(arena.player).is_ok_and(|player| (player.0.x - body.x).abs() >= REACH) {
-            trail.puffs.iter_mut().filter_map(Option::take).for_each(|puff| commands.entity(puff).despawn());
-            continue;
-        }
-        let (mut size, mut alpha, mut rise) = (SIZE, ALPHA, 0.0);
-        for age in 0..count {
-            let slot = ((tick - age) % PUFFS) as usize;
-            let depth = BLOCKS + DEPTH - age as f32 * OLDER + trail.number as f32 * NEXT;
-            let place = (trail.places[slot] + Vec2::new(0.0, rise)).extend(depth) - at.translation;
-            let colour = Color::linear_rgba(1.0, 1.0, 1.0, alpha);
-            match trail.puffs[slot].and_then(|puff| puffs.get_mut(puff).ok()) {
+        let far = players.get(arena.player).is_ok_and(|player| (player.0.x - body.x).abs() >= REACH);
+        let (mut first, mut rows) = (0, 0);
+        while !far && first < count {
+            let row = trail.row(tick, first, count);
+            let (newest, oldest) = (trail.place(tick, first), trail.place(tick, first + row.count - 1));
+            let (size, middle) = row.lay_out(newest, oldest);
+            let depth = BLOCKS + DEPTH - rows as f32 * OLDER + trail.number as f32 * NEXT;
+            let place = middle.extend(depth) - at.translation;
+            let (rect, custom_size, flip_x) = (Some(row.rect()), Some(size), newest.x < oldest.x);
+            match trail.sprites.get(rows).and_then(|&sprite| sprites.get_mut(sprite).ok()) {
                 Some((mut transform, mut sprite)) => {
                     transform.translation = place;
-                    sprite.custom_size = Some(size);
-                    sprite.color = colour;
+                    (sprite.rect, sprite.custom_size, sprite.flip_x) = (rect, custom_size, flip_x);
                 }
                 None => {
-                    let sprite = Sprite {
-                        rect: Some(Art::puff()),
-                        custom_size: Some(size),
-                        color: colour,
-                        ..Sprite::from_image(art.figures.clone())
-                    };
-                    let puff = (ChildOf(enemy), sprite, Transform::from_translation(place));
-                    trail.puffs[slot] = Some(commands.spawn(puff).id());
+                    let drawn = Sprite { rect, custom_size, flip_x, ..Sprite::from_image(art.puffs.clone()) };
+                    let made = commands.spawn((ChildOf(enemy), drawn, Transform::from_translation(place))).id();
+                    trail.sprites.truncate(rows);
+                    trail.sprites.push(made);
                 }
             }
-            (size, alpha, rise) = (size * GROWTH, alpha * FADING, rise + RISE);
+            (first, rows) = (first + row.count, rows + 1);
+        }
+        if rows < trail.sprites.len() {
+            trail.sprites.drain(rows..).for_each(|sprite| commands.entity(sprite).despawn());
         }
     }
 }
