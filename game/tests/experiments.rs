@@ -26,12 +26,33 @@ fn every_experiment_and_every_variant_fits_its_game() {
     for name in names() {
         for run in study_runs(&read(&name)).unwrap_or_else(|error| panic!("{name}: {error}")) {
             let game = registry::game(&run.experiment.game).expect("a game");
-            for split in [&run.experiment.train, &run.experiment.test] {
-                game.check_mode(&split.mode).unwrap_or_else(|error| panic!("{name}, {}: {error}", run.variant));
-            }
+            run.experiment.check_levels(game).unwrap_or_else(|error| panic!("{name}, {}: {error}", run.variant));
             run.experiment.score.check_space(game.actions()).unwrap_or_else(|error| panic!("{name}: {error}"));
         }
     }
+}
+
+#[test]
+fn what_is_held_out_is_not_trained_on_by_another_name() {
+    let check = |game: &str, train: &str, test: &str| {
+        let (train, test) = (train.parse().expect("a split"), test.parse().expect("a split"));
+        let experiment = Experiment { train, test, ..read("maze2d-random") };
+        experiment.check_levels(registry::game(game).expect("a game")).map_err(|error| error.to_string())
+    };
+    for game in ["maze2d", "antmaze", "antmaze-sighted"] {
+        for train in ["random+sparse:0..63", "random+limit=100:50..63", "random+loops=0.3+difficulty=4..8:50..50"] {
+            let error = check(game, train, "random:50..99").expect_err("mazes of the same seed");
+            assert!(error.contains(train) && error.contains("random:50..99"), "{error}");
+        }
+        assert_eq!(check(game, "random+sparse:0..49", "random:50..99"), Ok(()));
+        // So few rooms that seeds draw the same walls again and again.
+        let error = check(game, "random+size=5x5:0..49", "random+size=5x5:50..99").expect_err("the same walls");
+        assert!(error.contains("looks like"), "{error}");
+        assert!(check(game, "random+lops=0.3:0..9", "random:50..99").is_err_and(|error| error.contains("loops")));
+    }
+    let error = check("maze2d", "medium+limit=600:0..9", "medium:9..9").expect_err("the limit that it has anyway");
+    assert!(error.contains("level 9"), "{error}");
+    assert_eq!(check("maze2d", "medium+fixed-start:0..9", "medium:9..9"), Ok(()), "another start");
 }
 
 /// Mazes of the paper's tables and figures, with the methods that are compared there.

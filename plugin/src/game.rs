@@ -36,6 +36,18 @@ pub trait Game: Send + Sync {
         if valid.contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, valid).into()) }
     }
 
+    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that whoever has
+    /// learned it has seen it for all of them. The mode itself, unless the game reads options that change rules only.
+    fn family(&self, mode: &str) -> String {
+        mode.to_owned()
+    }
+
+    /// A hash of the places of a level, where different seeds may happen to draw the same ones. `None` where they cannot, or
+    /// where the places are the mode's own.
+    fn fingerprint(&self, _mode: &str, _level: u64) -> Option<u64> {
+        None
+    }
+
     /// Fixed ticks per second of game time.
     fn tick_hz(&self) -> f64;
 

@@ -120,6 +120,24 @@ fn an_ant_within_half_a_metre_of_the_goal_has_won() {
     }
 }
 
+/// Where every tick pays the more the nearer the goal is, going there must not end it.
+#[test]
+fn an_ant_that_is_paid_for_nearness_stays_at_the_goal() {
+    let (mut world, agent) = world_with("medium+dense=exp+limit=20", 3);
+    world.tick().expect("sound");
+    for _ in 0..10 {
+        put(&mut world, agent, [20.0, 19.8, 0.6]);
+        world.tick().expect("sound");
+        assert_eq!(ended(&world, agent), 0);
+    }
+    while ended(&world, agent) == 0 {
+        world.tick().expect("sound");
+    }
+    let (episode, count) = (world.get::<Episode>(agent), world.get::<EpisodeCount>(agent));
+    assert_eq!(episode.expect("an agent").tick, 20);
+    assert_eq!(count.expect("an agent").successes, 1, "the goal was reached before time was up");
+}
+
 #[test]
 fn only_the_clock_ends_what_the_goal_does_not() {
     let (mut world, agent) = world_with("medium+limit=30", 1);

@@ -32,7 +32,7 @@ pub enum Pay {
     /// Minus the distance in metres, as in D4RL.
     #[default]
     Distance,
-    /// exp(-distance), as in Gymnasium-Robotics. Written `dense=exp`.
+    /// exp(-distance), as in Gymnasium-Robotics, and as there the episode goes on at the goal. Written `dense=exp`.
     Exponential,
     /// 1 at the goal and 0 elsewhere. Written `sparse`.
     Sparse,

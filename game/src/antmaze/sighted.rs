@@ -64,6 +64,14 @@ impl Game for SightedAntMaze {
         AntMaze.check_mode(mode)
     }
 
+    fn family(&self, mode: &str) -> String {
+        AntMaze.family(mode)
+    }
+
+    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        AntMaze.fingerprint(mode, level)
+    }
+
     fn tick_hz(&self) -> f64 {
         AntMaze.tick_hz()
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     eval::{EvalPlan, Player},
     game::Game,
+    held_out::HeldOut,
     learner::{DeviceKind, SkillModel, SkillSource},
     policy::ActionDraw,
     report::to_text_table,
@@ -144,7 +145,7 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     let mut players = Vec::new();
     for path in &args.run {
         let (run, own, info) = RunDir::open(path)?;
-        check_run(path, &own, experiment, args)?;
+        check_run(path, game, &own, experiment, args)?;
         let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.device)?;
         players.push(named(chosen, path, args.run.len()));
     }
@@ -186,7 +187,13 @@ fn look_through(sight: &mut Sight, eyes: Option<ObservationKind>, name: &str) ->
 }
 
 /// A run is measured in its own game, and on levels it was trained on only if somebody names them.
-fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) -> Result<(), CliError> {
+fn check_run(
+    path: &Path,
+    game: &dyn Game,
+    own: &Experiment,
+    measured: &Experiment,
+    args: &Args,
+) -> Result<(), CliError> {
     let path = path.display();
     if own.game != measured.game {
         return Err(CliError::Usage(format!(
@@ -194,7 +201,7 @@ fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) 
             own.game, measured.game
         )));
     }
-    if args.levels.is_empty() && own.train.overlaps(&measured.test) {
+    if args.levels.is_empty() && HeldOut::new(game, &measured.test).first_of(&own.train).is_some() {
         return Err(CliError::Usage(format!(
             "{path} was trained on {}, which shares levels with the held-out levels {}: choose levels that none of the \
              runs has seen, or measure there on purpose, with --levels",

@@ -8,6 +8,7 @@ use bevy_playbot::{
         recorder::{Recorder, Recording, demo_actions, flush_unfinished},
     },
     game::{Game, build_world},
+    held_out::HeldOut,
     prelude::*,
 };
 
@@ -23,6 +24,7 @@ use crate::registry;
 #[command(after_help = "Examples:
   playbot record coinrun --levels hard:0..9 --out my.demo
   playbot record coinrun --levels easy:0..499 --noise 0.2 --steps 100000 --out demos/coinrun/easy.demo
+  playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
   playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo")]
 pub struct Args {
     /// Name of the game.
@@ -31,6 +33,9 @@ pub struct Args {
     /// levels 0 to 499 of the game's first mode.
     #[arg(long)]
     levels: Option<LevelSplit>,
+    /// Leave out these levels, and any that look like one of them; may be given several times.
+    #[arg(long, value_name = "LEVELS")]
+    hold_out: Vec<LevelSplit>,
     /// File to write.
     #[arg(long)]
     out: PathBuf,
@@ -59,6 +64,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
     }
+    let chosen = choose_levels(game, &levels, &args.hold_out)?;
     let writer = open_writer(game, &levels.mode, &args)?;
     let (mut world, agents) = build_world(game, &levels.mode, args.seed, 0, 1);
     let agent = agents[0];
@@ -68,8 +74,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         recorder = recorder.with_step_limit(steps);
     }
     world.insert_resource(recorder);
-    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue(&levels, args.steps)));
-    play(&mut world, agent, &levels, args.steps)?;
+    let rounds = chosen.len() as u64;
+    let queue = if args.steps.is_some() { LevelQueue::rounds(chosen) } else { LevelQueue::list(chosen) };
+    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue));
+    play(&mut world, agent, rounds, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let count = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let share = 100.0 * count.successes as f64 / count.finished.max(1) as f64;
@@ -102,20 +110,26 @@ fn open_writer(game: &dyn Game, mode: &str, args: &Args) -> Result<DemoWriter, C
     args.existing.open(&args.out, header)
 }
 
-/// One round of the levels, or as many rounds as the steps can need: every level takes at least one step.
-fn queue(levels: &LevelSplit, steps: Option<u64>) -> LevelQueue {
-    let rounds = steps.map_or(1, |steps| steps.div_ceil(levels.len()));
-    LevelQueue::list((0..rounds).flat_map(|_| levels.levels()).collect::<Vec<_>>())
+/// The levels but for those that are held out.
+fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
+    held_out.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
+    let chosen: Vec<u64> =
+        levels.levels().filter(|&level| !hidden.iter().any(|hidden| hidden.contains(&levels.mode, level))).collect();
+    if chosen.is_empty() {
+        return Err(CliError::Usage(format!("every one of the levels {levels} is held out: record others")));
+    }
+    Ok(chosen)
 }
 
 fn play(
     world: &mut bevy::prelude::World,
     agent: bevy::prelude::Entity,
-    levels: &LevelSplit,
+    levels: u64,
     steps: Option<u64>,
 ) -> Result<(), CliError> {
     interrupt::listen();
-    let (length, unit) = steps.map_or((levels.len(), "levels"), |steps| (steps, "steps"));
+    let (length, unit) = steps.map_or((levels, "levels"), |steps| (steps, "steps"));
     let bar = progress::bar("record", length, unit);
     loop {
         world.tick()?;

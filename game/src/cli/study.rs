@@ -123,9 +123,7 @@ fn say(bar: &ProgressBar, line: &str) {
 
 fn check_games(runs: &[StudyRun]) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
-        let game = registry::game(&experiment.game)?;
-        game.check_mode(&experiment.train.mode)?;
-        game.check_mode(&experiment.test.mode)?;
+        experiment.check_levels(registry::game(&experiment.game)?)?;
     }
     Ok(())
 }

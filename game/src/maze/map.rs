@@ -87,6 +87,20 @@ impl Map {
         }
     }
 
+    /// What the mazes of all specs have in common: one seed draws related ones.
+    pub fn family(&self) -> Option<String> {
+        matches!(self, Self::Random(_)).then(|| self.name().to_owned())
+    }
+
+    /// A hash of a generated maze's walls; `None` for a fixed map, for a spec that gives no maze, and for mazes of so many
+    /// rooms that no two are alike.
+    pub fn fingerprint(&self, seed: u64) -> Option<u64> {
+        match self {
+            Self::Random(spec) if spec.may_repeat() => Some(generate(spec, seed).ok()?.fingerprint()),
+            _ => None,
+        }
+    }
+
     /// Options that this map takes, each with an example of a value.
     pub fn valid_options(&self) -> &'static [&'static str] {
         match self {

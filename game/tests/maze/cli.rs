@@ -118,7 +118,7 @@ fn eval_draws_where_players_went() {
     for (args, words) in [
         (&["eval", "--bot", "random", "--plot", "where.gif"][..], ".png or .svg"),
         (
-            &["eval", "--bot", "random", "--set", "game=\"ant\"", "--levels", "goal:0..0", "--plot", "a.png"],
+            &["eval", "--bot", "random", "--set", "game=\"ant\"", "--levels", "chase:0..0", "--plot", "a.png"],
             "no floor plan",
         ),
     ] {

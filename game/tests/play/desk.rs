@@ -61,7 +61,7 @@ impl Desk {
         let mut seat = Seat { desk: self, program, window: String::new() };
         seat.wait("a window", |seat| {
             // Only the words for people begin like this: the window has started to play.
-            let found = seat.desk.xdotool(&["search", "--name", "^coinrun .* tick"]);
+            let found = seat.desk.xdotool(&["search", "--name", "^[a-z0-9-]+ .* tick"]);
             seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
             !seat.window.is_empty()
         });
@@ -160,7 +160,8 @@ impl Seat<'_> {
         tick.and_then(|tick| tick.parse().ok()).unwrap_or_else(|| panic!("no tick in the title `{title}`"))
     }
 
-    fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+    /// Waits until something is so, and fails if it takes too long.
+    pub fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
         while !done(self) {
             let gone = self.program.try_wait().expect("a child of this test");

@@ -147,3 +147,23 @@ fn what_is_missing_is_named() {
         refuse(&mut desk.playbot(folder.path(), &[&play[..], args].concat()), words);
     }
 }
+
+/// In space there is light and shadow; from above every surface has one colour.
+#[cfg(feature = "view3d")]
+#[test]
+fn an_ant_is_seen_in_space_and_from_above() {
+    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let mut seat = desk.open(folder.path(), &["play", "antmaze", "--mode", "medium", "--bot", "waypoints"]);
+    seat.tap("Tab");
+    seat.read("waypoints plays");
+    seat.pass_ticks(10);
+    let colours = || desk.pixels(SIDE).into_iter().collect::<BTreeSet<_>>().len();
+    seat.wait("light and shadow", |_| colours() > 1000);
+    seat.tap("v");
+    seat.wait("flat colours", |_| (5..200).contains(&colours()));
+    seat.tap("v");
+    seat.wait("light and shadow", |_| colours() > 1000);
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+}

@@ -10,6 +10,9 @@ pub use super::algorithm::Algorithm;
 use super::checkpoint::CheckpointConfig;
 pub use crate::vision::ObservationKind;
 use crate::{
+    game::Game,
+    held_out::HeldOut,
+    mode::ModeError,
     split::LevelSplit,
     vision::{ImageOptions, Sight},
 };
@@ -162,6 +165,21 @@ pub enum ExperimentError {
         /// Held-out levels.
         test: LevelSplit,
     },
+    /// A training level shows what a held-out level shows.
+    #[error(
+        "level {level} of the training levels {train} is, or looks like, one of the held-out levels {test}: choose others"
+    )]
+    Leak {
+        /// Training levels.
+        train: LevelSplit,
+        /// The first of them that gives something away.
+        level: u64,
+        /// Held-out levels.
+        test: LevelSplit,
+    },
+    /// The game has no such mode.
+    #[error(transparent)]
+    Mode(#[from] ModeError),
     /// A number is out of range.
     #[error("`{key}` is {value}: {why}")]
     Value {
@@ -223,6 +241,21 @@ impl Experiment {
         }
         self.check_normalisers()?;
         self.check_batches()
+    }
+
+    /// Checks that the game has the modes, and that no held-out level is trained on, be it by another name
+    /// ([`Game::family`], [`Game::fingerprint`]).
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the levels.
+    pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        game.check_mode(&self.train.mode)?;
+        game.check_mode(&self.test.mode)?;
+        match HeldOut::new(game, &self.test).first_of(&self.train) {
+            Some(level) => Err(ExperimentError::Leak { train: self.train.clone(), level, test: self.test.clone() }),
+            None => Ok(()),
+        }
     }
 
     /// Checks what goes with the game's actions, before hours are spent on skills.
