@@ -1,9 +1,16 @@
 //! The experiments that come with the program can be run: names, modes, levels and values fit.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
 
-use bevy_playbot::train::{Experiment, config_file::read_experiment, study::study_runs};
+use bevy_playbot::{
+    split::LevelSplit,
+    train::{Experiment, config_file::read_experiment, study::study_runs},
+};
 use playbot_games::registry;
+use serde_json::Value;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments")
@@ -86,4 +93,72 @@ fn what_is_measured_elsewhere_was_learned_where_the_variant_says() {
             }
         }
     }
+}
+
+/// The command with which an experiment's demonstrations are made, as its file says; none if it says none.
+fn recorded(name: &str) -> Option<Vec<String>> {
+    let text = std::fs::read_to_string(folder().join(format!("{name}.ron"))).expect("readable");
+    let line = text.lines().find_map(|line| line.trim_start_matches("//").trim().strip_prefix("playbot record "))?;
+    Some(line.split_whitespace().map(str::to_owned).collect())
+}
+
+/// The value of an option of a command.
+fn value<'a>(args: &'a [String], option: &str) -> &'a str {
+    let at = args.iter().position(|arg| arg == option).unwrap_or_else(|| panic!("{args:?} has no {option}"));
+    &args[at + 1]
+}
+
+#[test]
+fn demonstrations_are_made_of_the_game_that_is_learned_and_not_of_held_out_levels() {
+    let recorded: Vec<_> = names().into_iter().filter_map(|name| Some((recorded(&name)?, name))).collect();
+    assert!(recorded.len() >= 10, "only {} say how", recorded.len());
+    for (args, name) in recorded {
+        let experiment = read(&name);
+        assert_eq!(args[0], experiment.game, "{name}");
+        let levels: LevelSplit = value(&args, "--levels").parse().expect("a split");
+        registry::game(&args[0]).expect("a game").check_mode(&levels.mode).expect("a mode");
+        // On a fixed map another mode makes other levels of the same seeds; the walls of a generated maze are its seed's.
+        let held_out = LevelSplit { mode: levels.mode.clone(), ..experiment.test.clone() };
+        let is_generated = levels.mode.starts_with("random");
+        assert!(!levels.overlaps(if is_generated { &held_out } else { &experiment.test }), "{name}");
+        assert_eq!(Some(Path::new(value(&args, "--out"))), experiment.demos.as_deref(), "{name}");
+    }
+}
+
+/// Runs the program in a folder.
+fn playbot(folder: &Path, args: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("starts");
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn those_who_see_are_recorded_imitated_trained_and_measured() {
+    for (name, sees) in [("maze2d-random-hour", 14), ("antmaze-random-hour", 39)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let run = |args: &[&str]| playbot(folder.path(), args);
+        let [game, levels, noise] = {
+            let args = recorded(name).expect("says how");
+            [args[0].clone(), value(&args, "--levels").to_owned(), value(&args, "--noise").to_owned()]
+        };
+        run(&["record", &game, "--levels", &levels, "--noise", &noise, "--steps", "2000", "--out", "some.demo"]);
+        let file = folder_file(name);
+        let sizes = "skills.hidden=[32,32]";
+        let experiment = ["--experiment", &file, "--set", sizes, "--set", "arenas=8", "--set", "checkpoints.every=1"];
+        let learn = ["learn-skills", "--demos", "some.demo", "--epochs", "1", "--out", "skills"];
+        run(&[&learn[..], &experiment].concat());
+        let train = ["train", "--skills", "skills", "--run", "run", "--steps", "2048"];
+        run(&[&train[..], &experiment].concat());
+        let levels = format!("{}:64..65", read(name).test.mode);
+        let measured = run(&["eval", "--run", "run", "--levels", &levels, "--episodes-per-level", "1", "--json"]);
+        let measured: Value = serde_json::from_str(measured.trim()).expect("a line of JSON");
+        assert_eq!(measured["episodes"], 2, "{measured}");
+        let sights = registry::game(&game).expect("a game").observation().len();
+        assert_eq!(sights, sees, "{name} is learned by those who see");
+    }
+}
+
+fn folder_file(name: &str) -> String {
+    let path = folder().canonicalize().expect("there").join(format!("{name}.ron"));
+    path.to_str().expect("plain").to_owned()
 }
