@@ -16,7 +16,7 @@ impl Walls {
         let mut gone: f64 = 0.0;
         while !self.is_solid(cell[0], cell[1]) {
             let middle = self.centre(cell[0], cell[1]);
-            let until_side = [0, 1].map(|axis| match way[axis] {
+            let until_side = [0, 1].map(|axis: usize| match way[axis] {
                 0.0 => f64::INFINITY,
                 along => (middle[axis] + HALF.copysign(along) - place[axis]) / along,
             });
