@@ -171,11 +171,11 @@ pub enum ExperimentError {
     )]
     Leak {
         /// Training levels.
-        train: LevelSplit,
+        train: Box<LevelSplit>,
         /// The first of them that gives something away.
         level: u64,
         /// Held-out levels.
-        test: LevelSplit,
+        test: Box<LevelSplit>,
     },
     /// The game has no such mode.
     #[error(transparent)]
@@ -253,7 +253,10 @@ impl Experiment {
         game.check_mode(&self.train.mode)?;
         game.check_mode(&self.test.mode)?;
         match HeldOut::new(game, &self.test).first_of(&self.train) {
-            Some(level) => Err(ExperimentError::Leak { train: self.train.clone(), level, test: self.test.clone() }),
+            Some(level) => {
+                let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
+                Err(ExperimentError::Leak { train, level, test })
+            }
             None => Ok(()),
         }
     }

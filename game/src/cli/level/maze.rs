@@ -55,7 +55,7 @@ fn maze(args: &Args) -> Result<Maze, CliError> {
         return Err(no_seed(&map.to_string()));
     }
     let seed = args.seed.unwrap_or(0);
-    Ok(if args.game == "antmaze" { map.antmaze(seed) } else { map.maze2d(seed) }?)
+    Ok(if args.game.starts_with("antmaze") { map.antmaze(seed) } else { map.maze2d(seed) }?)
 }
 
 fn no_seed(map: &str) -> CliError {

@@ -41,7 +41,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     match args.game.as_str() {
         "coinrun" => coinrun::show(&args),
-        "maze2d" | "antmaze" => maze::show(&args),
+        "maze2d" | "maze2d-sighted" | "antmaze" | "antmaze-sighted" => maze::show(&args),
         other => {
             let game = registry::game(other)?;
             Err(CliError::Usage(format!("`{}` has no levels to show", game.name())))
