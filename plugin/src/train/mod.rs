@@ -16,6 +16,7 @@ pub mod metrics_log;
 pub mod presets;
 mod ron_keys;
 pub mod run_dir;
+pub mod run_lock;
 pub mod study;
 pub mod tensorboard;
 pub mod trainer;
