@@ -13,7 +13,8 @@ use bevy_playbot::{
     report::{Chart, Curve, Report, ResultRow, ResultTable, Section, Table, to_text_table},
     train::{
         Algorithm, Experiment, Trainer,
-        run_dir::{is_unborn, write_atomically},
+        metrics_log::{SUCCESS_RATE, range_of},
+        run_dir::{check_replaceable, is_unborn, write_atomically},
         run_lock::RunLock,
         worlds::default_threads,
     },
@@ -94,6 +95,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let experiment = read_experiment(&args)?;
     let game = registry::game(&experiment.game)?;
+    Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() }.check_memory(game)?;
     let _lock = take_folder(&args.run)?;
     let Some(skills) = skills(game, &experiment, &args)? else {
         eprintln!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
@@ -156,7 +158,15 @@ fn take_folder(path: &Path) -> Result<RunLock, CliError> {
     }
     std::fs::create_dir_all(path)
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
-    Ok(RunLock::take(path)?)
+    let lock = RunLock::take(path)?;
+    for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
+        if run.exists() {
+            // Found out before skills are learned.
+            check_replaceable(&run)?;
+            RunLock::take(&run)?;
+        }
+    }
+    Ok(lock)
 }
 
 /// Learns the skill model and saves it; `None` after Ctrl-C.
@@ -243,6 +253,7 @@ fn write_report(
         x_label: "environment steps".to_owned(),
         y_label: y_label.to_owned(),
         curves,
+        y_range: None,
         marks: Vec::new(),
     };
     let table = ResultTable {
@@ -276,7 +287,10 @@ fn write_report(
                 text: "Means over the last 100 training episodes.".to_owned(),
                 charts: vec![
                     chart("Return on training levels", "return", curve(|point| point.episodic_return)),
-                    chart("Success on training levels", "success rate", curve(|point| point.success_rate)),
+                    Chart {
+                        y_range: range_of(SUCCESS_RATE),
+                        ..chart("Success on training levels", "success rate", curve(|point| point.success_rate))
+                    },
                 ],
                 ..Section::default()
             },

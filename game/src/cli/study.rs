@@ -18,7 +18,7 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment::ExperimentArgs,
+    experiment::{ExperimentArgs, quoted},
     interrupt, progress,
     study_run::Runner,
 };
@@ -141,7 +141,9 @@ fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>,
 
 fn check_games(runs: &[StudyRun]) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
-        experiment.check_levels(registry::game(&experiment.game)?)?;
+        let game = registry::game(&experiment.game)?;
+        experiment.check_levels(game)?;
+        experiment.check_memory(game)?;
     }
     Ok(())
 }
@@ -200,10 +202,4 @@ fn command(args: &Args) -> String {
 fn restart(args: &Args) -> String {
     let runs = args.runs.as_ref().map(|path| format!(" --runs {}", quoted(&path.display().to_string())));
     command(args) + &runs.unwrap_or_default()
-}
-
-/// A word for the shell.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
-    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -12,6 +12,7 @@ mod config_keys;
 mod config_set;
 pub mod json_lines;
 pub mod learner;
+mod memory;
 pub mod metrics_log;
 pub mod presets;
 mod ron_keys;
