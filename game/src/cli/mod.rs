@@ -13,6 +13,8 @@ mod interrupt;
 mod learn_skills;
 mod level;
 mod methods;
+mod number;
+mod output;
 mod play;
 mod player;
 mod plot;
@@ -62,7 +64,8 @@ Examples:
   playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
 
-Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
+Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
+130 stopped by Ctrl-C before it was done.";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -116,6 +119,7 @@ pub fn main() -> ExitCode {
     match std::panic::catch_unwind(|| run(verb)) {
         Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
         Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
+        Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             eprintln!("error: {error}");
