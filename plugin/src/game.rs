@@ -111,7 +111,7 @@ pub trait Game: Send + Sync {
 
 /// The name is none of those that exist.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
-#[error("unknown {what} `{name}`{}; valid: {}", hint(.near), .valid.join(", "))]
+#[error("unknown {what} `{name}`{}; {}", hint(.near), choice(.valid))]
 pub struct UnknownName {
     /// What was named: `game`, `mode`, `method`.
     pub what: &'static str,
@@ -125,6 +125,10 @@ pub struct UnknownName {
 
 fn hint(near: &Option<String>) -> String {
     near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+}
+
+fn choice(valid: &[String]) -> String {
+    if valid.is_empty() { "there is none here".to_owned() } else { format!("valid: {}", valid.join(", ")) }
 }
 
 impl UnknownName {

@@ -20,6 +20,7 @@ use super::{
     experiment::{ExperimentArgs, option},
     footprints::Footprints,
     methods,
+    number::at_least_one,
     player::Chosen,
 };
 use crate::registry::{self, GAMES};
@@ -68,7 +69,7 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]

@@ -15,6 +15,8 @@ mod level;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;
 mod methods;
+mod number;
+mod output;
 mod play;
 mod player;
 mod plot;
@@ -64,7 +66,8 @@ Examples:
   playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
 
-Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
+Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
+130 stopped by Ctrl-C before it was done.";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -120,6 +123,7 @@ pub fn main() -> ExitCode {
     match std::panic::catch_unwind(|| run(verb)) {
         Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
         Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
+        Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             eprintln!("error: {error}");

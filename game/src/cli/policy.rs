@@ -14,6 +14,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     eval::{check_skills, cloning_skills},
     experiment::{ExperimentArgs, quoted},
+    output::prepare,
 };
 use crate::registry;
 
@@ -78,6 +79,7 @@ fn export(args: &Export) -> Result<Outcome, CliError> {
     if args.out.exists() && !args.force {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
     }
+    prepare(&args.out)?;
     let (game, experiment, file) = match (&args.run, &args.skills) {
         (Some(run), _) => from_run(run, args.checkpoint)?,
         (None, Some(skills)) => from_skills(skills, &args.from)?,

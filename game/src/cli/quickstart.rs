@@ -26,6 +26,7 @@ use super::{
     eval::cloning,
     experiment::{self, ExperimentArgs, option},
     interrupt, learn_skills, methods,
+    number::at_least_one,
     train::{create_run, drive},
 };
 use crate::registry;
@@ -55,7 +56,7 @@ pub struct Args {
     #[arg(long)]
     epochs: Option<usize>,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// One line of JSON per method instead of a table.
     #[arg(long)]
@@ -99,7 +100,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let _lock = take_folder(&args.run)?;
     let Some(skills) = skills(game, &experiment, &args)? else {
         eprintln!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
-        return Ok(Outcome::Pass);
+        return Ok(Outcome::Stopped);
     };
     let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut trained = Vec::new();
@@ -215,8 +216,12 @@ fn train_one(
 
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     let run = args.run.join(algorithm.name());
-    eprintln!("stopped and saved: go on with `playbot train --run {} --resume`", run.display());
-    Outcome::Pass
+    eprintln!(
+        "stopped and saved; there is no report yet: go on with this training alone, `playbot train --run {} --resume`, \
+         or start again with `playbot quickstart`",
+        run.display()
+    );
+    Outcome::Stopped
 }
 
 /// How many steps SCORE needed for what PPO reached in the end, in words.

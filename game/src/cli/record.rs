@@ -43,7 +43,8 @@ pub struct Args {
     /// deviation of the normal noise on each value, before it is clipped.
     #[arg(long, default_value_t = 0.0)]
     noise: f64,
-    /// Stop after exactly this many steps; without it, after one round of the levels.
+    /// Stop after exactly this many steps, not counting those that --append finds; without it, after one round of the
+    /// levels.
     #[arg(long)]
     steps: Option<u64>,
     /// Seed of the noise.
@@ -60,6 +61,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| usual_levels(game));
     game.check_mode(&levels.mode)?;
+    check_demonstrator(game)?;
     check_noise(game, args.noise)?;
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
@@ -77,12 +79,54 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let rounds = chosen.len() as u64;
     let queue = if args.steps.is_some() { LevelQueue::rounds(chosen) } else { LevelQueue::list(chosen) };
     world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue));
-    play(&mut world, agent, rounds, args.steps)?;
+    let finished = play(&mut world, agent, rounds, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let count = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let share = 100.0 * count.successes as f64 / count.finished.max(1) as f64;
     eprintln!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
-    Ok(Outcome::Pass)
+    if finished {
+        return Ok(Outcome::Pass);
+    }
+    let rest = Rest { level: world.get::<Episode>(agent).map_or(levels.first, |episode| episode.level), steps };
+    eprintln!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
+    Ok(Outcome::Stopped)
+}
+
+/// Where a recording was stopped.
+struct Rest {
+    /// The level that was being played.
+    level: u64,
+    /// Steps that this call has recorded.
+    steps: u64,
+}
+
+impl Rest {
+    /// What is to be changed in the call. Each call begins with the first of its levels, counts its own steps, and draws
+    /// the same noise from the same seed.
+    fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
+        let left = LevelSplit { first: self.level, ..levels.clone() };
+        let mut changes = format!("--append --levels {left}");
+        if let Some(steps) = args.steps {
+            changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
+        }
+        if args.noise > 0.0 {
+            changes += &format!(" --seed {}", args.seed.wrapping_add(1));
+        }
+        format!("add the rest with the same command and `{changes}`")
+    }
+}
+
+/// Somebody must play.
+fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
+    if game.demonstrator().is_some() {
+        return Ok(());
+    }
+    let name = game.name();
+    let mut advice = "train a policy without demonstrations (`playbot train --algorithm ppo`)".to_owned();
+    if game.input_map().is_some() {
+        advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
+    }
+    Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
 }
 
 fn usual_levels(game: &dyn Game) -> LevelSplit {
@@ -122,26 +166,30 @@ fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) 
     Ok(chosen)
 }
 
+/// Plays until enough is recorded; false if somebody stopped it before.
 fn play(
     world: &mut bevy::prelude::World,
     agent: bevy::prelude::Entity,
     levels: u64,
     steps: Option<u64>,
-) -> Result<(), CliError> {
+) -> Result<bool, CliError> {
     interrupt::listen();
     let (length, unit) = steps.map_or((levels, "levels"), |steps| (steps, "steps"));
     let bar = progress::bar("record", length, unit);
-    loop {
+    let finished = loop {
         world.tick()?;
         let recorder = world.resource::<Recorder>();
         let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
         bar.set_position(done);
         let idle = !world.get::<Control>(agent).is_some_and(|control| control.is_active());
-        if idle || steps.is_some_and(|steps| done >= steps) || interrupt::asked() {
-            break;
+        if idle || steps.is_some_and(|steps| done >= steps) {
+            break true;
         }
-    }
+        if interrupt::asked() {
+            break false;
+        }
+    };
     bar.finish_and_clear();
     flush_unfinished(world)?;
-    Ok(())
+    Ok(finished)
 }

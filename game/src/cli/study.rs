@@ -19,7 +19,9 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
-    interrupt, progress,
+    interrupt,
+    number::at_least_one,
+    progress,
     study_run::Runner,
 };
 use crate::registry;
@@ -54,7 +56,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     force: bool,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
@@ -83,8 +85,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         runner.check_demos(&runs)?;
     }
     let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
-        eprintln!("stopped and saved: go on with `{} --resume`", restart(&args));
-        return Ok(Outcome::Pass);
+        eprintln!(
+            "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
+            restart(&args)
+        );
+        return Ok(Outcome::Stopped);
     };
     write(&args.out, &report)?;
     if args.json {

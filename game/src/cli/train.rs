@@ -18,7 +18,9 @@ use bevy_playbot::{
 use super::{
     error::{CliError, Outcome},
     experiment::{ExperimentArgs, option},
-    interrupt, progress,
+    interrupt,
+    number::at_least_one,
+    progress,
 };
 use crate::registry;
 
@@ -54,7 +56,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     seed: Option<u64>,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Save a checkpoint every so many updates, instead of the experiment's.
     #[arg(long)]
@@ -69,10 +71,16 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
         eprintln!("done: test it with `playbot eval --run {}`", args.run.display());
+        Ok(Outcome::Pass)
     } else {
-        eprintln!("stopped and saved: go on with `playbot train --run {} --resume`", args.run.display());
+        let (steps, wanted) = (trainer.steps(), trainer.experiment().steps);
+        let run = args.run.display();
+        eprintln!(
+            "stopped and saved after {steps} of {wanted} steps, so the training is incomplete: go on with \
+             `playbot train --run {run} --resume`"
+        );
+        Ok(Outcome::Stopped)
     }
-    Ok(Outcome::Pass)
 }
 
 fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
@@ -186,7 +194,11 @@ pub fn drive(
 }
 
 fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
-    run.save(trainer).map_err(|error| CliError::NotSaved { error: error.into(), run: run.path().into() })
+    let is_first = run.checkpoint(Which::Last).is_err();
+    run.save(trainer).map_err(|error| {
+        let (error, run) = (error.into(), run.path().into());
+        if is_first { CliError::NeverSaved { error, run } } else { CliError::NotSaved { error, run } }
+    })
 }
 
 /// The error of a training, with the checkpoint that is left if its numbers ran away.

@@ -196,10 +196,11 @@ mod tests {
         let error = |text: &str| text.parse::<Map>().expect_err("no map").to_string();
         assert!(error("medum").contains("did you mean `medium`"), "{}", error("medum"));
         assert!(error("random+lops=0.1").contains("did you mean `loops=0.2`"), "{}", error("random+lops=0.1"));
-        assert!(error("medium+loops=0.1").contains("unknown map option"));
+        assert_eq!(error("medium+loops=0.1"), "unknown map option `loops=0.1`; there is none here");
         assert!(error("random+size=9").contains("rows x columns"));
         assert!(error("random+size=9x5000").contains("too large"));
-        assert!(error("random+size=4x9").contains("no room"));
+        assert!(error("random+size=4x9").contains("`size=4x9` has no room"));
+        assert!(error("random+size=0x0").contains("`size=0x0` has no room"));
         assert!(error("random+corridor=0").contains("at least 1"));
         assert!(error("random+loops=1.5").contains("between 0 and 1"));
         assert!(error("random+loops=NaN").contains("between 0 and 1"));

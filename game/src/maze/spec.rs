@@ -45,7 +45,6 @@ impl MazeSpec {
     /// [`MazeError`] names the value that cannot be.
     pub fn check(&self) -> Result<(), MazeError> {
         let Self { rows, columns, loops, corridor, .. } = *self;
-        check_size(rows, columns)?;
         if corridor == 0 {
             return Err(MazeError::NoCorridor);
         }
@@ -53,6 +52,7 @@ impl MazeSpec {
         if rows < least || columns < least {
             return Err(MazeError::TooSmall { rows, columns, corridor, least });
         }
+        check_size(rows, columns)?;
         if !(0.0..=1.0).contains(&loops) {
             return Err(MazeError::Loops(loops.to_string()));
         }

@@ -68,6 +68,33 @@ fn a_file_of_rows_is_a_map() {
 }
 
 #[test]
+fn what_is_shown_can_be_edited_and_read_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shown = text(&playbot(folder.path(), &["level", "antmaze", "--map", "umaze"]));
+    std::fs::write(folder.path().join("mine.txt"), format!("\u{feff}{shown}")).expect("writable");
+    let again = text(&playbot(folder.path(), &["level", "antmaze", "--map", "mine.txt"]));
+    assert_eq!(again, shown);
+}
+
+#[test]
+fn a_whole_mode_names_the_level_that_is_played() {
+    use playbot_games::{antmaze, maze2d};
+    let text = "random+size=15x15+loops=0.2+goals=random";
+    let mode: antmaze::AntMazeMode = text.parse().expect("a mode");
+    let played = antmaze::generate(&mode, 3).expect("a level");
+    assert_ne!(played.goal, played.maze.goal(), "the mode draws another goal than the map's");
+    for game in ["antmaze", "antmaze-sighted"] {
+        let shown = level(&[game, "--map", text, "--seed", "3"]);
+        assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start), &json!(played.goal)));
+    }
+    let mode: maze2d::Maze2dMode = "medium+sparse".parse().expect("a mode");
+    let played = maze2d::Maze2dLevel::new(&mode, 5).expect("a level");
+    let shown = level(&["maze2d", "--map", "medium+sparse", "--seed", "5"]);
+    assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start_cell), &json!(played.goal_cell)));
+    assert_eq!(level(&["antmaze-sighted", "--map", "xl"]), level(&["antmaze", "--map", "xl"]));
+}
+
+#[test]
 fn what_is_wrong_with_a_map_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, rows) in [
@@ -92,6 +119,8 @@ fn what_is_wrong_with_a_map_is_said() {
         (&["--map", "medum"], &["did you mean `medium`?", "no file"]),
         (&["--map", "medium", "--seed", "1"], &["no seed"]),
         (&["--map", "random+size=5000x5000"], &["too large"]),
+        (&["--map", "random+size=0x0"], &["`size=0x0`"]),
+        (&["--map", "medium+sprse"], &["did you mean `sparse`?", "valid: sparse, fixed-start"]),
         (&["--map", "random+lops=1"], &["did you mean `loops"]),
         (&["--mode", "medium"], &["--map"]),
         (&["--map", "medium", "--png", "a.gif"], &[".png or .svg"]),

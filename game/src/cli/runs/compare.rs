@@ -13,7 +13,10 @@ use bevy_playbot::{
 use serde_json::json;
 
 use super::{
-    super::error::{CliError, Outcome, print_line},
+    super::{
+        error::{CliError, Outcome, print_line},
+        output,
+    },
     write_plot,
 };
 
@@ -36,7 +39,7 @@ pub struct Args {
     #[arg(long)]
     threshold: Option<f64>,
     /// Draw mean and spread over the seeds into this SVG file.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", value_parser = output::svg)]
     plot: Option<PathBuf>,
     /// One line of JSON per group.
     #[arg(long)]

@@ -13,7 +13,10 @@ use bevy_playbot::{
 use serde_json::{Value, json};
 
 use super::{
-    super::error::{CliError, Outcome, print_line},
+    super::{
+        error::{CliError, Outcome, print_line},
+        output,
+    },
     ls::{UNKNOWN, age_s, duration, to_json},
     write_plot,
 };
@@ -34,7 +37,7 @@ pub struct Args {
     #[arg(long)]
     metric: Vec<String>,
     /// Draw the curves into this SVG file.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", value_parser = output::svg)]
     plot: Option<PathBuf>,
     /// Print everything as one line of JSON.
     #[arg(long)]

@@ -22,6 +22,7 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     interrupt,
+    output::{self, make_folder_of},
     player::{Chosen, PlayerArgs},
     progress,
 };
@@ -63,8 +64,8 @@ pub struct Args {
     /// Episode of the recording, counted from 0.
     #[arg(long, default_value_t = 0, requires = "demo")]
     episode_number: usize,
-    /// File to write.
-    #[arg(long, default_value = "view.png")]
+    /// File to write, a .png.
+    #[arg(long, default_value = "view.png", value_parser = output::png)]
     out: PathBuf,
     /// How many times as large as the bot sees it.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
@@ -196,10 +197,7 @@ fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
 ///
 /// The folder or the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
-    }
+    make_folder_of(path)?;
     Ok(write_atomically(path, bytes)?)
 }
 
