@@ -183,9 +183,9 @@ pub enum ExperimentError {
         /// Key in the file.
         key: &'static str,
         /// Its value.
-        levels: LevelSplit,
+        levels: Box<LevelSplit>,
         /// What is wrong with the mode.
-        source: ModeError,
+        source: Box<ModeError>,
         /// A mode that the game has.
         example: &'static str,
     },
@@ -437,8 +437,8 @@ fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result
     let example = game.modes().first().copied().unwrap_or_default();
     game.check_mode(&levels.mode).map_err(|source| ExperimentError::Mode {
         key,
-        levels: levels.clone(),
-        source,
+        levels: Box::new(levels.clone()),
+        source: Box::new(source),
         example,
     })
 }
