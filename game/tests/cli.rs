@@ -65,6 +65,13 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["eval", "--bot", "random", "--set", "test=hard"], "mode:first..last"),
         (&["train", "--run", "r", "--algorithm", "bc"], "playbot eval --skills"),
         (&["config", "show", "--set", "ppo.minibatches=7"], "64 × 128 = 8192; 8 does"),
+        (&["config", "show", "--set", "arenas=0"], "`arenas=0`: `arenas` is 0"),
+        (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: ppo lr must be"),
+        (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
+        (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..127: unknown map `hard`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "or with --levels"),
+        (&["eval", "--bot", "random", "--plot", "plot.gif"], "is written as .png or .svg"),
         (&["config", "presets", "skil-paper"], "did you mean `skill-paper`?"),
         (&["study", "--out", "o", "--seeds", "1,1"], "seed 1 is there twice"),
         (&["study", "--out", "o", "--set", "variants=[(name: \"a\", set: [\"kl=false\"])]"], "variant `a`"),
@@ -98,6 +105,8 @@ fn an_experiment_can_be_shown_with_all_its_values_and_read_back() {
     };
     std::fs::write(folder.path().join("least.ron"), "(base: [\"d4rl-ppo\"], game: \"coinrun\", train: \"hard:0..3\", test: \"hard:4..5\", demos: \"d\", steps: 9, ppo: (epochs: 2))").expect("writable");
     let shown = show(&["--experiment", "least.ron", "--set", "score.kl_coef=0.25"]);
+    let warned = playbot(folder.path(), &["config", "show", "--experiment", "least.ron"]);
+    assert!(errors(&warned).contains("there are no recordings at d"), "{}", errors(&warned));
     for line in
         ["steps: 9,", "epochs: 2,", "num_steps: 2048,", "kl_coef: 0.25,", "algorithm: \"score-ppo\",", "horizon: 8,"]
     {
@@ -187,6 +196,45 @@ fn blind_bots_score_what_they_score_in_the_original() {
     assert_eq!(rows[0]["split"], "hard:64..127");
     assert_eq!((rows[0]["episodes"].as_u64(), rows[0]["return_mean"].as_f64()), (Some(64), Some(5.46875)));
     assert_eq!((rows[1]["method"].as_str(), rows[1]["return_mean"].as_f64()), (Some("right-jump"), Some(6.40625)));
+}
+
+#[test]
+fn a_measurement_outlives_its_plot() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let eval = |plot: &str| {
+        let levels = ["--levels", "hard:64..64", "--episodes-per-level", "1"];
+        playbot(folder.path(), &[&["eval", "--bot", "right-jump", "--plot", plot], &levels[..]].concat())
+    };
+    std::fs::create_dir(folder.path().join("taken.svg")).expect("writable");
+    std::fs::write(folder.path().join("file"), "").expect("writable");
+    for (plot, words, code_then) in [("taken.svg", "is a folder", 3), ("file/plot.svg", "cannot create file", 2)] {
+        let output = eval(plot);
+        assert_eq!(code(&output), code_then, "{}", errors(&output));
+        assert!(errors(&output).contains(words), "{}", errors(&output));
+        assert!(output.stdout.is_empty(), "found out before anything is measured");
+    }
+    let output = eval("new/folder/plot.svg");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let svg = std::fs::read_to_string(folder.path().join("new/folder/plot.svg")).expect("drawn");
+    assert!(svg.contains("crates and the like"), "level 64 has crates");
+    let line = svg.split("<polyline points=\"").find(|line| line.contains("stroke-width=\"1.8\"")).expect("a trail");
+    let (x, y) = line.split(' ').next().and_then(|point| point.split_once(',')).expect("a point");
+    assert!(svg.contains(&format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"6\"")), "it begins at {x}, {y}, not at the start");
+    // A file name that is too long is found out only when it is written.
+    let late = eval(&format!("{}.svg", "x".repeat(300)));
+    assert_eq!(code(&late), 2, "{}", errors(&late));
+    assert!(String::from_utf8_lossy(&late.stdout).contains("right-jump"), "the table is there all the same");
+}
+
+#[cfg(all(target_os = "linux", feature = "camera"))]
+#[test]
+fn cameras_work_silently_without_a_desktop() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+    command.args(["eyes", "coinrun", "--levels", "hard:0..0", "--frames", "1"]).current_dir(folder.path());
+    let output = command.env_remove("XDG_RUNTIME_DIR").env_remove("NODEVICE_SELECT").output().expect("it starts");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    assert!(!errors(&output).contains("XDG_RUNTIME_DIR"), "{}", errors(&output));
 }
 
 #[test]

@@ -84,6 +84,36 @@ fn one_observation_is_what_the_bot_sees_enlarged() {
     assert!(grey.frames[0].iter().all(|[r, g, b]| r == g && g == b));
 }
 
+#[cfg(feature = "camera")]
+#[test]
+fn a_camera_sees_what_the_raster_sees() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for game in [&["coinrun", "--seed", "5"][..], &["maze2d"], &["antmaze"], &["ant", "--mode", "goal"]] {
+        let [raster, camera] = [&["--out", "raster.png"][..], &["--camera", "--out", "camera.png"]].map(|args| {
+            written(folder.path(), &[&["view"], game, &["--tick", "3", "--scale", "1"], args].concat());
+            read(&folder.path().join(args[args.len() - 1])).frames.swap_remove(0)
+        });
+        let apart = |(one, other): &(&[u8; 3], &[u8; 3])| (0..3).any(|i| one[i].abs_diff(other[i]) > 8);
+        let apart = raster.iter().zip(&camera).filter(apart).count();
+        assert!(apart < 64 * 64 * 3 / 100, "{game:?}: {apart} pixels differ");
+        assert!(raster.iter().any(|colour| *colour != raster[0]), "{game:?}: it shows something");
+    }
+}
+
+/// `playbot eyes` says where its worst frame is to be found.
+#[cfg(feature = "camera")]
+#[test]
+fn the_worst_frame_is_of_the_moment_that_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let eyes = ["eyes", "coinrun", "--levels", "hard:3..7", "--frames", "5", "--out", "."];
+    let worst = &written(folder.path(), &eyes)["worst"];
+    let [level, tick] = ["level", "tick"].map(|key| worst[key].to_string());
+    written(folder.path(), &["view", "coinrun", "--seed", &level, "--tick", &tick, "--scale", "1"]);
+    let seen = &read(&folder.path().join("view.png")).frames[0];
+    // The raster's picture is the left one, enlarged five times.
+    assert!(reduced(&read(&folder.path().join("worst.png")), 0, 64, 5) == *seen, "level {level}, tick {tick}");
+}
+
 #[test]
 fn an_episode_becomes_a_moving_picture() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -170,6 +200,16 @@ fn bad_wishes_are_refused_in_words() {
         (&["--image", "widht=64"], 3, "did you mean `width`?"),
         (&["--image", "height=tall"], 3, "must be a whole number, not tall"),
         (&["--scale", "0"], 3, "0 is not in 1..=32"),
+        (
+            &["--scale", "32", "--image", "width=1024", "--image", "height=1024", "--image", "stack=16"],
+            3,
+            "smaller --scale",
+        ),
+        (
+            &["--episode", "--image", "width=1024", "--image", "height=1024", "--image", "stack=16"],
+            3,
+            "smaller pictures",
+        ),
         (&["--tick", "5000"], 3, "there is no tick 5000: the episode has"),
         (&["--demo", "none.demo"], 3, "none.demo"),
         (&["--demo", "file"], 3, "file"),

@@ -379,7 +379,6 @@ fn the_demonstrator_walks_to_the_goal() {
         let episodes = evaluate(&AntMaze, &Player::Demonstrator, &plan, |_| {}).expect("sound");
         let summary = summarize("waypoints", &plan.split, &episodes);
         assert!(summary.success >= least, "{levels}: {summary:?}");
-        assert_eq!(summary.clipped, 0.0, "{levels}");
     }
 }
 

@@ -6,7 +6,7 @@ use bevy_playbot::{
     prelude::*,
     vision::{BlankEpisodes, TileLayer, VisionError},
 };
-use playbot_tests::scene::{camera_world, image, spawn_eye};
+use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
 
 /// Set for a copy of this program that finds no adapter.
 const CHILD: &str = "PLAYBOT_TEST_WITHOUT_ADAPTER";
@@ -106,6 +106,33 @@ fn things_without_an_image_are_named() {
     world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 2, rows: 2, cells: vec![0], outside: 0 });
     let told = fault(&mut world);
     assert!(told.contains("has 1 cells; with 2 columns and 2 rows"), "{told}");
+    // As many as there should be.
+    world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 0, rows: 2, cells: vec![], outside: 0 });
+    world.tick().expect("a grid without cells");
+}
+
+/// What Bevy would draw as a white dot.
+#[test]
+fn a_sprite_without_an_image_is_named_and_a_rectangle_of_one_colour_is_drawn() {
+    let mut world = camera_world(|_| {});
+    let target = world.spawn(Transform::default()).id();
+    let eye = spawn_eye(&mut world, 0, target, 4.0, [8, 8]);
+    let blank = (Name::new("ghost"), Sprite::default(), Transform::default(), Visibility::Hidden);
+    let blank = world.spawn(blank).id();
+    world.tick().expect("what is hidden needs no image");
+    for _ in 0..2 {
+        world.entity_mut(blank).insert(Visibility::Visible);
+        let told = fault(&mut world);
+        for part in ["sprite", &blank.to_string(), "`ghost`", "has no image", "custom_size"] {
+            assert!(told.contains(part), "`{part}` is missing in: {told}");
+        }
+    }
+    world.entity_mut(blank).insert(Sprite::from_color(Color::srgb_u8(200, 40, 90), Vec2::splat(2.0)));
+    world.tick().expect("a rectangle");
+    assert_eq!([pixel(&world, eye, 4, 4), pixel(&world, eye, 0, 0)], [[200, 40, 90], [0, 0, 0]]);
+    world.entity_mut(blank).insert(Sprite::from_color(Color::WHITE, Vec2::splat(2.0)));
+    world.tick().expect("white as well");
+    assert_eq!(pixel(&world, eye, 4, 4), [255; 3]);
 }
 
 fn five_ticks(mut agents: Query<&mut Episode>) {

@@ -320,9 +320,17 @@ fn idle_agents_are_not_looked_after() {
     assert_eq!(*world.get::<Frame>(eye).expect("an eye"), Frame::default());
 }
 
+/// An image without a single texel.
+fn empty(world: &mut World, [width, height]: [u32; 2]) -> Handle<Image> {
+    let mut image = image(1, &[RED]);
+    (image.texture_descriptor.size.width, image.texture_descriptor.size.height) = (width, height);
+    image.data = Some(Vec::new());
+    world.resource_mut::<Assets<Image>>().add(image)
+}
+
 #[test]
 fn what_cannot_be_drawn_is_named_with_agent_and_tick() {
-    let cases: [(&str, fn(&mut World)); 8] = [
+    let cases: [(&str, fn(&mut World)); 11] = [
         ("no image", |world| {
             world.spawn((Sprite::default(), Name::new("ghost")));
         }),
@@ -342,6 +350,19 @@ fn what_cannot_be_drawn_is_named_with_agent_and_tick() {
             image.data = None;
             let handle = world.resource_mut::<Assets<Image>>().add(image);
             world.spawn((Sprite::from_image(handle), Name::new("ghost")));
+        }),
+        ("0x4", |world| {
+            let handle = empty(world, [0, 4]);
+            world.spawn((Sprite::from_image(handle), Name::new("ghost")));
+        }),
+        ("4x0", |world| {
+            let sized = Sprite { custom_size: Some(Vec2::splat(4.0)), ..Sprite::from_image(empty(world, [4, 0])) };
+            world.spawn((sized, Name::new("ghost")));
+        }),
+        ("0x0", |world| {
+            let tileset = empty(world, [0, 0]);
+            let layer = TileLayer { tileset, columns: 1, rows: 1, cells: vec![0], outside: 0 };
+            world.spawn((layer, Name::new("ghost")));
         }),
         ("Tiled", |world| {
             let image_mode = SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 1.0 };

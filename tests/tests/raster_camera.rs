@@ -10,7 +10,10 @@ use bevy_playbot::{
     raster::{RasterPlugin, RasterSensor},
     vision::{Difference, Frame, ImageOptions, TileLayer},
 };
-use playbot_games::coinrun::{CoinRun, picture::VIEW};
+use playbot_games::{
+    ant::{Ant, walk::Walker},
+    coinrun::{CoinRun, picture::VIEW},
+};
 use playbot_tests::scene::{camera_world, draw, image, spawn_eye};
 
 /// A World with a camera and a raster that see the same, each an agent.
@@ -179,6 +182,78 @@ fn tiles_look_the_same() {
         world.despawn(layer);
     }
     total.check();
+}
+
+#[test]
+fn a_grid_without_cells_is_its_outside() {
+    let (mut world, [camera, raster]) = both_eyes(13.0, [64, 48]);
+    let dice = &mut Dice(3);
+    let texels: Vec<[u8; 4]> = (0..32).map(|_| [(); 4].map(|()| draw(&mut dice.0, 256) as u8 | 128)).collect();
+    let tileset = world.resource_mut::<Assets<Image>>().add(image(4, &texels));
+    let layer = world.spawn(Transform::default()).id();
+    for (columns, rows, outside) in [(0, 0, 1), (3, 0, 0), (0, 2, 1), (0, 0, TileLayer::EMPTY)] {
+        for scale in [0.7, 4.0] {
+            let mut place = Transform::from_translation((dice.point(0.5) * scale).extend(-1.0));
+            place.scale = Vec3::new(scale, scale, 1.0);
+            let grid = TileLayer { tileset: tileset.clone(), columns, rows, cells: Vec::new(), outside };
+            world.entity_mut(layer).insert((grid, place));
+            world.tick().expect("nothing is wrong with it");
+            let difference = difference(&world, camera, raster);
+            assert!(difference.close > 0.98, "{columns} x {rows}, outside {outside}, scale {scale}: {difference:?}");
+            let black = world.get::<Frame>(raster).expect("an eye").pixels.iter().filter(|p| **p == [0, 0, 0, 255]);
+            let expected = if outside == TileLayer::EMPTY { 64 * 48 } else { 0 };
+            assert_eq!(black.count(), expected, "all of the picture, or nothing");
+        }
+    }
+    // And cells may come and go.
+    let cells = vec![0, 1, TileLayer::EMPTY, 0];
+    world.entity_mut(layer).insert(TileLayer { tileset, columns: 2, rows: 2, cells, outside: 1 });
+    world.tick().expect("sound");
+    assert!(difference(&world, camera, raster).close > 0.98);
+}
+
+/// Plays an ant on the open floor before both eyes, for a number of ticks, and returns how far it got.
+fn ant_walks(world: &mut World, player: Entity, watcher: Entity, ticks: u32) -> f32 {
+    let mut farthest = 0.0f32;
+    let mut total = Total::default();
+    for _ in 0..ticks {
+        world.tick().expect("sound");
+        let walker = world.get::<Walker>(player).expect("an ant");
+        farthest = farthest.max(walker.body.torso().0.truncate().length());
+        let seen = difference(world, player, watcher);
+        assert!(seen.close > 0.97, "{seen:?}");
+        total.add(seen);
+    }
+    total.check();
+    farthest
+}
+
+#[test]
+fn the_open_floor_of_the_ant_looks_the_same_and_has_no_edge() {
+    let game = Ant;
+    let mut world = camera_world(|app| {
+        game.build(app, "goal");
+        app.add_plugins(RasterPlugin);
+        game.build_picture(app);
+    });
+    let [player, other] = [0, 1].map(|index| game.spawn_agent(&mut world, index));
+    let width = game.picture().expect("it is drawn").width;
+    let options = ImageOptions::default();
+    for agent in [player, other] {
+        let still = Action(ActionValue::Continuous(vec![0.0; 8]));
+        let sensor = CameraSensor::following(agent, width, options);
+        world.entity_mut(agent).insert((sensor, Control::Human, still, LevelQueue::Always(0)));
+    }
+    let sensor = RasterSensor::following(player, width, options);
+    let watcher = world.spawn((Agent::new(2, ActionSpace::Discrete(2)), Control::Human, sensor)).id();
+    assert!(ant_walks(&mut world, player, watcher, 5) < 2.0);
+    // Far from where it began.
+    let mut walker = world.get_mut::<Walker>(player).expect("an ant");
+    let mut state = walker.body.state();
+    state.qpos[0] += 37.3;
+    state.qpos[1] -= 61.9;
+    walker.body.set_state(&state);
+    assert!(ant_walks(&mut world, player, watcher, 5) > 70.0);
 }
 
 #[test]

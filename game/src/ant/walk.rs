@@ -54,7 +54,7 @@ impl Task {
     /// The level from above: the first goal, and the floor around. `None` where there are more goals to come.
     pub(super) fn floor_plan(self, level: u64) -> Option<FloorPlan> {
         let bounds = Rect::from_center_size(Vec2::ZERO, Vec2::splat(2.0 * GOAL_DISTANCE + 4.0));
-        let plan = |goal| FloorPlan { bounds, walls: Vec::new(), start: Vec2::ZERO, goal };
+        let plan = |goal| FloorPlan { bounds, start: Vec2::ZERO, goal, ..FloorPlan::default() };
         (self == Self::Goal).then(|| plan(self.begin(level).goal))
     }
 

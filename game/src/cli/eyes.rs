@@ -63,6 +63,7 @@ const GAP: usize = 8;
 #[derive(Clone, Serialize)]
 struct Compared {
     level: u64,
+    /// Tick of the episode, from 0.
     tick: u32,
     #[serde(flatten)]
     difference: Difference,
@@ -140,6 +141,7 @@ fn spread(to: &mut Vec<Compared>, level: &mut Vec<Compared>, count: usize) {
 /// A picture with its moment.
 struct Seen {
     level: u64,
+    /// Tick of the episode, from 0, that began with it: as `playbot view --tick` counts.
     tick: u32,
     pixels: Vec<[u8; 4]>,
 }
@@ -160,7 +162,7 @@ impl Looker {
         Ok(Self { world, agent })
     }
 
-    /// The picture that the next tick begins with; `None` when all levels have been played.
+    /// Plays a tick and returns the picture that it began with; `None` when all levels have been played.
     fn tick(&mut self) -> Result<Option<Seen>, CliError> {
         tick_world(&mut self.world)?;
         if !self.world.get::<Control>(self.agent).is_some_and(|control| control.is_active()) {
@@ -168,7 +170,9 @@ impl Looker {
         }
         let episode = self.world.get::<Episode>(self.agent).expect("required by Agent");
         let frame = self.world.get::<Frame>(self.agent).expect("required by sensors");
-        Ok(Some(Seen { level: episode.level, tick: episode.tick, pixels: frame.pixels.clone() }))
+        // The tick has been counted since.
+        let tick = episode.tick.saturating_sub(1);
+        Ok(Some(Seen { level: episode.level, tick, pixels: frame.pixels.clone() }))
     }
 }
 
@@ -217,7 +221,7 @@ fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), Cli
         })
         .collect();
     let step = side * ENLARGE + GAP;
-    let mut screen = Screen::new(3 * step - GAP, side * ENLARGE, [255; 3]);
+    let mut screen = Screen::new(3 * step - GAP, side * ENLARGE, [255; 3])?;
     for (place, picture) in [raster, camera, &apart].into_iter().enumerate() {
         screen.frame(picture, side, ENLARGE, (place * step, 0));
     }

@@ -114,7 +114,8 @@ fn timed<T>(
     let summary = summarize(name, &plan.split, &episodes);
     if summary.clipped > 0.0 {
         eprintln!(
-            "{name}: {:.1} % of the actions lay outside the game's range and were clipped",
+            "{name} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
+            plan.split,
             100.0 * summary.clipped
         );
     }

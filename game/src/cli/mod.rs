@@ -12,6 +12,8 @@ mod footprints;
 mod interrupt;
 mod learn_skills;
 mod level;
+#[cfg(all(target_os = "linux", feature = "camera"))]
+mod mesa;
 mod methods;
 mod number;
 mod output;
@@ -105,6 +107,8 @@ enum Verb {
 
 /// Runs the command line on the process's arguments.
 pub fn main() -> ExitCode {
+    #[cfg(all(target_os = "linux", feature = "camera"))]
+    mesa::hush();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
+    game::UnknownName,
     learner::DeviceKind,
     report::StudyReport,
     train::{
         Experiment,
-        run_dir::write_atomically,
+        run_dir::{is_unborn, write_atomically},
         study::{StudyRun, study_runs},
         worlds::default_threads,
     },
@@ -17,7 +18,7 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment::ExperimentArgs,
+    experiment::{ExperimentArgs, quoted},
     interrupt,
     number::at_least_one,
     progress,
@@ -31,10 +32,14 @@ use crate::registry;
 #[command(after_help = "Examples:
   playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
+  playbot study --experiment my.ron --variant full --variant no-kl --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
+    /// Only this variant of the experiment's; may be given several times. All of them if none is named.
+    #[arg(long, value_name = "NAME")]
+    variant: Vec<String>,
     /// Seeds, instead of the experiment's.
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
@@ -63,8 +68,9 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
-    let experiment = args.from.load([seeds])?;
-    let runs = study_runs(&experiment)?;
+    let mut experiment = args.from.load([seeds])?;
+    let runs = chosen(study_runs(&experiment)?, &args.variant)?;
+    experiment.variants.retain(|variant| runs.iter().any(|run| run.variant == variant.name));
     check_games(&runs)?;
     let folder = runs_folder(&args);
     check_folder(&folder, &args)?;
@@ -74,6 +80,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     }
     interrupt::listen();
     let mut runner = Runner::new(&folder, args.force, args.device, args.threads);
+    runner.check_folders(&runs)?;
     if args.force {
         runner.check_demos(&runs)?;
     }
@@ -126,9 +133,22 @@ fn say(bar: &ProgressBar, line: &str) {
     bar.suspend(|| eprintln!("{line}"));
 }
 
+/// The runs of some variants, in the order of the experiment; of all variants if none is named.
+fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>, CliError> {
+    let mut names: Vec<&str> = runs.iter().map(|run| run.variant.as_str()).collect();
+    names.dedup();
+    if let Some(unknown) = variants.iter().find(|name| !names.contains(&name.as_str())) {
+        return Err(UnknownName::new("variant", unknown, &names).into());
+    }
+    runs.retain(|run| variants.is_empty() || variants.contains(&run.variant));
+    Ok(runs)
+}
+
 fn check_games(runs: &[StudyRun]) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
-        experiment.check_levels(registry::game(&experiment.game)?)?;
+        let game = registry::game(&experiment.game)?;
+        experiment.check_levels(game)?;
+        experiment.check_memory(game)?;
     }
     Ok(())
 }
@@ -140,7 +160,8 @@ fn runs_folder(args: &Args) -> PathBuf {
 
 /// Runs that are there are neither overwritten nor mixed with new ones unless somebody says so.
 fn check_folder(folder: &Path, args: &Args) -> Result<(), CliError> {
-    let is_used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    let is_used =
+        std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| !is_unborn(&entry.path())));
     if !is_used || args.resume || args.force {
         return Ok(());
     }
@@ -169,6 +190,9 @@ fn command(args: &Args) -> String {
     for set in &args.from.set {
         push("set", set.clone());
     }
+    for variant in &args.variant {
+        push("variant", variant.clone());
+    }
     if !args.seeds.is_empty() {
         push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
     }
@@ -183,10 +207,4 @@ fn command(args: &Args) -> String {
 fn restart(args: &Args) -> String {
     let runs = args.runs.as_ref().map(|path| format!(" --runs {}", quoted(&path.display().to_string())));
     command(args) + &runs.unwrap_or_default()
-}
-
-/// A word for the shell.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
-    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -101,7 +101,7 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 }
 
 fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
-    let (run, saved, _) = RunDir::open(&args.run)?;
+    let (run, saved, _) = RunDir::open_to_write(&args.run)?;
     let game = registry::game(&saved.game)?;
     let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
     let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
@@ -118,7 +118,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 ///
 /// # Errors
 ///
-/// It exists and `force` is off, or it cannot be written.
+/// It exists and `force` is off, it is in use or no run, or it cannot be written.
 pub fn create_run(
     path: &Path,
     game: &dyn Game,
@@ -127,8 +127,23 @@ pub fn create_run(
     device: DeviceKind,
     force: bool,
 ) -> Result<RunDir, RunError> {
+    let info = run_info(game, experiment, skills, device)?;
+    RunDir::create(path, &experiment.without_study(), &info, force)
+}
+
+/// What the folder of a run says of it.
+///
+/// # Errors
+///
+/// The skill model's file cannot be read.
+pub fn run_info(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&Path>,
+    device: DeviceKind,
+) -> Result<RunInfo, RunError> {
     let skills = skills.filter(|_| experiment.algorithm.needs_skills());
-    let info = RunInfo {
+    Ok(RunInfo {
         algorithm: experiment.algorithm,
         seed: experiment.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -136,8 +151,7 @@ pub fn create_run(
         game_version: game.version(),
         skills: skills.map(file_checksum).transpose()?,
         device,
-    };
-    RunDir::create(path, &experiment.without_study(), &info, force)
+    })
 }
 
 /// Trains to the end of the experiment or to Ctrl-C, with progress bar, log and checkpoints. Returns whether the end

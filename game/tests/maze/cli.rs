@@ -32,6 +32,10 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
     assert_eq!(level(&["antmaze", "--map", "xl"])["shortest_path_length"], 29);
     let (ball, ant) = (level(&["maze2d", "--map", "umaze"]), level(&["antmaze", "--map", "umaze"]));
     assert_eq!((&ball["goal"], &ant["goal"]), (&json!([1, 1]), &json!([3, 1])));
+    assert_eq!(
+        (level(&["maze2d-sighted", "--map", "umaze"]), level(&["antmaze-sighted", "--map", "umaze"])),
+        (ball, ant)
+    );
 }
 
 #[test]

@@ -61,7 +61,7 @@ impl Desk {
         let mut seat = Seat { desk: self, program, window: String::new() };
         seat.wait("a window", |seat| {
             // Only the words for people begin like this: the window has started to play.
-            let found = seat.desk.xdotool(&["search", "--name", "^[a-z0-9-]+ .* tick"]);
+            let found = seat.desk.xdotool(&["search", "--name", &format!("^{} .* tick", args[1])]);
             seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
             !seat.window.is_empty()
         });

@@ -88,6 +88,30 @@ fn a_person_wins_hands_over_and_takes_over() {
 }
 
 #[test]
+fn an_ant_on_the_open_floor_is_played_with_keys() {
+    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let mut seat = desk.open(folder.path(), &["play", "ant", "--mode", "goal", "--record", "a.demo"]);
+    seat.hold(&["Left"]);
+    seat.pass_ticks(25);
+    let picture = desk.pixels(SIDE);
+    let colour = |x: usize, y: usize| [16, 8, 0].map(|shift| picture[y * SIDE + x] >> shift & 255);
+    // The corners show floor, light grey.
+    for (x, y) in [(20, 20), (SIDE - 20, 20), (20, SIDE - 20), (SIDE - 20, SIDE - 20)] {
+        assert!(colour(x, y).iter().all(|channel| (170..=215).contains(channel)), "{:?} at {x}, {y}", colour(x, y));
+    }
+    let [red, _, blue] = colour(SIDE / 2, SIDE / 2);
+    assert!(red > blue + 60, "the ant is in the middle");
+    seat.release(&["Left"]);
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+    verified(folder.path(), "a.demo");
+    let EpisodeActions::Continuous { .. } = &episodes(folder.path(), "a.demo")[0].actions else {
+        panic!("an ant's actions are numbers")
+    };
+}
+
+#[test]
 fn a_crash_costs_the_running_episode_only() {
     let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
     let args = ["play", "coinrun", "--seed", "0", "--record", "a.demo"];

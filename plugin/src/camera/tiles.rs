@@ -18,7 +18,8 @@ use crate::{fault::Faults, vision::TileLayer};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TileLayerPlugin;
 
-/// World units that a [`TileLayer`] is drawn beyond its grid, with its `outside` tile.
+/// World units that a [`TileLayer`] is drawn beyond its grid, with its `outside` tile. A grid without cells is drawn as
+/// far around its origin, and half a cell more.
 ///
 /// Sensors raise it to half of what they see, which is as much as can come into view of an agent in the grid, and not
 /// so much that it would cover the arena next door.
@@ -87,11 +88,10 @@ fn dress_tiles(
         if !layer.is_changed() && !border.is_changed() {
             continue;
         }
-        if layer.cells.len() != layer.columns as usize * layer.rows as usize || layer.cells.is_empty() {
+        if !layer.is_complete() {
             let TileLayer { columns, rows, cells, .. } = &*layer;
             faults.report(format!(
-                "tile layer {entity} has {} cells; with {columns} columns and {rows} rows it needs one for each, and \
-                 at least one",
+                "tile layer {entity} has {} cells; with {columns} columns and {rows} rows it needs one for each",
                 cells.len()
             ));
             continue;
@@ -116,7 +116,12 @@ fn dress_tiles(
 
 /// The grid with its border, in cells.
 fn rectangle(layer: &TileLayer, border: f32) -> Mesh {
-    let border = if layer.outside == TileLayer::EMPTY { 0.0 } else { border.ceil() };
+    let border = match layer.outside {
+        TileLayer::EMPTY => 0.0,
+        // Nothing can be in it: what is seen is around a place half a cell from its origin at most.
+        _ if layer.cells.is_empty() => border.ceil() + 1.0,
+        _ => border.ceil(),
+    };
     let (left, right) = (-border, layer.columns as f32 + border);
     let (bottom, top) = (-border, layer.rows as f32 + border);
     let corners = vec![[left, bottom, 0.0], [right, bottom, 0.0], [right, top, 0.0], [left, top, 0.0]];
@@ -126,8 +131,13 @@ fn rectangle(layer: &TileLayer, border: f32) -> Mesh {
 }
 
 fn cell_image(layer: &TileLayer) -> Image {
-    let size = Extent3d { width: layer.columns, height: layer.rows, depth_or_array_layers: 1 };
-    let bytes = layer.cells.iter().flat_map(|cell| cell.to_ne_bytes()).collect();
+    // No texture is empty: a grid without cells gets one that is never looked up.
+    let (cells, width, height) = match &*layer.cells {
+        [] => (&[TileLayer::EMPTY][..], 1, 1),
+        cells => (cells, layer.columns, layer.rows),
+    };
+    let size = Extent3d { width, height, depth_or_array_layers: 1 };
+    let bytes = cells.iter().flat_map(|cell| cell.to_ne_bytes()).collect();
     let mut image = Image::new(size, TextureDimension::D2, bytes, TextureFormat::R16Uint, RenderAssetUsages::default());
     image.sampler = ImageSampler::nearest();
     image

@@ -3,6 +3,8 @@
 use bevy::prelude::*;
 use thiserror::Error;
 
+use crate::vision::NO_IMAGE;
+
 /// Why a picture cannot be drawn. Entities are named where this is reported.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(super) enum RasterError {
@@ -21,12 +23,14 @@ pub(super) enum RasterError {
 /// Why an entity cannot be drawn.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(super) enum Undrawable {
-    #[error("the sprite has no image; set `Sprite::image`, or `custom_size` for a rectangle of one colour")]
+    #[error("the sprite has no image: {NO_IMAGE}")]
     NoImage,
     #[error("the image is not loaded; wait for it before the first episode, or add it to `Assets<Image>`")]
     NotLoaded,
     #[error("the image's pixels were given to the GPU and dropped; load it with `RenderAssetUsages::default()`")]
     NoPixels,
+    #[error("the image has no pixels: its size is {width}x{height}; it must have at least one")]
+    Empty { width: u32, height: u32 },
     #[error("images of format {0} cannot be drawn; use Rgba8UnormSrgb, Bgra8UnormSrgb or Rgba8Unorm")]
     Format(String),
     #[error(

@@ -1,6 +1,6 @@
 //! Everything that is drawn on a stage.
 
-use bevy::{asset::AssetId, ecs::system::SystemParam, prelude::*, sprite::Anchor};
+use bevy::{ecs::system::SystemParam, prelude::*, sprite::Anchor};
 
 use super::{
     error::{RasterError, Undrawable},
@@ -8,7 +8,7 @@ use super::{
     quad::{Part, Quad, lay_out},
     texture::{TextureId, Textures},
 };
-use crate::vision::{Stage, TileLayer};
+use crate::vision::{Stage, TileLayer, lacks_image};
 
 /// Something to draw, in the coordinates of its stage.
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +138,7 @@ impl Gathering<'_, '_, '_> {
     }
 
     fn sprite(&mut self, sprite: &Sprite, anchor: &Anchor, pose: &Pose) -> Result<Item, Undrawable> {
-        if sprite.custom_size.is_none() && sprite.image.id() == AssetId::default() {
+        if lacks_image(sprite) {
             return Err(Undrawable::NoImage);
         }
         let texture = self.textures.find(&sprite.image, &self.stages.images)?;
@@ -149,13 +149,13 @@ impl Gathering<'_, '_, '_> {
     }
 
     fn tiles(&mut self, entity: Entity, layer: &TileLayer, pose: &Pose) -> Result<Item, Undrawable> {
-        let TileLayer { columns, rows, ref cells, .. } = *layer;
-        if cells.len() != columns as usize * rows as usize {
+        if !layer.is_complete() {
+            let TileLayer { columns, rows, ref cells, .. } = *layer;
             return Err(Undrawable::Cells { cells: cells.len(), columns, rows });
         }
         let texture = self.textures.find(&layer.tileset, &self.stages.images)?;
         let strip = self.textures.get(texture);
-        if strip.width == 0 || strip.height == 0 || !strip.height.is_multiple_of(strip.width) {
+        if !strip.height.is_multiple_of(strip.width) {
             return Err(Undrawable::Strip { width: strip.width, height: strip.height });
         }
         let quad = Quad { corner: pose.at.truncate(), across: pose.x.truncate(), up: pose.y.truncate() };

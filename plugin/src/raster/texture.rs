@@ -18,7 +18,7 @@ pub(super) enum Cover {
     Blended,
 }
 
-/// An image, top row first.
+/// An image of at least one texel, top row first.
 #[derive(Clone, Debug)]
 pub(super) struct Texture {
     pub width: u32,
@@ -34,8 +34,11 @@ impl Texture {
     }
 
     fn of(image: &Image) -> Result<Self, Undrawable> {
-        let bytes = image.data.as_ref().ok_or(Undrawable::NoPixels)?;
         let (width, height) = (image.width(), image.height());
+        if width == 0 || height == 0 {
+            return Err(Undrawable::Empty { width, height });
+        }
+        let bytes = image.data.as_ref().ok_or(Undrawable::NoPixels)?;
         // The type of the format has no name in a program without a renderer.
         let format = format!("{:?}", image.texture_descriptor.format);
         let convert: fn([u8; 4]) -> Rgba = match format.as_str() {

@@ -284,7 +284,8 @@ impl Trainer {
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
     experiment.check()?;
     experiment.check_levels(game)?;
-    Ok(experiment.sight().check(game)?)
+    experiment.sight().check(game)?;
+    Ok(experiment.check_memory(game)?)
 }
 
 impl Progress {

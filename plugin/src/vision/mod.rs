@@ -20,6 +20,7 @@ mod options;
 mod planes;
 mod plugin;
 mod sight;
+mod sprite_image;
 mod stack;
 mod stage;
 mod tile_layer;
@@ -37,6 +38,7 @@ pub use tile_layer::TileLayer;
 pub use velocity::PaintedVelocity;
 
 pub(crate) use compose::is_observed;
+pub(crate) use sprite_image::{NO_IMAGE, lacks_image};
 
 use bevy::ecs::schedule::SystemSet;
 

@@ -7,14 +7,18 @@ use bevy::prelude::*;
 ///
 /// The tileset is a vertical strip of square tiles: tile `i` is rows `i * w..(i + 1) * w` of an image of width `w`.
 /// Pixels of a tile are drawn or not: an alpha of at least 128 is opaque.
+///
+/// A grid without cells is a ground that is the same everywhere: its `outside`. Cameras draw what is outside as far as
+/// can be seen from the grid (see their `TileBorder`), so a game whose agents leave it must move the layer along, by whole
+/// cells.
 #[derive(Component, Clone, Debug)]
 #[require(Transform, Visibility)]
 pub struct TileLayer {
     /// The strip of tiles.
     pub tileset: Handle<Image>,
-    /// Cells from left to right.
+    /// Cells from left to right; may be 0.
     pub columns: u32,
-    /// Cells from bottom to top.
+    /// Cells from bottom to top; may be 0.
     pub rows: u32,
     /// `rows * columns` tile numbers, bottom row first; [`TileLayer::EMPTY`] is not drawn.
     pub cells: Vec<u16>,
@@ -25,6 +29,11 @@ pub struct TileLayer {
 impl TileLayer {
     /// The number of no tile.
     pub const EMPTY: u16 = u16::MAX;
+
+    /// Whether there is a tile number for every cell.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.cells.len() == self.columns as usize * self.rows as usize
+    }
 
     /// The tile at a cell, inside or outside the grid.
     #[inline]

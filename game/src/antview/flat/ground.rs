@@ -7,7 +7,7 @@ use super::{
     GROUND,
     art::{Art, FLOOR, WALL},
 };
-use crate::antview::Ground;
+use crate::antview::{AntPose, Ground, OnGround};
 
 /// From the corner of one arena to the corner of the next, metres. Cameras see several arenas where mazes have more than
 /// 120 cells to the side; sensors that draw by themselves never do.
@@ -52,5 +52,27 @@ pub fn tiles(
         let [x, y] = ground.corner;
         let place = Transform::from_xyz(x, y, GROUND).with_scale(Vec3::new(ground.cell, ground.cell, 1.0));
         commands.entity(tiling.0).insert((layer, place));
+    }
+}
+
+/// Keeps the origin of an open floor's tiles within half a cell of its ant: they are alike, so nobody sees them move, and
+/// a floor that is drawn as far as one can see from its origin has no edge.
+pub fn follow(
+    ants: Query<(&AntPose, &OnGround)>,
+    grounds: Query<(&Ground, &Tiling)>,
+    mut tilings: Query<&mut Transform, With<TileLayer>>,
+) {
+    for (pose, on_ground) in &ants {
+        let Ok((ground, tiling)) = grounds.get(on_ground.0) else { continue };
+        let Ok(mut place) = tilings.get_mut(tiling.0) else { continue };
+        if !ground.is_wall.is_empty() {
+            continue;
+        }
+        let corner = Vec2::from(ground.corner);
+        let cells = ((pose.0[0].centre.truncate() - corner) / ground.cell).round();
+        let at = (corner + cells * ground.cell).extend(GROUND);
+        if place.translation != at {
+            place.translation = at;
+        }
     }
 }

@@ -28,6 +28,8 @@ pub(super) fn build(app: &mut App) {
     let art = Art::add_to(&mut images);
     app.insert_resource(art).init_resource::<ground::Stages>().add_systems(
         ObserveSchedule,
-        (ground::stages, ground::tiles, limbs::dress, limbs::pose, limbs::goals).chain().in_set(AntViewSystems::Draw),
+        (ground::stages, ground::tiles, ground::follow, limbs::dress, limbs::pose, limbs::goals)
+            .chain()
+            .in_set(AntViewSystems::Draw),
     );
 }

@@ -66,5 +66,5 @@ fn draw(game: &dyn Game, level: &Level) -> Result<Vec<u8>, CliError> {
     world.entity_mut(agent).insert((RasterSensor { target: centre, width }, Control::Human, seed));
     world.tick()?;
     let seen = world.get::<Observation>(agent).expect("required by Agent");
-    Ok(Film::new(image, 1, game.tick_hz()).still(&seen.image)?.0)
+    Ok(Film::new(image, 1, game.tick_hz())?.still(&seen.image)?.0)
 }

@@ -21,16 +21,16 @@ const OUTLINE: f32 = 1.5;
 ///
 /// It is too large for a PNG.
 pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, CliError> {
-    film::to_png(&paint(drawing))
+    film::to_png(&paint(drawing)?)
 }
 
-fn paint(drawing: &Drawing) -> Screen {
+fn paint(drawing: &Drawing) -> Result<Screen, CliError> {
     let size = (drawing.size * ZOOM).ceil().as_uvec2();
-    let mut screen = Screen::new(size.x as usize, size.y as usize, [255; 3]);
+    let mut screen = Screen::new(size.x as usize, size.y as usize, [255; 3])?;
     for shape in &drawing.shapes {
         add(&mut screen, shape);
     }
-    screen
+    Ok(screen)
 }
 
 fn add(screen: &mut Screen, shape: &Shape) {
@@ -144,7 +144,7 @@ mod tests {
                 outline: blue,
             },
         ];
-        let screen = paint(&Drawing { label: String::new(), size: Vec2::new(20.0, 30.0), shapes });
+        let screen = paint(&Drawing { label: String::new(), size: Vec2::new(20.0, 30.0), shapes }).expect("small");
         assert_eq!((screen.width, screen.height), (40, 60));
         assert_eq!((pixel(&screen, 2, 2), pixel(&screen, 9, 5)), (red, red));
         assert_eq!((pixel(&screen, 1, 2), pixel(&screen, 10, 5)), ([255; 3], [255; 3]));
@@ -165,7 +165,7 @@ mod tests {
             Shape::Mark { form: MarkForm::Disc, centre: -far, radius: 5.0, fill: [0; 3], outline: [0; 3] },
             Shape::Text { at: far, size: 13.0, colour: [0; 3], words: "far".to_owned() },
         ];
-        let screen = paint(&Drawing { label: String::new(), size: Vec2::splat(10.0), shapes });
+        let screen = paint(&Drawing { label: String::new(), size: Vec2::splat(10.0), shapes }).expect("small");
         assert_eq!((pixel(&screen, 10, 10), pixel(&screen, 19, 0)), ([0; 3], [255; 3]));
     }
 }

@@ -7,7 +7,7 @@ use bevy_playbot::{
     runs::{RunRecord, changed_settings},
     train::{
         checkpoint::Checkpoint,
-        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     },
 };
 use serde_json::{Value, json};
@@ -48,6 +48,12 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let run = RunRecord::read(&args.run)?;
     run.curves.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let curves = curves(&run, &args.metric)?;
+    if args.plot.is_some() && curves.is_empty() {
+        return Err(CliError::Usage(format!(
+            "{}: no episode has ended yet, so there is no curve to draw: train for longer, or name a --metric",
+            run.path.display()
+        )));
+    }
     if args.json {
         print_line(full_json(&run))?;
     } else {
@@ -167,6 +173,7 @@ fn chart(run: &RunRecord, tag: &str, curve: &[(u64, f64)]) -> Chart {
         x_label: "environment steps".to_owned(),
         y_label: format!("{} on {}, seed {}", run.info.algorithm, run.experiment.game, run.info.seed),
         curves: vec![Curve::new("", points)],
+        y_range: range_of(tag),
         marks: Vec::new(),
     }
 }

@@ -24,8 +24,15 @@ pub struct Film {
 
 impl Film {
     /// Pictures of this form, each pixel enlarged to a square of `scale` pixels, `tick_hz` of them in a second.
-    pub fn new(options: ImageOptions, scale: u32, tick_hz: f64) -> Self {
-        Self { options, scale: scale as usize, tick_hz }
+    ///
+    /// # Errors
+    ///
+    /// Such a picture is too large.
+    pub fn new(options: ImageOptions, scale: u32, tick_hz: f64) -> Result<Self, CliError> {
+        let film = Self { options, scale: scale as usize, tick_hz };
+        let [width, height] = film.size();
+        Screen::check_size(width, height)?;
+        Ok(film)
     }
 
     /// One observation ([`Observation::image`](bevy_playbot::observation::Observation::image)) and nothing else; stacked pictures side by side, the oldest on the left.
@@ -35,7 +42,7 @@ impl Film {
     /// The picture is too large for a PNG.
     pub fn still(&self, image: &[u8]) -> Result<Png, CliError> {
         let [width, height] = self.size();
-        let mut screen = Screen::new(width, height, BACKGROUND);
+        let mut screen = Screen::new(width, height, BACKGROUND)?;
         self.draw(&mut screen, image);
         Ok((to_png(&screen)?, [width, height]))
     }
@@ -50,7 +57,7 @@ impl Film {
         let width = width.max(NARROWEST);
         let skills = shots.iter().map(|shot| shot.skill.len()).max().unwrap_or(0);
         let caption = Caption::new(width, skills);
-        let mut screen = Screen::new(width, height + caption.height(), BACKGROUND);
+        let mut screen = Screen::new(width, height + caption.height(), BACKGROUND)?;
         let mut bytes = Vec::new();
         self.encode(&mut bytes, &mut screen, shots, &caption, drawn).map_err(too_large)?;
         Ok((bytes, [screen.width, screen.height]))

@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn texts_take_the_width_that_was_announced() {
         let text = "Tick 12: right+jump?";
-        let mut screen = Screen::new(2 * width(text), 2 * HEIGHT, [0; 3]);
+        let mut screen = Screen::new(2 * width(text), 2 * HEIGHT, [0; 3]).expect("small");
         write(&mut screen, text, 2, (0, 0), [255; 3]);
         let lit = |x: usize| (0..screen.height).any(|y| screen.bytes()[3 * (y * screen.width + x)] > 0);
         assert!(lit(screen.width - 3) && !lit(screen.width - 1), "a free column after the last letter");

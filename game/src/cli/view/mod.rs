@@ -82,11 +82,14 @@ pub struct Args {
     json: bool,
 }
 
+/// Most memory for the observations of an episode.
+const MOST_BYTES: usize = 1 << 30;
+
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     let (mut stage, sight, name) = open_stage(game, &args)?;
+    let film = Film::new(sight.image, args.scale, game.tick_hz())?;
     let shots = take(&mut stage, &args)?;
-    let film = Film::new(sight.image, args.scale, game.tick_hz());
     let (bytes, size) = if args.episode {
         let bar = progress::bar("draw", shots.len() as u64, "frames");
         let drawn = film.animated(&shots, || bar.inc(1));
@@ -158,11 +161,19 @@ fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<bevy_playbo
 fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
     interrupt::listen();
     let bar = progress::bar("play", 0, "ticks");
-    let mut shots = Vec::new();
+    let (mut shots, mut kept) = (Vec::new(), 0);
     while let Some(shot) = stage.next()? {
         bar.set_length(u64::from(shot.tick) + 1);
         bar.set_position(u64::from(shot.tick) + 1);
         if args.episode {
+            kept += shot.image.len();
+            if kept > MOST_BYTES {
+                return Err(CliError::Usage(format!(
+                    "the pictures of {} ticks take more than {} MiB of memory: try smaller pictures, or a shorter stack",
+                    shot.tick,
+                    MOST_BYTES >> 20
+                )));
+            }
             shots.push(shot);
         } else if shot.tick == args.tick {
             shots.push(shot);

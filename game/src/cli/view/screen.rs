@@ -1,5 +1,10 @@
 //! A picture for people, and what is drawn on it.
 
+use crate::cli::error::CliError;
+
+/// Most pixels of a picture, which take 384 MiB. The longest stack of the usual 64 x 64 fits at the largest scale.
+const MOST_PIXELS: usize = 1 << 27;
+
 /// Red, green, blue.
 pub type Colour = [u8; 3];
 
@@ -14,8 +19,28 @@ pub struct Screen {
 
 impl Screen {
     /// An empty screen.
-    pub fn new(width: usize, height: usize, colour: Colour) -> Self {
-        Self { width, height, pixels: vec![colour; width * height] }
+    ///
+    /// # Errors
+    ///
+    /// It is too large: see [`check_size`](Self::check_size).
+    pub fn new(width: usize, height: usize, colour: Colour) -> Result<Self, CliError> {
+        Self::check_size(width, height)?;
+        Ok(Self { width, height, pixels: vec![colour; width * height] })
+    }
+
+    /// Checks that a screen of this size is not too large.
+    ///
+    /// # Errors
+    ///
+    /// It has more than 2^27 pixels.
+    pub fn check_size(width: usize, height: usize) -> Result<(), CliError> {
+        if width.checked_mul(height).is_some_and(|pixels| pixels <= MOST_PIXELS) {
+            return Ok(());
+        }
+        Err(CliError::Usage(format!(
+            "the picture cannot be made: it would have {width} x {height} pixels, of which {MOST_PIXELS} are possible; \
+             try a smaller --scale, or smaller pictures"
+        )))
     }
 
     /// The pixels as bytes, row by row.

@@ -50,7 +50,7 @@ pub(super) fn players(
         let (column, row) = (stages.0 % ARENAS_PER_ROW, stages.0 / ARENAS_PER_ROW);
         stages.0 += 1;
         let place = Vec3::new(column as f32, row as f32, 0.0) * SPACING;
-        let backdrop = commands.spawn((ChildOf(plays_in.0), Sprite::default())).id();
+        let backdrop = commands.spawn(ChildOf(plays_in.0)).id();
         let ground = commands.spawn((ChildOf(plays_in.0), Transform::from_xyz(0.0, 0.0, GROUND))).id();
         let scenery = Scenery { backdrop, ground, dressed: 0, tick: 0 };
         commands.entity(plays_in.0).insert((Stage, Transform::from_translation(place), scenery));

@@ -1,0 +1,14 @@
+//! Which sprites have something to show.
+
+use bevy::{asset::AssetId, prelude::*};
+
+/// What to do about a sprite that [lacks an image](lacks_image).
+pub(crate) const NO_IMAGE: &str = "set `Sprite::image`, or `custom_size` for a rectangle of one colour";
+
+/// Whether a sprite shows nothing because nobody gave it an image. One with a size of its own is a rectangle of one
+/// colour, as [`Sprite::from_color`] makes them: it needs no image.
+///
+/// Bevy keeps a white texel under the handle of no image, and so draws a sprite of neither kind as a white dot.
+pub(crate) fn lacks_image(sprite: &Sprite) -> bool {
+    sprite.custom_size.is_none() && sprite.image.id() == AssetId::default()
+}
