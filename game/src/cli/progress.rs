@@ -76,7 +76,7 @@ fn told() -> MutexGuard<'static, Vec<Told>> {
 /// Tells of all work that goes on, again and again.
 fn tell() {
     loop {
-        thread::sleep(PAUSE);
+        thread::park_timeout(PAUSE);
         let mut lines = String::new();
         told().retain(|told| {
             let line = told.line();

@@ -76,26 +76,27 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         recorder = recorder.with_step_limit(steps);
     }
     world.insert_resource(recorder);
-    let rounds = chosen.len() as u64;
+    let count = chosen.len() as u64;
     let queue = if args.steps.is_some() { LevelQueue::rounds(chosen) } else { LevelQueue::list(chosen) };
     world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue));
-    let finished = play(&mut world, agent, rounds, args.steps)?;
+    let finished = play(&mut world, agent, count, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
-    let count = *world.get::<EpisodeCount>(agent).expect("required by Agent");
-    let share = 100.0 * count.successes as f64 / count.finished.max(1) as f64;
+    let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
+    let share = 100.0 * ended.successes as f64 / ended.finished.max(1) as f64;
     eprintln!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
     if finished {
         return Ok(Outcome::Pass);
     }
-    let rest = Rest { level: world.get::<Episode>(agent).map_or(levels.first, |episode| episode.level), steps };
+    let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
+    let rest = Rest { level, steps };
     eprintln!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
 }
 
 /// Where a recording was stopped.
 struct Rest {
-    /// The level that was being played.
-    level: u64,
+    /// The level that was being played, unless every level has been played already.
+    level: Option<u64>,
     /// Steps that this call has recorded.
     steps: u64,
 }
@@ -104,8 +105,10 @@ impl Rest {
     /// What is to be changed in the call. Each call begins with the first of its levels, counts its own steps, and draws
     /// the same noise from the same seed.
     fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
-        let left = LevelSplit { first: self.level, ..levels.clone() };
-        let mut changes = format!("--append --levels {left}");
+        let mut changes = "--append".to_owned();
+        if let Some(first) = self.level {
+            changes += &format!(" --levels {}", LevelSplit { first, ..levels.clone() });
+        }
         if let Some(steps) = args.steps {
             changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
         }

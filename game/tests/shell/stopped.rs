@@ -33,8 +33,8 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     let (folder, file) = (temporary.path(), temporary.path().join("a.demo"));
     let steps = ENDLESS.to_string();
     let base = ["record", "coinrun", "--out", "a.demo", "--noise", "0.2"];
-    let first = [&base[..], &["--levels", "easy:0..40", "--steps", &steps]].concat();
-    let output = interrupted(folder, &first, || fs::metadata(&file).is_ok_and(|file| file.len() > 10_000));
+    let first = [&base[..], &["--levels", "easy:0..4000", "--steps", &steps]].concat();
+    let output = interrupted(folder, &first, || fs::metadata(&file).is_ok_and(|file| file.len() > 3_000));
     let listed = |what: &str| lines(&playbot(folder, &["demo", "ls", "a.demo", "--json"]))[0][what].as_u64();
     let recorded = listed("steps").expect("a number");
     let words = errors(&output);
@@ -42,7 +42,7 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     let (advice, _) = advice.split_once('`').expect("what to change");
     assert!(words.contains("incomplete") && advice.starts_with("--append --levels easy:"), "{words}");
     let rest = (ENDLESS - recorded).to_string();
-    assert!(advice.ends_with(&format!("..40 --steps {rest} --seed 2")), "{recorded} steps: {words}");
+    assert!(advice.ends_with(&format!("..4000 --steps {rest} --seed 2")), "{recorded} steps: {words}");
 
     // As it says, but for the number of steps.
     let advice = advice.replace(&rest, "100");
