@@ -190,6 +190,7 @@ fn a_level_can_be_drawn_as_a_whole() {
 fn bad_wishes_are_refused_in_words() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("file"), "in the way").expect("writable");
+    let large = ["--image", "width=1024", "--image", "height=1024", "--image", "stack=16"];
     for (args, code, words) in [
         (&["--mode", "hrad"][..], 3, "did you mean `hard`?"),
         (&["--seed", "5000000000"], 3, "5000000000 is not in 0..=4294967295"),
@@ -200,16 +201,8 @@ fn bad_wishes_are_refused_in_words() {
         (&["--image", "widht=64"], 3, "did you mean `width`?"),
         (&["--image", "height=tall"], 3, "must be a whole number, not tall"),
         (&["--scale", "0"], 3, "0 is not in 1..=32"),
-        (
-            &["--scale", "32", "--image", "width=1024", "--image", "height=1024", "--image", "stack=16"],
-            3,
-            "smaller --scale",
-        ),
-        (
-            &["--episode", "--image", "width=1024", "--image", "height=1024", "--image", "stack=16"],
-            3,
-            "smaller pictures",
-        ),
+        (&[&large[..], &["--scale", "32"]].concat(), 3, "524768 x 32768 pixels"),
+        (&[&large[..], &["--scale", "1", "--episode"]].concat(), 3, "more than 1024 MiB of memory"),
         (&["--tick", "5000"], 3, "there is no tick 5000: the episode has"),
         (&["--demo", "none.demo"], 3, "none.demo"),
         (&["--demo", "file"], 3, "file"),

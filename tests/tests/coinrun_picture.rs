@@ -166,6 +166,72 @@ fn saws_turn_each_tick_and_enemies_step_every_five() {
     assert_eq!(saws.iter(world).len() + enemies.iter(world).len() + 4, spawned.spawns.len(), "and four crates");
 }
 
+/// Puffs of an enemy that can be seen at once.
+const PUFFS: usize = 9;
+
+/// Depth, place, size and opacity of the puffs of the only enemy, the newest first, and where that enemy is.
+fn puffs(world: &mut World) -> (Vec<[f32; 6]>, Body) {
+    let mut enemies = world.query_filtered::<(&ArenaBody, &Transform, Option<&Children>), With<Enemy>>();
+    let (body, at, children) = enemies.single(world).expect("one enemy");
+    let mut seen = Vec::new();
+    for &puff in children.into_iter().flatten() {
+        let place = at.translation + world.get::<Transform>(puff).expect("a sprite").translation;
+        let sprite = sprite(world, puff);
+        assert_eq!(sprite.rect, Some(Art::puff()));
+        let size = sprite.custom_size.expect("set");
+        seen.push([place.z, place.x, place.y, size.x, size.y, sprite.color.alpha()]);
+    }
+    seen.sort_by(|one, other| other[0].total_cmp(&one[0]));
+    (seen, body.0)
+}
+
+/// Puts the player high up, and this far to the right of the only enemy.
+fn hover(world: &mut World, agent: Entity, away: f32) {
+    let x = puffs(world).1.x + away;
+    world.get_mut::<PlayerBody>(agent).expect("a player").0 = Body { x, y: 50.0, ..Body::player() };
+}
+
+#[test]
+fn enemies_leave_puffs_that_rise_and_fade() {
+    let (mut app, agents) = drawn("hard", 1);
+    let (world, agent) = (app.world_mut(), agents[0]);
+    play(world, agent, 5);
+    let mut path = Vec::new();
+    for tick in 0..14 {
+        press(world, agent, NOTHING, 1);
+        // Now those that the next tick begins with, however often they are looked at.
+        hover(world, agent, -5.0);
+        look(world);
+        let (seen, enemy) = puffs(world);
+        look(world);
+        assert_eq!(puffs(world).0, seen);
+        path.insert(0, Vec2::new(enemy.x, enemy.y - 0.25));
+        assert_eq!(seen.len(), (tick + 1).min(PUFFS), "after tick {tick}");
+        let (mut growth, mut alpha) = (1.0, 0.5);
+        for (age, &[z, x, y, width, height, opacity]) in seen.iter().enumerate() {
+            let at = path[age] + Vec2::new(0.0, 0.01 * age as f32);
+            assert!((Vec2::new(x, y) - at).length() < 1e-5, "tick {tick}, age {age}: {x}, {y}, not {at}");
+            assert!((Vec2::new(width, height) - Vec2::new(0.6, 0.4) * growth).length() < 1e-5);
+            assert!((opacity - alpha).abs() < 1e-6);
+            assert!(z > 0.1 && z < 1.0, "between saws and crates, and enemies");
+            (growth, alpha) = (growth * 1.05, alpha * 0.8);
+        }
+    }
+    assert!(path.windows(2).all(|pair| pair[0] != pair[1]), "it walks");
+    // Far away there are none, and all at once when one comes near again.
+    for (away, count) in [(30.0, 0), (-9.0, PUFFS)] {
+        hover(world, agent, away);
+        look(world);
+        assert_eq!(puffs(world).0.len(), count);
+    }
+    // A new level begins without.
+    world.get_mut::<Episode>(agent).expect("an agent").abandon();
+    press(world, agent, NOTHING, 1);
+    hover(world, agent, -5.0);
+    press(world, agent, NOTHING, 1);
+    assert_eq!(puffs(world).0.len(), 1, "left in the first tick");
+}
+
 #[test]
 fn levels_come_and_go_without_a_trace() {
     let (mut app, agents) = drawn("hard", 3);
@@ -178,6 +244,8 @@ fn levels_come_and_go_without_a_trace() {
     let world = app.world_mut();
     let expected: usize = 3 * (generate(Mode::Hard, 5).spawns.len() + 2);
     let drawn = world.query_filtered::<(), (Or<(With<Sprite>, With<TileLayer>)>, Without<Agent>)>().iter(world).len();
+    let puffs: usize = world.query_filtered::<&Children, With<Enemy>>().iter(world).map(|puffs| puffs.len()).sum();
+    let drawn = drawn - puffs;
     assert_eq!(drawn, expected, "the bodies of the last level, a backdrop and tiles for each arena");
     let children: usize = world.query::<(&Stage, &Children)>().iter(world).map(|(_, children)| children.len()).sum();
     assert_eq!(children, expected + 3, "and the players");

@@ -10,15 +10,17 @@ const COLUMNS: usize = 16;
 /// The grounds, in the order of the level's draws.
 pub const GROUNDS: [&str; 6] = ["dirt", "grass", "planet", "sand", "snow", "stone"];
 
-/// The figures: players in a row of double height, then enemies, crates and saws, then the enemies' second steps.
+/// The figures: players in a row of double height, then enemies, crates and saws, then the enemies' second steps and a
+/// puff.
 pub fn figures(drawings: &Drawings) -> Result<Canvas, String> {
     let mut sheet = Canvas::new(COLUMNS * SIDE, 4 * SIDE);
     let poses = ["stand", "walk1", "walk2"];
     let players = (0..5).flat_map(|colour| poses.map(|pose| format!("player_{colour}_{pose}")));
     let still = (0..4).map(|number| format!("crate_{number}")).chain(["saw_1".to_owned(), "saw_2".to_owned()]);
     let enemies = |step: usize| (0..9).map(move |number| format!("enemy_{number}_{step}"));
+    let second = enemies(2).chain(["puff".to_owned()]);
     let rows: [(usize, usize, Vec<String>); 3] =
-        [(0, 2, players.collect()), (2, 1, enemies(1).chain(still).collect()), (3, 1, enemies(2).collect())];
+        [(0, 2, players.collect()), (2, 1, enemies(1).chain(still).collect()), (3, 1, second.collect())];
     for (row, height, names) in rows {
         for (column, name) in names.iter().enumerate() {
             let drawing = sized(drawings, name, height * SIDE)?;

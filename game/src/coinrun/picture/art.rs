@@ -136,6 +136,11 @@ impl Art {
         Self::cell(9 + usize::from(sprite), 2, 1)
     }
 
+    /// What an enemy leaves behind, on the sheet of figures: white.
+    pub fn puff() -> Rect {
+        Self::cell(9, 3, 1)
+    }
+
     /// A saw on the sheet of figures, in one of its two positions.
     pub fn saw(turn: usize) -> Rect {
         Self::cell(13 + turn, 2, 1)
@@ -176,7 +181,8 @@ mod tests {
         let players = (0..AGENT_THEMES as u8).flat_map(|colour| poses.map(|pose| Art::player(colour, pose)));
         let enemies = (0..ENEMY_SPRITES as u8).flat_map(|sprite| [0, 1].map(|step| Art::enemy(sprite, step)));
         let crates = (0..CRATE_SPRITES as u8).map(Art::wooden_crate);
-        let rects: Vec<_> = players.chain(enemies).chain(crates).chain([0, 1].map(Art::saw)).collect();
+        let rects: Vec<_> =
+            players.chain(enemies).chain(crates).chain([0, 1].map(Art::saw)).chain([Art::puff()]).collect();
         let texels = |rect: &Rect| -> Vec<[u8; 4]> {
             let (x, y) = (rect.min.x as u32..rect.max.x as u32, rect.min.y as u32..rect.max.y as u32);
             let bytes = |x, y| sheet.pixel_bytes(UVec3::new(x, y, 0)).expect("inside");

@@ -6,6 +6,7 @@ use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer};
 use super::{
     animate::PLAYER_HEIGHT,
     art::{Art, Pose},
+    trail::Trail,
 };
 use crate::coinrun::{
     SIZE, TileGrid,
@@ -15,7 +16,7 @@ use crate::coinrun::{
 /// Layers, the farthest first. Things of one layer lie [`STEP`] apart in the order in which they were made.
 const BACKDROP: f32 = -2.0;
 const GROUND: f32 = -1.0;
-const BLOCKS: f32 = 0.0;
+pub(super) const BLOCKS: f32 = 0.0;
 const ACTORS: f32 = 1.0;
 const STEP: f32 = 1.0 / 1024.0;
 
@@ -126,6 +127,9 @@ pub(super) fn inhabitants(
                 Sprite { rect: Some(rect), custom_size: Some(size), ..Sprite::from_image(art.figures.clone()) },
                 Transform::from_xyz(body.0.x, body.0.y, layer + scenery.dressed as f32 * STEP),
             ));
+            if enemy.is_some() {
+                commands.entity(entity).insert(Trail::new(scenery.dressed));
+            }
         }
     }
 }

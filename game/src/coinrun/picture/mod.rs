@@ -2,11 +2,12 @@
 //!
 //! Each arena becomes a [`Stage`](bevy_playbot::vision::Stage) with a backdrop, its tiles and a sprite for everything
 //! that lives in it, in the arena's own coordinates: one unit is one tile. Nothing here changes the game, and whatever is
-//! shown follows from the state of the game alone: animations count the ticks of the episode.
+//! shown follows from the episode alone: animations count its ticks, and enemies leave puffs where they were.
 
 mod animate;
 mod art;
 mod dress;
+mod trail;
 
 pub use art::{Art, Pose};
 
@@ -35,6 +36,7 @@ impl Plugin for CoinRunPicturePlugin {
                 animate::enemies,
                 animate::saws,
                 animate::moved_blocks,
+                trail::trails,
             )
                 .chain()
                 .in_set(VisionSystems::Dress),
