@@ -237,6 +237,23 @@ fn cameras_work_silently_without_a_desktop() {
     assert!(!errors(&output).contains("XDG_RUNTIME_DIR"), "{}", errors(&output));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_listening_stops_no_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let deaf = |args: &[&str]| {
+        let full = std::fs::File::create("/dev/full").expect("a disk that is always full");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        command.args(args).current_dir(folder.path()).stderr(full).output().expect("the program starts")
+    };
+    let recorded = deaf(&["record", "coinrun", "--levels", "easy:0..3", "--out", "a.demo"]);
+    assert_eq!(code(&recorded), 0);
+    let learned = deaf(&["learn-skills", "--demos", "a.demo", "--epochs", "1", "--out", "skills"]);
+    assert_eq!(code(&learned), 0);
+    assert!(folder.path().join("skills").exists());
+    assert_eq!(code(&deaf(&["level", "maze2d", "--map", "nope"])), 3, "a mistake is one even if nobody is told");
+}
+
 #[test]
 fn recording_verifying_and_repairing_from_the_shell() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -88,7 +88,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     for (name, game, mode, kind, measure) in wanted {
         let measured = match measure(*game, mode, *kind, &args) {
             Err(CliError::Vision(error)) if args.case.is_empty() => {
-                eprintln!("{name}: {error}");
+                tell!("{name}: {error}");
                 continue;
             }
             measured => measured?,

@@ -46,7 +46,7 @@ fn check(experiment: &Experiment) -> Result<(), CliError> {
     experiment.check_levels(registry::game(&experiment.game)?)?;
     let demos = experiment.demos.as_deref().filter(|_| experiment.algorithm.needs_skills());
     if let Some(path) = demos.filter(|path| !resolve(path).exists()) {
-        eprintln!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
+        tell!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
     }
     Ok(())
 }

@@ -91,7 +91,7 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
         let summary = match DemoSummary::read(&file) {
             Ok(summary) => summary,
             Err(error) => {
-                eprintln!("{error}");
+                tell!("{error}");
                 outcome = Outcome::Findings;
                 continue;
             }

@@ -18,7 +18,7 @@ pub fn listen() {
             if ASKED.swap(true, Ordering::SeqCst) {
                 std::process::exit(EXIT_CODE.into());
             }
-            eprintln!("\nstopping after this step; press Ctrl-C again to stop at once and lose it");
+            tell!("\nstopping after this step; press Ctrl-C again to stop at once and lose it");
         });
         if let Err(error) = installed {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");

@@ -83,13 +83,13 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     };
     match learn(&experiment, dataset, args.device, Some(&checkpoint), report)? {
         None => {
-            eprintln!("stopped and saved; no skill model is written yet: go on with the same command and --resume");
+            tell!("stopped and saved; no skill model is written yet: go on with the same command and --resume");
             return Ok(Outcome::Stopped);
         }
         Some(model) => {
             model.save(&args.out)?;
             remove(&checkpoint)?;
-            eprintln!("skill model written to {}", args.out.display());
+            tell!("skill model written to {}", args.out.display());
         }
     }
     Ok(Outcome::Pass)
@@ -152,13 +152,18 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
         demos = demos.at_most(steps);
     }
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
-    eprint!("{} in {} from {}", counted(steps, "step"), counted(demos.episodes() as u64, "episode"), path.display());
+    begin_to_tell!(
+        "{} in {} from {}",
+        counted(steps, "step"),
+        counted(demos.episodes() as u64, "episode"),
+        path.display()
+    );
     if experiment.demo_steps.is_some_and(|wanted| wanted < steps) {
-        eprint!(" (more than was asked for: episodes are kept whole)");
+        begin_to_tell!(" (more than was asked for: episodes are kept whole)");
     }
     match demos.picture_bytes() {
-        0 => eprintln!(),
-        bytes => eprintln!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+        0 => tell!(),
+        bytes => tell!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
     }
     let bar = progress::bar("replay recordings", steps, "steps");
     let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
@@ -220,6 +225,6 @@ fn begin(
             path.display()
         )));
     }
-    eprintln!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
+    tell!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
     Ok(trainer)
 }

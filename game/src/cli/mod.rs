@@ -1,6 +1,9 @@
 //! The command line. One file per verb; data goes to standard output, everything else to standard error.
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 
+#[macro_use]
+mod tell;
+
 mod bench;
 mod config;
 mod demo;
@@ -126,11 +129,11 @@ pub fn main() -> ExitCode {
         Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            eprintln!("error: {error}");
+            tell!("error: {error}");
             ExitCode::from(error.exit_code())
         }
         Err(_) => {
-            eprintln!("error: the program failed, which is a bug in it; please report the lines above");
+            tell!("error: the program failed, which is a bug in it; please report the lines above");
             ExitCode::from(2)
         }
     }
@@ -162,5 +165,7 @@ fn init_tracing(verbose: u8) {
     let level = ["warn,winit=error,bevy_render::renderer=error", "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    // What cannot be written is not worth a word, which could not be written either.
+    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
+    format.with_writer(std::io::stderr).init();
 }

@@ -92,7 +92,7 @@ fn export(args: &Export) -> Result<Outcome, CliError> {
     if experiment.check_test(game).is_ok() {
         command += &format!(" --levels {}", quoted(&experiment.test.to_string()));
     }
-    eprintln!("policy written to {out}: measure it with `{command}`");
+    tell!("policy written to {out}: measure it with `{command}`");
     Ok(Outcome::Pass)
 }
 

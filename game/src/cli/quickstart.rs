@@ -99,7 +99,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() }.check_memory(game)?;
     let _lock = take_folder(&args.run)?;
     let Some(skills) = skills(game, &experiment, &args)? else {
-        eprintln!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
+        tell!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
         return Ok(Outcome::Stopped);
     };
     let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
@@ -132,10 +132,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         print_line(to_text_table(&rows))?;
     }
     let comparison = compare(&trained);
-    eprintln!("{comparison}");
+    tell!("{comparison}");
     let report = args.run.join("report.html");
     write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
-    eprintln!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
+    tell!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
     Ok(Outcome::Pass)
 }
 
@@ -203,7 +203,7 @@ fn train_one(
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {
-            eprintln!("{algorithm}: the first policy is the decoder, KL {kl}");
+            tell!("{algorithm}: the first policy is the decoder, KL {kl}");
         }
         if let (Some(episodic_return), Some(success_rate)) = (report.episodic_return, report.success_rate) {
             curve.push(CurvePoint { step: report.step, episodic_return, success_rate });
@@ -216,7 +216,7 @@ fn train_one(
 
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     let run = args.run.join(algorithm.name());
-    eprintln!(
+    tell!(
         "stopped and saved; there is no report yet: go on with this training alone, `playbot train --run {} --resume`, \
          or start again with `playbot quickstart`",
         run.display()

@@ -83,13 +83,13 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let share = 100.0 * ended.successes as f64 / ended.finished.max(1) as f64;
-    eprintln!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
+    tell!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
     if finished {
         return Ok(Outcome::Pass);
     }
     let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
     let rest = Rest { level, steps };
-    eprintln!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
+    tell!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
 }
 

@@ -85,7 +85,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         runner.check_demos(&runs)?;
     }
     let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
-        eprintln!(
+        tell!(
             "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
             restart(&args)
         );
@@ -97,7 +97,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     } else {
         print_line(report.summary().trim_end())?;
     }
-    eprintln!("written to {}: table.md, curves.svg, results.json", args.out.display());
+    tell!("written to {}: table.md, curves.svg, results.json", args.out.display());
     Ok(Outcome::Pass)
 }
 
@@ -130,7 +130,7 @@ fn all(
 }
 
 fn say(bar: &ProgressBar, line: &str) {
-    bar.suspend(|| eprintln!("{line}"));
+    bar.suspend(|| tell!("{line}"));
 }
 
 /// The runs of some variants, in the order of the experiment; of all variants if none is named.

@@ -155,10 +155,10 @@ impl Runner {
         let revision = env!("PLAYBOT_REVISION");
         if info.revision != revision {
             let folder = folder.display();
-            eprintln!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+            tell!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
         }
         if info.device != self.device {
-            eprintln!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
+            tell!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
         }
     }
 

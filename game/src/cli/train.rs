@@ -70,12 +70,12 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let (run, mut trainer) = if args.resume { resume(&args)? } else { start(&args)? };
     let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
-        eprintln!("done: test it with `playbot eval --run {}`", args.run.display());
+        tell!("done: test it with `playbot eval --run {}`", args.run.display());
         Ok(Outcome::Pass)
     } else {
         let (steps, wanted) = (trainer.steps(), trainer.experiment().steps);
         let run = args.run.display();
-        eprintln!(
+        tell!(
             "stopped and saved after {steps} of {wanted} steps, so the training is incomplete: go on with \
              `playbot train --run {run} --resume`"
         );
@@ -110,7 +110,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     if experiment != saved {
         run.write_experiment(&experiment)?;
     }
-    eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
+    tell!("going on at step {} of {}", trainer.steps(), experiment.steps);
     Ok((run, trainer))
 }
 

@@ -51,23 +51,23 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     if runs.iter().any(|run| run.curves.last_step() > 0) {
         // Behaviour cloning trains nothing, and a run that has just begun has nothing to show.
         for run in runs.extract_if(.., |run| run.curves.last_step() == 0) {
-            eprintln!("warning: {} is left out: it has no metrics", run.path.display());
+            tell!("warning: {} is left out: it has no metrics", run.path.display());
         }
     }
     let metric = args.metric.as_deref().unwrap_or(SUCCESS_RATE);
     let has_metric = |run: &RunRecord| !run.curves.curve(metric).is_empty();
     if runs.iter().all(|run| run.curves.last_step() > 0) && (args.metric.is_none() || runs.iter().any(has_metric)) {
         for run in runs.extract_if(.., |run| !has_metric(run)) {
-            eprintln!("warning: {} is left out: it has no {metric}{}", run.path.display(), why_not(metric));
+            tell!("warning: {} is left out: it has no {metric}{}", run.path.display(), why_not(metric));
         }
         if runs.is_empty() {
-            eprintln!("nothing to compare yet: train for longer, or name another --metric");
+            tell!("nothing to compare yet: train for longer, or name another --metric");
             return Ok(Outcome::Pass);
         }
     }
     let groups = group_runs(&runs);
     let curves = mean_and_spread(&groups, metric)?;
-    groups.iter().flat_map(RunGroup::warnings).for_each(|warning| eprintln!("warning: {warning}"));
+    groups.iter().flat_map(RunGroup::warnings).for_each(|warning| tell!("warning: {warning}"));
     let threshold = args.threshold.or_else(|| if metric == SUCCESS_RATE { common_threshold(&runs) } else { None });
     let rows: Vec<_> = groups.iter().map(|group| GroupStatistics::new(group, metric, threshold)).collect();
     if args.json {
@@ -103,7 +103,7 @@ fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
             }
             seen.push(same);
             let run = RunRecord::read(&path)?;
-            run.curves.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+            run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
             runs.push(run);
         }
     }
@@ -117,7 +117,7 @@ fn common_threshold(runs: &[RunRecord]) -> Option<f64> {
     if runs.iter().all(|run| threshold(run) == first) {
         return Some(first);
     }
-    eprintln!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
+    tell!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
     None
 }
 

@@ -46,7 +46,7 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let run = RunRecord::read(&args.run)?;
-    run.curves.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
     let curves = curves(&run, &args.metric)?;
     if args.plot.is_some() && curves.is_empty() {
         return Err(CliError::Usage(format!(

@@ -218,7 +218,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
         }))?;
     } else {
         let how = stage.end().map_or("still running", stage::end_in_words);
-        eprintln!(
+        tell!(
             "{path}: {width} × {height}, {} frames of level {} played by {}; after {} ticks: {how}",
             written.frames,
             stage.level(),
@@ -229,7 +229,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
     match stage.divergence() {
         None => Ok(Outcome::Pass),
         Some(divergence) => {
-            eprintln!("from there on it is not the game that was recorded: {divergence}");
+            tell!("from there on it is not the game that was recorded: {divergence}");
             Ok(Outcome::Findings)
         }
     }
