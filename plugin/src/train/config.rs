@@ -185,12 +185,12 @@ pub enum ExperimentError {
         /// Its value.
         levels: LevelSplit,
         /// What is wrong with the mode.
-        source: ModeError,
+        source: Box<ModeError>,
         /// A mode that the game has.
         example: &'static str,
     },
     /// What a training keeps is more than the machine has room for.
-    #[error("{what} take {:.1} GiB, and {:.1} GiB of memory are free: lower {keys}", gib(.needed), gib(.free))]
+    #[error("{what} need {:.1} GiB, and {:.1} GiB of memory are free: lower {keys}", gib(.needed), gib(.free))]
     Memory {
         /// What it is, with the factors.
         what: String,
