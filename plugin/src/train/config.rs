@@ -435,7 +435,7 @@ fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result
     game.check_mode(&levels.mode).map_err(|source| ExperimentError::Mode {
         key,
         levels: levels.clone(),
-        source,
+        source: source.into(),
         example,
     })
 }
