@@ -190,7 +190,7 @@ pub enum ExperimentError {
         example: &'static str,
     },
     /// What a training keeps is more than the machine has room for.
-    #[error("{what} take {:.1} GiB, and {:.1} GiB of memory are free: lower {keys}", gib(.needed), gib(.free))]
+    #[error("{what} need {:.1} GiB, and {:.1} GiB of memory are free: lower {keys}", gib(.needed), gib(.free))]
     Memory {
         /// What it is, with the factors.
         what: String,

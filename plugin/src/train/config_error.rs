@@ -44,7 +44,7 @@ pub enum ConfigError {
         /// The texts, those that are to blame if it can be told.
         sets: Vec<String>,
         /// Why.
-        source: ExperimentError,
+        source: Box<ExperimentError>,
     },
     /// The values do not go together.
     #[error("{}: {source}", path.display())]

@@ -65,7 +65,7 @@ fn blame<S: AsRef<str>>(own: &Experiment, sets: &[S], source: ExperimentError, p
     if sets.is_empty() {
         sets = all.into_iter().map(str::to_owned).collect();
     }
-    ConfigError::Sets { sets, source }
+    ConfigError::Sets { sets, source: source.into() }
 }
 
 /// Parses the text of an experiment. `path` is for messages and says where to look for files that it is built on.

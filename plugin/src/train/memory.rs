@@ -30,7 +30,7 @@ impl Experiment {
         if rollouts > free {
             let family = if self.algorithm.is_sac() { "sac" } else { "ppo" };
             let image = if is_image { ", `image.width`, `image.height` or `image.stack`" } else { "" };
-            let joined = if copies > 1 { " × 2, since those of several Worlds are joined" } else { "" };
+            let joined = if copies > 1 { " × 2 (those of the Worlds are joined)" } else { "" };
             return Err(ExperimentError::Memory {
                 what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes{joined}"),
                 needed: rollouts,
@@ -42,7 +42,7 @@ impl Experiment {
         let replay = product(&[transitions, 2, observation]);
         if self.algorithm.is_sac() && replay.saturating_add(rollouts) > free {
             return Err(ExperimentError::Memory {
-                what: format!("a replay buffer of {transitions} transitions × 2 × {observation} bytes"),
+                what: format!("the slots of a replay buffer of {transitions} transitions × 2 × {observation} bytes"),
                 needed: replay,
                 free,
                 keys: "`sac.buffer`".to_owned(),
@@ -118,14 +118,14 @@ mod tests {
 
     #[test]
     fn rollouts_must_fit() {
-        // 64 arenas × 128 steps × 40 bytes = 320 KiB, twice with two Worlds.
-        assert_eq!(check("ppo", "worlds: 1", 320 << 10), Ok(()));
-        let text = check("ppo", "worlds: 2", 320 << 10).expect_err("two copies");
-        assert!(text.contains("64 arenas × 128 steps × 40 bytes × 2"), "{text}");
-        assert_eq!(check("ppo", "worlds: 2", 640 << 10), Ok(()));
+        // 64 arenas × 256 steps × 40 bytes = 640 KiB, twice with two Worlds.
+        assert_eq!(check("ppo", "worlds: 1", 640 << 10), Ok(()));
+        let text = check("ppo", "worlds: 2", 1279 << 10).expect_err("two copies");
+        assert!(text.contains("64 arenas × 256 steps × 40 bytes × 2"), "{text}");
+        assert_eq!(check("ppo", "worlds: 2", 1280 << 10), Ok(()));
         let pictures = "observation: Raster, image: (width: 512, height: 512, stack: 8)";
-        let text = check("ppo", pictures, 16 << 30).expect_err("96 GiB");
-        for words in ["64 arenas × 128 steps × 6291456 bytes × 2", "96.0 GiB", "16.0 GiB", "`image.stack`"] {
+        let text = check("ppo", pictures, 16 << 30).expect_err("192 GiB");
+        for words in ["64 arenas × 256 steps × 6291456 bytes × 2", "192.0 GiB", "16.0 GiB", "`image.stack`"] {
             assert!(text.contains(words), "{text}");
         }
     }
