@@ -70,7 +70,7 @@ fn shake(seed: u64, steps: u64) -> Result<Extremes, String> {
     let mut ant = AntBody::new(&place.walls);
     for step in 0..steps {
         if step % EPISODE == 0 {
-            place = if step / EPISODE % 2 == 0 { narrow_room(&mut rng) } else { maze(&mut rng)? };
+            place = if (step / EPISODE).is_multiple_of(2) { narrow_room(&mut rng) } else { maze(&mut rng)? };
             ant = AntBody::new(&place.walls);
             let mut state = AntState::reset(&mut rng);
             state.qpos[..2].copy_from_slice(&place.start);
