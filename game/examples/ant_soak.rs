@@ -1,4 +1,4 @@
-//! Shakes ants between walls with random torques for as long as asked, and stops at the first thing that should not be.
+//! Shakes ants in a narrow room and in mazes, by turns, with random torques for as long as asked, and stops at the first thing that should not be.
 //!
 //! `cargo run --release --example ant_soak -- 10000000` takes about six minutes on two cores.
 
@@ -7,7 +7,11 @@ use std::{
     thread::{available_parallelism, scope},
 };
 
-use playbot_games::ant::{AntBody, AntState, WallBox};
+use playbot_games::{
+    ant::{AntBody, AntState, WallBox},
+    antmaze::{geometry::centre_of, wall_boxes},
+    maze::{MazeSpec, generate},
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -53,20 +57,31 @@ struct Extremes {
     gap: f32,
 }
 
+/// Where an ant is shaken, and from where.
+struct Place {
+    walls: Vec<WallBox>,
+    start: [f32; 2],
+}
+
 fn shake(seed: u64, steps: u64) -> Result<Extremes, String> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut ant = AntBody::new(&room());
     let mut seen = Extremes { height: 0.0, speed: 0.0, gap: ROOM };
+    let mut place = narrow_room(&mut rng);
+    let mut ant = AntBody::new(&place.walls);
     for step in 0..steps {
         if step % EPISODE == 0 {
-            ant.set_state(&start(&mut rng));
+            place = if (step / EPISODE).is_multiple_of(2) { narrow_room(&mut rng) } else { maze(&mut rng)? };
+            ant = AntBody::new(&place.walls);
+            let mut state = AntState::reset(&mut rng);
+            state.qpos[..2].copy_from_slice(&place.start);
+            ant.set_state(&state);
         }
         ant.step(&std::array::from_fn(|_| rng.random_range(-1.0..=1.0)));
         let state = ant.state();
         let [x, y, z] = [state.qpos[0], state.qpos[1], state.qpos[2]];
         seen.height = seen.height.max(z);
         seen.speed = state.qvel.iter().fold(seen.speed, |fastest, speed| fastest.max(speed.abs()));
-        seen.gap = seen.gap.min(ROOM - x.abs().max(y.abs()));
+        seen.gap = place.walls.iter().fold(seen.gap, |gap, wall| gap.min(distance(wall, [x, y])));
         let sound = state.is_finite() && z > 0.0 && z < CEILING && seen.speed < FASTEST && seen.gap > 0.0;
         if !sound {
             return Err(format!("step {step}: {state:?}"));
@@ -75,18 +90,27 @@ fn shake(seed: u64, steps: u64) -> Result<Extremes, String> {
     Ok(seen)
 }
 
-/// Beside a wall, so that legs and walls meet often.
-fn start(rng: &mut ChaCha8Rng) -> AntState {
-    let mut state = AntState::reset(rng);
-    state.qpos[0] = rng.random_range(-1.0..1.0);
-    state.qpos[1] = rng.random_range(-1.0..1.0);
-    state
+/// From the outside of a wall to a place, in metres, seen from above; 0 within.
+fn distance(wall: &WallBox, place: [f32; 2]) -> f32 {
+    let beyond = [0, 1].map(|axis| ((place[axis] - wall.centre[axis]).abs() - wall.half[axis]).max(0.0));
+    beyond[0].hypot(beyond[1])
 }
 
-/// Four walls of AntMaze's height.
-fn room() -> [WallBox; 4] {
-    [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(|[x, y]| WallBox {
+/// Four walls of AntMaze's height, so near that legs and walls meet often.
+fn narrow_room(rng: &mut ChaCha8Rng) -> Place {
+    let walls = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(|[x, y]| WallBox {
         centre: [x * (ROOM + 2.0), y * (ROOM + 2.0), 1.0],
         half: [2.0 + f32::abs(y) * ROOM, 2.0 + f32::abs(x) * ROOM, 1.0],
-    })
+    });
+    Place { walls: walls.to_vec(), start: [(); 2].map(|()| rng.random_range(-1.0..1.0)) }
+}
+
+/// A generated maze, with corners that stand out and seams between boxes, from anywhere in it.
+fn maze(rng: &mut ChaCha8Rng) -> Result<Place, String> {
+    let spec = MazeSpec { rows: 9, columns: 9, loops: rng.random_range(0.0..=1.0), ..MazeSpec::default() };
+    let maze = generate(&spec, rng.random()).map_err(|error| error.to_string())?;
+    let cells: Vec<_> = maze.free_cells().collect();
+    let middle = centre_of(&maze, cells[rng.random_range(0..cells.len())]);
+    let start = middle.map(|along| along + rng.random_range(-1.0..1.0));
+    Ok(Place { walls: wall_boxes(&maze), start })
 }

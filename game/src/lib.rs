@@ -6,6 +6,7 @@
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
 //! - [`antview`]: what ants look like.
+//! - [`sighted`]: the mazes for agents that see walls and goal.
 //! - [`registry`]: games by name.
 //! - [`cli`]: the program `playbot`.
 //! - `window`, with the feature of that name: a person plays.
@@ -18,5 +19,6 @@ pub mod coinrun;
 pub mod maze;
 pub mod maze2d;
 pub mod registry;
+pub mod sighted;
 #[cfg(feature = "window")]
 pub mod window;

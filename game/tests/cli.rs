@@ -19,6 +19,10 @@ fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
 fn lines(output: &Output) -> Vec<Value> {
     let text = String::from_utf8_lossy(&output.stdout);
     text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
@@ -41,16 +45,33 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["record", "maze2d", "--levels", "medium+sprse:0..1", "--out", "o"], "did you mean `sparse`?"),
         (&["record", "maze2d", "--noise=-0.5", "--out", "o"], "a standard deviation is a finite number"),
         (&["record", "coinrun", "--noise", "1.5", "--out", "o"], "a probability lies between 0 and 1"),
-        (&["eval", "--set", "game=maze2d", "--bot", "random", "--levels", "random+size=3x3:0..1"], "3 x 3 cells"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random", "--levels", "random+size=3x3:0..1"], "size=3x3"),
         (&["fly"], "unrecognized subcommand"),
         (&["train", "--run", "r", "--set", "ppo.gama=1"], "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
         (&["train", "--run", "r", "--set", "ppo.lr"], "write key=value"),
         (&["quickstart", "--set", "ppo.lr=fast"], "`ppo.lr` must be a number such as 0.0005, not fast"),
+        (&["learn-skills", "--out", "s", "--epochs", "0"], "epochs must be at least 1"),
+        (&["learn-skills", "--out", "s", "--threads", "0"], "it must be at least 1"),
+        (&["eval", "--bot", "random", "--threads", "0"], "it must be at least 1"),
+        (&["train", "--run", "r", "--threads", "0"], "it must be at least 1"),
+        (&["study", "--out", "o", "--threads", "0"], "it must be at least 1"),
+        (&["quickstart", "--threads", "0"], "it must be at least 1"),
+        (&["view", "coinrun", "--out", "x.svg"], "written as .png"),
+        (&["level", "coinrun", "--png", "a.svg"], "written as .png"),
+        (&["runs", "show", "r", "--plot", "x.png"], "written as .svg"),
+        (&["runs", "compare", "r", "--plot", "x.png"], "written as .svg"),
         (&["learn-skills", "--out", "s", "--set", "skills.prior_std=Sate"], "did you mean `State`?"),
         (&["eval", "--bot", "random", "--set", "eval.episodes_per_level=0"], "at least one episode"),
         (&["eval", "--bot", "random", "--set", "test=hard"], "mode:first..last"),
         (&["train", "--run", "r", "--algorithm", "bc"], "playbot eval --skills"),
         (&["config", "show", "--set", "ppo.minibatches=7"], "64 × 128 = 8192; 8 does"),
+        (&["config", "show", "--set", "arenas=0"], "`arenas=0`: `arenas` is 0"),
+        (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: ppo lr must be"),
+        (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
+        (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..127: unknown map `hard`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "or with --levels"),
+        (&["eval", "--bot", "random", "--plot", "plot.gif"], "is written as .png or .svg"),
         (&["config", "presets", "skil-paper"], "did you mean `skill-paper`?"),
         (&["study", "--out", "o", "--seeds", "1,1"], "seed 1 is there twice"),
         (&["study", "--out", "o", "--set", "variants=[(name: \"a\", set: [\"kl=false\"])]"], "variant `a`"),
@@ -84,6 +105,8 @@ fn an_experiment_can_be_shown_with_all_its_values_and_read_back() {
     };
     std::fs::write(folder.path().join("least.ron"), "(base: [\"d4rl-ppo\"], game: \"coinrun\", train: \"hard:0..3\", test: \"hard:4..5\", demos: \"d\", steps: 9, ppo: (epochs: 2))").expect("writable");
     let shown = show(&["--experiment", "least.ron", "--set", "score.kl_coef=0.25"]);
+    let warned = playbot(folder.path(), &["config", "show", "--experiment", "least.ron"]);
+    assert!(errors(&warned).contains("there are no recordings at d"), "{}", errors(&warned));
     for line in
         ["steps: 9,", "epochs: 2,", "num_steps: 2048,", "kl_coef: 0.25,", "algorithm: \"score-ppo\",", "horizon: 8,"]
     {
@@ -176,6 +199,62 @@ fn blind_bots_score_what_they_score_in_the_original() {
 }
 
 #[test]
+fn a_measurement_outlives_its_plot() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let eval = |plot: &str| {
+        let levels = ["--levels", "hard:64..64", "--episodes-per-level", "1"];
+        playbot(folder.path(), &[&["eval", "--bot", "right-jump", "--plot", plot], &levels[..]].concat())
+    };
+    std::fs::create_dir(folder.path().join("taken.svg")).expect("writable");
+    std::fs::write(folder.path().join("file"), "").expect("writable");
+    for (plot, words, code_then) in [("taken.svg", "is a folder", 3), ("file/plot.svg", "cannot create file", 2)] {
+        let output = eval(plot);
+        assert_eq!(code(&output), code_then, "{}", errors(&output));
+        assert!(errors(&output).contains(words), "{}", errors(&output));
+        assert!(output.stdout.is_empty(), "found out before anything is measured");
+    }
+    let output = eval("new/folder/plot.svg");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let svg = std::fs::read_to_string(folder.path().join("new/folder/plot.svg")).expect("drawn");
+    assert!(svg.contains("crates and the like"), "level 64 has crates");
+    let line = svg.split("<polyline points=\"").find(|line| line.contains("stroke-width=\"1.8\"")).expect("a trail");
+    let (x, y) = line.split(' ').next().and_then(|point| point.split_once(',')).expect("a point");
+    assert!(svg.contains(&format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"6\"")), "it begins at {x}, {y}, not at the start");
+    // A file name that is too long is found out only when it is written.
+    let late = eval(&format!("{}.svg", "x".repeat(300)));
+    assert_eq!(code(&late), 2, "{}", errors(&late));
+    assert!(String::from_utf8_lossy(&late.stdout).contains("right-jump"), "the table is there all the same");
+}
+
+#[cfg(all(target_os = "linux", feature = "camera"))]
+#[test]
+fn cameras_work_silently_without_a_desktop() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+    command.args(["eyes", "coinrun", "--levels", "hard:0..0", "--frames", "1"]).current_dir(folder.path());
+    let output = command.env_remove("XDG_RUNTIME_DIR").env_remove("NODEVICE_SELECT").output().expect("it starts");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    assert!(!errors(&output).contains("XDG_RUNTIME_DIR"), "{}", errors(&output));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_listening_stops_no_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let deaf = |args: &[&str]| {
+        let full = std::fs::File::create("/dev/full").expect("a disk that is always full");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        command.args(args).current_dir(folder.path()).stderr(full).output().expect("the program starts")
+    };
+    let recorded = deaf(&["record", "coinrun", "--levels", "easy:0..3", "--out", "a.demo"]);
+    assert_eq!(code(&recorded), 0);
+    let learned = deaf(&["learn-skills", "--demos", "a.demo", "--epochs", "1", "--out", "skills"]);
+    assert_eq!(code(&learned), 0);
+    assert!(folder.path().join("skills").exists());
+    assert_eq!(code(&deaf(&["level", "maze2d", "--map", "nope"])), 3, "a mistake is one even if nobody is told");
+}
+
+#[test]
 fn recording_verifying_and_repairing_from_the_shell() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |args: &[&str]| playbot(folder.path(), args);
@@ -192,8 +271,8 @@ fn recording_verifying_and_repairing_from_the_shell() {
     let bytes = std::fs::read(folder.path().join("a.demo")).expect("readable");
     std::fs::write(folder.path().join("torn.demo"), &bytes[..bytes.len() - 5]).expect("writable");
     let torn = run(&["demo", "verify", "torn.demo"]);
-    assert_eq!(code(&torn), 3);
-    assert!(errors(&torn).contains("playbot demo repair"), "{}", errors(&torn));
+    assert_eq!(code(&torn), 1, "damage is a finding: {}", errors(&torn));
+    assert!(said(&torn).contains("playbot demo repair"), "{}", said(&torn));
     let mended = run(&["demo", "repair", "torn.demo", "--out", "mended.demo", "--json"]);
     assert_eq!(lines(&mended)[0]["kept_episodes"], 3);
     assert_eq!(code(&run(&["demo", "verify", "mended.demo"])), 0);
@@ -203,8 +282,8 @@ fn recording_verifying_and_repairing_from_the_shell() {
     flipped[middle] ^= 16;
     std::fs::write(folder.path().join("flipped.demo"), flipped).expect("writable");
     let flipped = run(&["demo", "verify", "flipped.demo"]);
-    assert_eq!(code(&flipped), 3);
-    assert!(errors(&flipped).contains("byte"), "{}", errors(&flipped));
+    assert_eq!(code(&flipped), 1);
+    assert!(said(&flipped).contains("byte"), "{}", said(&flipped));
 }
 
 #[test]

@@ -1,9 +1,17 @@
 //! The experiments that come with the program can be run: names, modes, levels and values fit.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
 
-use bevy_playbot::train::{Experiment, config_file::read_experiment, study::study_runs};
+use bevy_playbot::{
+    held_out::HeldOut,
+    split::LevelSplit,
+    train::{Experiment, config_file::read_experiment, study::study_runs},
+};
 use playbot_games::registry;
+use serde_json::Value;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments")
@@ -26,12 +34,33 @@ fn every_experiment_and_every_variant_fits_its_game() {
     for name in names() {
         for run in study_runs(&read(&name)).unwrap_or_else(|error| panic!("{name}: {error}")) {
             let game = registry::game(&run.experiment.game).expect("a game");
-            for split in [&run.experiment.train, &run.experiment.test] {
-                game.check_mode(&split.mode).unwrap_or_else(|error| panic!("{name}, {}: {error}", run.variant));
-            }
+            run.experiment.check_levels(game).unwrap_or_else(|error| panic!("{name}, {}: {error}", run.variant));
             run.experiment.score.check_space(game.actions()).unwrap_or_else(|error| panic!("{name}: {error}"));
         }
     }
+}
+
+#[test]
+fn what_is_held_out_is_not_trained_on_by_another_name() {
+    let check = |game: &str, train: &str, test: &str| {
+        let (train, test) = (train.parse().expect("a split"), test.parse().expect("a split"));
+        let experiment = Experiment { train, test, ..read("maze2d-random") };
+        experiment.check_levels(registry::game(game).expect("a game")).map_err(|error| error.to_string())
+    };
+    for game in ["maze2d", "maze2d-sighted", "antmaze", "antmaze-sighted"] {
+        for train in ["random+sparse:0..63", "random+limit=100:50..63", "random+loops=0.3+difficulty=4..8:50..50"] {
+            let error = check(game, train, "random:50..99").expect_err("mazes of the same seed");
+            assert!(error.contains(train) && error.contains("random:50..99"), "{error}");
+        }
+        assert_eq!(check(game, "random+sparse:0..49", "random:50..99"), Ok(()));
+        // So few rooms that seeds draw the same walls again and again.
+        let error = check(game, "random+size=5x5:0..49", "random+size=5x5:50..99").expect_err("the same walls");
+        assert!(error.contains("looks like"), "{error}");
+        assert!(check(game, "random+lops=0.3:0..9", "random:50..99").is_err_and(|error| error.contains("loops")));
+    }
+    let error = check("maze2d", "medium+limit=600:0..9", "medium:9..9").expect_err("the limit that it has anyway");
+    assert!(error.contains("level 9"), "{error}");
+    assert_eq!(check("maze2d", "medium+fixed-start:0..9", "medium:9..9"), Ok(()), "another start");
 }
 
 /// Mazes of the paper's tables and figures, with the methods that are compared there.
@@ -42,10 +71,10 @@ const MAZES: [(&str, &[&str]); 10] = [
     ("antmaze-to-large", &["score-medium", "score-large", "ppo-medium"]),
     ("antmaze-to-xl", &["score-medium", "score-large", "score-xl", "ppo-large"]),
     ("antmaze-ablation", &["score-ppo", "no-init", "no-kl", "no-alpha", "ppo"]),
-    ("antmaze-random", &["score-ppo", "ppo"]),
+    ("antmaze-random", &["score-ppo", "ppo", "bc"]),
     ("maze2d-medium", &["score-ppo", "sac", "ppo"]),
     ("maze2d-large", &["score-ppo", "sac", "ppo"]),
-    ("maze2d-random", &["score-ppo", "ppo"]),
+    ("maze2d-random", &["score-ppo", "ppo", "bc"]),
 ];
 
 #[test]
@@ -86,4 +115,77 @@ fn what_is_measured_elsewhere_was_learned_where_the_variant_says() {
             }
         }
     }
+}
+
+/// The command with which an experiment's demonstrations are made, as its file says; none if it says none.
+fn recorded(name: &str) -> Option<Vec<String>> {
+    let text = std::fs::read_to_string(folder().join(format!("{name}.ron"))).expect("readable");
+    let line = text.lines().find_map(|line| line.trim_start_matches("//").trim().strip_prefix("playbot record "))?;
+    Some(line.split_whitespace().map(str::to_owned).collect())
+}
+
+/// The value of an option of a command.
+fn value<'a>(args: &'a [String], option: &str) -> &'a str {
+    let at = args.iter().position(|arg| arg == option).unwrap_or_else(|| panic!("{args:?} has no {option}"));
+    &args[at + 1]
+}
+
+#[test]
+fn demonstrations_are_made_of_the_game_that_is_learned_and_not_of_held_out_levels() {
+    let recorded: Vec<_> = names().into_iter().filter_map(|name| Some((recorded(&name)?, name))).collect();
+    assert!(recorded.len() >= 10, "only {} say how", recorded.len());
+    for (args, name) in recorded {
+        let experiment = read(&name);
+        assert_eq!(args[0], experiment.game, "{name}");
+        let levels: LevelSplit = value(&args, "--levels").parse().expect("a split");
+        let game = registry::game(&args[0]).expect("a game");
+        game.check_mode(&levels.mode).expect("a mode");
+        let hidden = HeldOut::new(game, &experiment.test);
+        if args.iter().any(|arg| arg == "--hold-out") {
+            let left_out = value(&args, "--hold-out").parse().expect("a split");
+            let left_out = HeldOut::new(game, &left_out);
+            assert!(experiment.test.levels().all(|level| left_out.contains(&experiment.test.mode, level)), "{name}");
+        } else {
+            assert_eq!(hidden.first_of(&levels), None, "{name}");
+        }
+        assert_eq!(Some(Path::new(value(&args, "--out"))), experiment.demos.as_deref(), "{name}");
+    }
+}
+
+/// Runs the program in a folder.
+fn playbot(folder: &Path, args: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("starts");
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn those_who_see_are_recorded_imitated_trained_and_measured() {
+    for (name, sees) in [("maze2d-random-hour", 14), ("antmaze-random-hour", 39)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let run = |args: &[&str]| playbot(folder.path(), args);
+        let [game, levels, noise] = {
+            let args = recorded(name).expect("says how");
+            [args[0].clone(), value(&args, "--levels").to_owned(), value(&args, "--noise").to_owned()]
+        };
+        run(&["record", &game, "--levels", &levels, "--noise", &noise, "--steps", "2000", "--out", "some.demo"]);
+        let file = folder_file(name);
+        let sizes = "skills.hidden=[32,32]";
+        let experiment = ["--experiment", &file, "--set", sizes, "--set", "arenas=8", "--set", "checkpoints.every=1"];
+        let learn = ["learn-skills", "--demos", "some.demo", "--epochs", "1", "--out", "skills"];
+        run(&[&learn[..], &experiment].concat());
+        let train = ["train", "--skills", "skills", "--run", "run", "--steps", "2048"];
+        run(&[&train[..], &experiment].concat());
+        let levels = format!("{}:64..65", read(name).test.mode);
+        let measured = run(&["eval", "--run", "run", "--levels", &levels, "--episodes-per-level", "1", "--json"]);
+        let measured: Value = serde_json::from_str(measured.trim()).expect("a line of JSON");
+        assert_eq!(measured["episodes"], 2, "{measured}");
+        let sights = registry::game(&game).expect("a game").observation().len();
+        assert_eq!(sights, sees, "{name} is learned by those who see");
+    }
+}
+
+fn folder_file(name: &str) -> String {
+    let path = folder().canonicalize().expect("there").join(format!("{name}.ron"));
+    path.to_str().expect("plain").to_owned()
 }

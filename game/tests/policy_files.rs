@@ -159,6 +159,45 @@ fn the_program_exports_shows_and_measures() {
         let row: Value = serde_json::from_str(&output.1).expect("JSON");
         (row["return_mean"].clone(), row["length_mean"].clone())
     };
+    let maze = r#"(game: "maze2d", train: "medium:0..3", test: "medium:4..5", demos: "maze.demo", steps: 128, arenas: 4,
+        skills: (window: 10, epochs: 1, batch: 16, hidden: [16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+        ppo: (num_steps: 32, minibatches: 2, hidden: [16]), eval: (episodes_per_level: 1))"#;
+    std::fs::write(folder.path().join("maze.ron"), maze).expect("writable");
+    done(&playbot(&["record", "maze2d", "--levels", "medium+fixed-start+end-at-goal:9..10", "--out", "maze.demo"]));
+    done(&playbot(&["learn-skills", "--experiment", "maze.ron", "--out", "sk.safetensors"]));
+    done(&playbot(&["train", "--algorithm", "ppo", "--experiment", "maze.ron", "--run", "maze"]));
+    let exported = playbot(&["policy", "export", "--run", "maze", "--out", "maze.policy"]);
+    done(&exported);
+    // The words of the advice, as one copies them.
+    let advice = exported.2.split('`').nth(1).expect("a command").to_owned();
+    assert_eq!(advice, "playbot eval --policy maze.policy --levels medium:4..5");
+    let words: Vec<&str> = advice.split(' ').skip(1).chain(["--episodes-per-level", "1", "--json"]).collect();
+    let measured = playbot(&words);
+    done(&measured);
+    assert!(measured.1.contains("medium:4..5"), "{}", measured.1);
+    for args in [
+        &["policy", "export", "--skills", "sk.safetensors", "--out", "clone.policy"][..],
+        &["eval", "--skills", "sk.safetensors"],
+    ] {
+        let (code, _, errors) = playbot(args);
+        assert_eq!(code, Some(3), "{errors}");
+        for words in ["those of maze2d, not of `coinrun`", "--experiment", "--set game=maze2d"] {
+            assert!(errors.contains(words), "{errors}");
+        }
+    }
+    done(&playbot(&[
+        "policy",
+        "export",
+        "--skills",
+        "sk.safetensors",
+        "--experiment",
+        "maze.ron",
+        "--out",
+        "clone.policy",
+    ]));
+    let usual = playbot(&["eval", "--policy", "clone.policy", "--episodes-per-level", "1", "--set", "game=coinrun"]);
+    assert!(usual.0 == Some(3) && usual.2.contains("for the game `maze2d`"), "{}", usual.2);
+
     assert_eq!(
         measure(&["--policy", "bot.policy", "--experiment", "small.ron"]),
         measure(&["--run", "run"]),

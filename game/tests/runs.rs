@@ -79,6 +79,33 @@ fn runs_are_listed_shown_and_compared() {
 }
 
 #[test]
+fn runs_without_an_episode_are_left_out_and_early_ones_say_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    let (nothing, why) = output(folder, &["runs", "compare", "runs"], 0);
+    assert!(nothing.is_empty() && why.contains("nothing to compare yet"), "{why}");
+    assert!(why.contains("runs/b is left out: it has no charts/success_rate, since no episode has ended"), "{why}");
+    let (_, blank) = output(folder, &["runs", "show", "runs/b", "--plot", "none.svg"], 3);
+    assert!(blank.contains("no episode has ended yet") && !folder.join("none.svg").exists(), "{blank}");
+
+    let metrics = |run: &str, episodes: &str, rate: &str| {
+        let lines = [128, 256, 384, 512]
+            .map(|step| format!("{{\"step\":{step},\"charts/episodes\":{episodes},\"charts/success_rate\":{rate}}}\n"));
+        fs::write(folder.join(run).join("metrics.jsonl"), lines.concat()).expect("writable");
+    };
+    metrics("runs/a/1", "40", "0.9");
+    metrics("runs/a/2", "200", "0");
+    let (table, warnings) = output(folder, &["runs", "compare", "runs", "--plot", "c.svg"], 0);
+    assert!(warnings.contains("runs/b is left out") && !warnings.contains("runs/a"), "{warnings}");
+    assert!(table.contains("never in 1 of 2, too few episodes in 1 of 2"), "{table}");
+    metrics("runs/a/1", "200", "0");
+    output(folder, &["runs", "compare", "runs", "--plot", "c.svg"], 0);
+    let svg = fs::read_to_string(folder.join("c.svg")).expect("written");
+    assert!(svg.contains(">1.0<") && !svg.contains("−") && !svg.contains(">-"), "a rate lies in 0..1: {svg}");
+}
+
+#[test]
 fn the_threshold_is_that_of_the_experiments() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

@@ -101,6 +101,11 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     assert!(!folder.join("killed/cloned-seed2/result.json").exists(), "it was killed before its end");
     fs::remove_dir_all(folder.join("out")).expect("there");
     refused(&study(folder, "killed", &[]), "--resume");
+    // Another process trains in one of its folders.
+    let lock = fs::File::open(folder.join("killed/no-kl-seed1/run.lock")).expect("there");
+    lock.lock().expect("nobody has it");
+    refused(&study(folder, "killed", &["--resume"]), "no-kl-seed1 is in use by another process");
+    drop(lock);
     ok(study(folder, "killed", &["--resume"]));
     assert!(written(folder) == expected, "the kill changed the results");
 
@@ -123,8 +128,25 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     ok(small(&[]));
     let results = ["plain-seed1", "full-seed1"].map(|run| folder.join("runs").join(run).join("result.json"));
     refused(&small(&["--force", "--set", "demos=nowhere"]), "nowhere");
-    refused(&small(&["--force", "--set", "test=easy:4..9"]), "level 4 is one of the held-out levels easy:4..9");
+    refused(
+        &small(&["--force", "--set", "test=easy:4..9"]),
+        "level 4 is, or looks like, one of the held-out levels easy:4..9",
+    );
     assert!(results.iter().all(|result| result.exists()), "finished runs were lost");
+
+    let one = |more: &[&str]| small(&[&["--resume", "--variant", "full"], more].concat());
+    let only = String::from_utf8(ok(one(&["--json"])).stdout).expect("Unicode");
+    assert!(only.lines().count() == 1 && only.contains("\"variant\":\"full\""), "{only}");
+    assert!(written(folder)[0].contains("--variant full --seeds 1"), "{}", written(folder)[0]);
+    refused(&one(&["--variant", "ful"]), "did you mean `full`?");
+
+    let foreign = folder.join("foreign/plain-seed1/notes.txt");
+    fs::create_dir_all(foreign.parent().expect("a folder")).expect("writable");
+    fs::write(&foreign, "mine").expect("writable");
+    let variants = r#"variants=[(name: "plain", set: ["algorithm=ppo"])]"#;
+    let over = study(folder, "foreign", &["--seeds", "1", "--set", "steps=128", "--set", variants, "--force"]);
+    refused(&over, "plain-seed1 is not the folder of a run");
+    assert!(foreign.exists(), "what is no run was replaced");
 
     let description = |run: &str| folder.join("runs").join(run).join("run.json");
     let info = |run| -> Value { serde_json::from_slice(&fs::read(description(run)).expect("there")).expect("JSON") };

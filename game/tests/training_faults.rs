@@ -82,6 +82,84 @@ fn a_killed_training_goes_on_bit_for_bit() {
     assert!(results(&folder.path().join("whole")) == results(&run), "killing it changed the result");
 }
 
+/// Starts a training and waits until it has logged a few updates.
+fn running(folder: &Path, run: &str) -> std::process::Child {
+    let mut command = train(folder, &["--run", run, "--steps", "100000000"]);
+    let mut child = command.stderr(Stdio::null()).spawn().expect("the program starts");
+    while logged(&folder.join(run)) < 3 {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended early");
+        std::thread::park_timeout(Duration::from_millis(1));
+    }
+    child
+}
+
+#[test]
+fn one_process_at_a_time_trains_in_a_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_experiment(folder.path(), "");
+    let mut child = running(folder.path(), "busy");
+    let run = folder.path().join("busy");
+    let before = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("written"));
+    let second = [
+        resume(folder.path(), "busy"),
+        train(folder.path(), &["--run", "busy", "--force"]).output().expect("the program starts"),
+    ];
+    let looked =
+        Command::new(env!("CARGO_BIN_EXE_playbot")).args(["runs", "ls", "."]).current_dir(folder.path()).output();
+    assert!(child.try_wait().expect("a child").is_none(), "the first one goes on");
+    for refused in second {
+        assert_eq!(refused.status.code(), Some(3), "{}", errors(&refused));
+        assert!(errors(&refused).contains("busy is in use by another process"), "{}", errors(&refused));
+    }
+    assert_eq!(looked.expect("the program starts").status.code(), Some(0), "who looks needs no lock");
+    let after = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("still there"));
+    assert!(before == after && !steps(&run).is_empty(), "the refused ones touched the run");
+    child.kill().expect("it runs");
+    child.wait().expect("a child");
+    // Nothing is left of the lock, and the old run makes way as a whole.
+    let forced = train(folder.path(), &["--run", "busy", "--force", "--steps", "256"]).output().expect("it starts");
+    assert!(forced.status.success(), "{}", errors(&forced));
+    assert_eq!((logged(&run), steps(&run).len()), (1, 2));
+    let names: Vec<_> =
+        std::fs::read_dir(folder.path()).expect("there").flatten().map(|entry| entry.file_name()).collect();
+    assert_eq!(names.len(), 2, "the old run is gone: {names:?}");
+}
+
+#[test]
+fn what_is_no_run_is_never_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_experiment(folder.path(), "");
+    let precious = folder.path().join("demos/a.demo");
+    std::fs::create_dir(folder.path().join("demos")).expect("writable");
+    std::fs::write(&precious, "precious").expect("writable");
+    let forced = train(folder.path(), &["--run", "demos", "--force"]).output().expect("the program starts");
+    assert_eq!(forced.status.code(), Some(3), "{}", errors(&forced));
+    assert!(errors(&forced).contains("demos is not the folder of a run"), "{}", errors(&forced));
+    let quick = ["quickstart", "--experiment", "small.ron", "--run", "demos"];
+    let quick = Command::new(env!("CARGO_BIN_EXE_playbot")).args(quick).current_dir(folder.path()).output();
+    let quick = quick.expect("the program starts");
+    assert_eq!(quick.status.code(), Some(3), "{}", errors(&quick));
+    assert!(errors(&quick).contains("demos holds something else"), "{}", errors(&quick));
+    let left: Vec<_> = std::fs::read_dir(folder.path().join("demos")).expect("there").flatten().collect();
+    assert!(left.len() == 1 && precious.exists(), "{left:?}");
+}
+
+#[test]
+fn what_does_not_fit_into_memory_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let large = ["observation=Raster", "image.width=512", "image.height=512", "image.stack=8", "ppo.num_steps=1048576"];
+    let sets = || large.iter().flat_map(|set| ["--set", set]);
+    for start in [&["train", "--algorithm", "ppo", "--run", "r"][..], &["quickstart", "--run", "r"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        let output = command.args(start).args(sets()).current_dir(folder.path()).output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
+        for words in ["64 arenas × 1048576 steps × 6291456 bytes × 2", "`ppo.num_steps`", "`image.stack`"] {
+            assert!(errors(&output).contains(words), "{}", errors(&output));
+        }
+    }
+    assert!(!folder.path().join("r").exists());
+}
+
 #[test]
 fn a_torn_checkpoint_is_passed_over_for_the_one_before() {
     let folder = tempfile::tempdir().expect("a folder");

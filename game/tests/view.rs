@@ -208,7 +208,8 @@ fn bad_wishes_are_refused_in_words() {
         (&["--demo", "file"], 3, "file"),
         (&["--demo", "a", "--bot", "random"], 3, "cannot be used with"),
         (&["--out", "file/view.png"], 2, "cannot create file"),
-        (&["--out", "."], 2, "cannot write ."),
+        (&["--out", "."], 3, "written as .png"),
+        (&["--out", "x.jpg"], 3, "written as .png"),
     ] {
         let output = playbot(folder.path(), &[&["view", "coinrun"], args].concat());
         assert_eq!(output.status.code(), Some(code), "{args:?}: {}", errors(&output));

@@ -9,6 +9,10 @@ pub struct FloorPlan {
     pub bounds: Rect,
     /// Walls, ground and whatever else nobody walks through.
     pub walls: Vec<Rect>,
+    /// What kills.
+    pub hazards: Vec<Rect>,
+    /// What agents can stand on and walk through, such as crates.
+    pub platforms: Vec<Rect>,
     /// Where agents start.
     pub start: Vec2,
     /// Where they should go.
@@ -16,29 +20,40 @@ pub struct FloorPlan {
 }
 
 impl FloorPlan {
-    /// The plan of a level of tiles. `square` says what a tile, by row and column, covers; walls side by side in a row
-    /// become one rectangle. There must be a tile.
+    /// The plan of a level of tiles that has walls only. `square` says what a tile, by row and column, covers; walls side
+    /// by side in a row become one rectangle. There must be a tile.
     pub fn of_tiles(
         [rows, columns]: [usize; 2],
         is_wall: impl Fn(usize, usize) -> bool,
         square: impl Fn(usize, usize) -> Rect,
         [start, goal]: [Vec2; 2],
     ) -> Self {
-        let mut walls: Vec<Rect> = Vec::new();
-        for row in 0..rows {
-            let mut goes_on = false;
-            for column in 0..columns {
-                let is_wall = is_wall(row, column);
-                match walls.last_mut() {
-                    Some(wall) if is_wall && goes_on => *wall = wall.union(square(row, column)),
-                    _ if is_wall => walls.push(square(row, column)),
-                    _ => {}
-                }
-                goes_on = is_wall;
-            }
-        }
-        Self { bounds: square(0, 0).union(square(rows - 1, columns - 1)), walls, start, goal }
+        let walls = joined_tiles([rows, columns], is_wall, &square);
+        let bounds = square(0, 0).union(square(rows - 1, columns - 1));
+        Self { bounds, walls, start, goal, ..Self::default() }
     }
+}
+
+/// What the tiles of one kind cover; those side by side in a row become one rectangle.
+pub fn joined_tiles(
+    [rows, columns]: [usize; 2],
+    is_one: impl Fn(usize, usize) -> bool,
+    square: impl Fn(usize, usize) -> Rect,
+) -> Vec<Rect> {
+    let mut areas: Vec<Rect> = Vec::new();
+    for row in 0..rows {
+        let mut goes_on = false;
+        for column in 0..columns {
+            let is_one = is_one(row, column);
+            match areas.last_mut() {
+                Some(area) if is_one && goes_on => *area = area.union(square(row, column)),
+                _ if is_one => areas.push(square(row, column)),
+                _ => {}
+            }
+            goes_on = is_one;
+        }
+    }
+    areas
 }
 
 #[cfg(test)]

@@ -36,6 +36,18 @@ pub trait Game: Send + Sync {
         if valid.contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, valid).into()) }
     }
 
+    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that whoever has
+    /// learned it has seen it for all of them. The mode itself, unless the game reads options that change rules only.
+    fn family(&self, mode: &str) -> String {
+        mode.to_owned()
+    }
+
+    /// A hash of the places of a level, where different seeds may happen to draw the same ones. `None` where they cannot, or
+    /// where the places are the mode's own.
+    fn fingerprint(&self, _mode: &str, _level: u64) -> Option<u64> {
+        None
+    }
+
     /// Fixed ticks per second of game time.
     fn tick_hz(&self) -> f64;
 
@@ -99,7 +111,7 @@ pub trait Game: Send + Sync {
 
 /// The name is none of those that exist.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
-#[error("unknown {what} `{name}`{}; valid: {}", hint(.near), .valid.join(", "))]
+#[error("unknown {what} `{name}`{}; {}", hint(.near), choice(.valid))]
 pub struct UnknownName {
     /// What was named: `game`, `mode`, `method`.
     pub what: &'static str,
@@ -113,6 +125,10 @@ pub struct UnknownName {
 
 fn hint(near: &Option<String>) -> String {
     near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+}
+
+fn choice(valid: &[String]) -> String {
+    if valid.is_empty() { "there is none here".to_owned() } else { format!("valid: {}", valid.join(", ")) }
 }
 
 impl UnknownName {

@@ -17,6 +17,13 @@ pub enum LevelQueue {
         /// Index of the next level.
         next: usize,
     },
+    /// These levels over and over, in order. At least one.
+    Rounds {
+        /// All of them.
+        levels: Arc<[u64]>,
+        /// Index of the next level.
+        next: usize,
+    },
     /// Levels `first..=last`, uniformly and with replacement, from the agent's own stream of random numbers.
     Uniform {
         /// Lowest level.
@@ -40,6 +47,11 @@ impl LevelQueue {
         Self::List { levels: levels.into(), next: 0 }
     }
 
+    /// A queue that goes through a list of levels again and again.
+    pub fn rounds(levels: impl Into<Arc<[u64]>>) -> Self {
+        Self::Rounds { levels: levels.into(), next: 0 }
+    }
+
     /// The next level, or `None` when there is none left.
     pub fn next_level(&mut self, rng: &mut impl Rng) -> Option<u64> {
         match self {
@@ -47,6 +59,11 @@ impl LevelQueue {
             Self::List { levels, next } => {
                 let level = levels.get(*next).copied();
                 *next += usize::from(level.is_some());
+                level
+            }
+            Self::Rounds { levels, next } => {
+                let level = levels.get(*next).copied();
+                *next = (*next + 1) % levels.len().max(1);
                 level
             }
             Self::Uniform { first, last } => Some(rng.random_range(*first..=*last)),

@@ -91,6 +91,7 @@ pub mod fault;
 pub mod floor_plan;
 pub mod game;
 pub mod headless;
+pub mod held_out;
 pub mod input_map;
 pub mod keyboard;
 pub mod level;

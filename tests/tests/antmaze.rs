@@ -11,6 +11,8 @@ use bevy_playbot::{
     },
     eval::{EvalPlan, Player, evaluate, summarize},
     game::{build_seeing_world, build_world},
+    learner::{DeviceKind, PolicyFile},
+    policy::ActionDraw,
     prelude::*,
     test_app::PlaybotTestExt,
     train::worlds::on_threads,
@@ -118,6 +120,24 @@ fn an_ant_within_half_a_metre_of_the_goal_has_won() {
         world.tick().expect("sound");
         assert!(place(&world, agent).iter().all(|x| x.abs() < 1.0), "the next episode begins at the start");
     }
+}
+
+/// Where every tick pays the more the nearer the goal is, going there must not end it.
+#[test]
+fn an_ant_that_is_paid_for_nearness_stays_at_the_goal() {
+    let (mut world, agent) = world_with("medium+dense=exp+limit=20", 3);
+    world.tick().expect("sound");
+    for _ in 0..10 {
+        put(&mut world, agent, [20.0, 19.8, 0.6]);
+        world.tick().expect("sound");
+        assert_eq!(ended(&world, agent), 0);
+    }
+    while ended(&world, agent) == 0 {
+        world.tick().expect("sound");
+    }
+    let (episode, count) = (world.get::<Episode>(agent), world.get::<EpisodeCount>(agent));
+    assert_eq!(episode.expect("an agent").tick, 20);
+    assert_eq!(count.expect("an agent").successes, 1, "the goal was reached before time was up");
 }
 
 #[test]
@@ -379,4 +399,29 @@ fn the_open_floor_is_drawn_around_its_ant() {
         assert!(at(32, 32)[0] > at(32, 32)[2] + 60, "the ant is red");
         assert!([(2, 2), (60, 30), (30, 60)].iter().all(|&(x, y)| at(x, y)[1] > 180), "floor");
     }
+}
+
+#[test]
+fn the_shipped_walker_reaches_goals_in_all_directions() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/models/ant-walker.safetensors");
+    let policy = PolicyFile::load(&file, DeviceKind::default()).expect("shipped").policy;
+    let plan = EvalPlan {
+        split: "goal:0..127".parse().expect("a split"),
+        sight: Sight::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 64,
+        worlds: 2,
+        threads: 2,
+    };
+    let player = Player::Policy { policy, prior: None, draw: ActionDraw::Greedy };
+    let trials = evaluate(&Ant, &player, &plan, |_| {}).expect("sound");
+    let fallen = trials.iter().filter(|trial| trial.end == EpisodeEnd::Terminated { success: false }).count();
+    // Goals are 8 m away, and reached within half a metre of them.
+    let speeds: Vec<f64> =
+        trials.iter().filter(|trial| trial.success).map(|trial| 7.5 / (0.1 * f64::from(trial.ticks))).collect();
+    let speed = speeds.iter().sum::<f64>() / speeds.len() as f64;
+    assert_eq!(trials.len(), 128);
+    assert!(speeds.len() >= 116, "nine in ten: {} of 128", speeds.len());
+    assert!(speed >= 0.8 && fallen <= 6, "{speed} m/s, {fallen} fell");
 }

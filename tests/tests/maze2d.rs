@@ -126,10 +126,30 @@ fn only_the_clock_ends_d4rl_s_episodes_and_success_is_known_all_the_same() {
     let still = Player::Blind(BlindBot::Constant(ActionValue::Continuous(vec![0.0, 0.0])));
     let results = evaluated("medium+fixed-start+limit=50", &still, 4);
     assert!(results.iter().all(|result| result.end == EpisodeEnd::Truncated && result.ticks == 50 && !result.success));
-    for text in ["medium+end-at-goal", "random"] {
+    for text in ["medium+end-at-goal", "random+end-at-goal"] {
         let results = evaluated(text, &Player::Demonstrator, 16);
         assert!(results.iter().all(|result| result.end == EpisodeEnd::Terminated { success: true }), "{text}");
         assert!(results.iter().all(|result| result.success && result.ticks < mode(text).limit));
+    }
+}
+
+/// Or nobody would learn to get there.
+#[test]
+fn the_way_to_the_goal_is_what_pays() {
+    for text in ["umaze", "medium", "large", "random", "random+sparse", "random+sparse+end-at-goal"] {
+        let paid = |player| evaluated(text, &player, 16).iter().map(|result| result.total_reward).sum::<f64>();
+        let (goes, strays) = (paid(Player::Demonstrator), paid(Player::Blind(BlindBot::Uniform)));
+        assert!(goes > strays, "{text}: {goes} for the demonstrator, {strays} for random pushes");
+    }
+}
+
+#[test]
+fn what_is_fixed_stays_where_goals_are_drawn() {
+    let mode = mode("random+size=5x5+loops=1+fixed-start+goal=random+end-at-goal");
+    for seed in 0..100 {
+        let level = Maze2dLevel::new(&mode, seed).expect("a level");
+        assert_eq!(level.start_cell, level.maze.start());
+        assert_ne!(level.goal_cell, level.start_cell);
     }
 }
 
@@ -179,7 +199,9 @@ fn record(path: &Path, text: &str, levels: u64) {
 #[test]
 fn recordings_replay_to_the_bit() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (index, text) in ["medium+retarget", "random", "umaze+contact=rapier+sparse"].into_iter().enumerate() {
+    for (index, text) in
+        ["medium+retarget", "random+end-at-goal", "umaze+contact=rapier+sparse"].into_iter().enumerate()
+    {
         let path = folder.path().join(format!("{index}.demo"));
         record(&path, text, 6);
         let report = verify_file(&GAME, &path, |_| {}).expect("readable");
@@ -187,7 +209,7 @@ fn recordings_replay_to_the_bit() {
         let reader = DemoReader::open(&path).expect("readable");
         assert_eq!(reader.header().mode, text);
         let episodes = reader.read_all().expect("whole");
-        let end = if text == "random" { DemoEnd::Terminated { success: true } } else { DemoEnd::Truncated };
+        let end = if text.contains("end-at-goal") { DemoEnd::Terminated { success: true } } else { DemoEnd::Truncated };
         assert!(episodes.iter().all(|episode| episode.end == end), "{text}");
     }
 }

@@ -28,15 +28,16 @@ const EXPERIMENT: &str = r#"(
     ),
     ppo: (num_steps: 128, minibatches: 8, epochs: 4, hidden: [64, 64], lr: 0.001, ent_coef: 0.0, gamma: 0.99),
     sac: (
-        num_steps: 4, batch: 64, buffer: 20000, learning_starts: 1000, hidden: [32, 32], updates_per_step: 0.02,
+        num_steps: 4, batch: 64, buffer: 60000, learning_starts: 1000, hidden: [64, 64], updates_per_step: 0.1,
+        actor_lr: 0.001, critic_lr: 0.001, gamma: 0.98, entropy: Fixed(0.02),
     ),
     score: (horizon: 8),
 )"#;
 
 fn experiment(algorithm: Algorithm) -> Experiment {
     let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
-    // Off-policy learning is slow by comparison: here it is enough that it runs, past the end of some episodes.
-    let (steps, arenas) = if algorithm.is_sac() { (4_000, 8) } else { (experiment.steps, experiment.arenas) };
+    // Learning from a buffer takes fewer steps and more time for each.
+    let (steps, arenas) = if algorithm.is_sac() { (60_000, 8) } else { (experiment.steps, experiment.arenas) };
     let mut experiment = Experiment { algorithm, steps, arenas, ..experiment };
     // SAC squashes its actions, so its policy cannot be a copy of the decoder.
     experiment.score.init_from_decoder = !algorithm.is_sac();
@@ -99,15 +100,13 @@ fn train(algorithm: Algorithm, skills: &SkillModel) -> Player {
 }
 
 #[test]
-fn with_continuous_actions_both_ppos_beat_chance_and_both_sacs_run() {
+fn with_continuous_actions_everybody_beats_chance() {
     let skills = skills();
     let (chance, chance_success) = measure(&Player::Blind(BlindBot::Uniform));
-    for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo] {
+    for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo, Algorithm::Sac, Algorithm::ScoreSac] {
         let (mean, success) = measure(&train(algorithm, &skills));
-        assert!(mean > 2.0 * chance && success > 2.0 * chance_success, "{algorithm}: {mean} against {chance}");
-    }
-    for algorithm in [Algorithm::Sac, Algorithm::ScoreSac] {
-        let (mean, _) = measure(&train(algorithm, &skills));
-        assert!(mean.is_finite() && mean > 0.0, "{algorithm}: {mean}");
+        let factor = if algorithm.is_sac() { 1.5 } else { 2.0 };
+        let learned = mean > factor * chance && success > factor * chance_success;
+        assert!(learned, "{algorithm}: {mean} and {success} against {chance} and {chance_success}");
     }
 }

@@ -109,6 +109,21 @@ fn an_ants_trail_begins_at_its_start() {
 }
 
 #[test]
+fn the_plan_of_coinrun_has_what_kills_and_what_carries() {
+    let plan = |level| game("coinrun").floor_plan("hard", level).expect("a plan");
+    // Saws on the ground and in pits, and crates, of the original's levels.
+    for (level, saws, crates) in [(0, 0, 4), (1, 1, 4), (6, 5, 9), (7, 10, 4), (8, 1, 11)] {
+        let plan = plan(level);
+        assert_eq!((plan.hazards.len(), plan.platforms.len()), (saws, crates), "level {level}");
+        assert!(plan.hazards.iter().chain(&plan.platforms).all(|area| area.size() == Vec2::ONE), "level {level}");
+    }
+    // Three pits of lava: rows of tiles are joined, and lie between walls.
+    let lava = plan(4).hazards;
+    assert!(lava.len() >= 3 && lava.iter().all(|area| area.width() > 1.0 && area.height() == 1.0), "{lava:?}");
+    assert!(lava.iter().all(|area| plan(4).walls.iter().all(|wall| wall.intersect(*area).is_empty())));
+}
+
+#[test]
 fn every_tick_is_counted_in_the_square_where_it_was() {
     let trails = trails("coinrun", &right_jump(), "hard:0..0");
     let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");

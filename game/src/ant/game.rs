@@ -4,6 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
 use bevy_playbot::{
+    floor_plan::FloorPlan,
     prelude::*,
     vision::{Picture, VisionSystems},
 };
@@ -75,6 +76,14 @@ impl Game for Ant {
 
     fn build_picture(&self, app: &mut App) {
         app.add_plugins(AntPicturePlugin);
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Task::named(mode)?.floor_plan(level)
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<Walker>(agent).map(Walker::place)
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {

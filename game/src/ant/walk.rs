@@ -1,7 +1,7 @@
 //! The game `ant`: get to goals on an open floor.
 
 use bevy::prelude::*;
-use bevy_playbot::{fault::Faults, prelude::*};
+use bevy_playbot::{fault::Faults, floor_plan::FloorPlan, prelude::*};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -9,6 +9,8 @@ use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState, ste
 
 /// How near a goal is near enough, in metres.
 pub const GOAL_RADIUS: f32 = 0.5;
+/// How far away the goal of [`Task::Goal`] is, in metres.
+const GOAL_DISTANCE: f32 = 8.0;
 /// Reward for each metre that the goal comes nearer. A control step at 1 m/s gives 1.
 const PROGRESS_REWARD: f32 = 10.0;
 /// Reward for each step on the feet.
@@ -49,13 +51,35 @@ impl Task {
         }
     }
 
+    /// The level from above: the first goal, and the floor around. `None` where there are more goals to come.
+    pub(super) fn floor_plan(self, level: u64) -> Option<FloorPlan> {
+        let bounds = Rect::from_center_size(Vec2::ZERO, Vec2::splat(2.0 * GOAL_DISTANCE + 4.0));
+        let plan = |goal| FloorPlan { bounds, start: Vec2::ZERO, goal, ..FloorPlan::default() };
+        (self == Self::Goal).then(|| plan(self.begin(level).goal))
+    }
+
+    /// An ant at the beginning of a level.
+    fn begin(self, level: u64) -> Beginning {
+        let mut draws = ChaCha8Rng::seed_from_u64(level);
+        let state = AntState::reset(&mut draws);
+        let goal = self.next_goal(Vec2::ZERO, &mut draws);
+        Beginning { state, goal, draws }
+    }
+
     fn next_goal(self, from: Vec2, rng: &mut ChaCha8Rng) -> Vec2 {
         let distance = match self {
-            Self::Goal => 8.0,
+            Self::Goal => GOAL_DISTANCE,
             Self::Chase => rng.random_range(2.0..=10.0f32),
         };
         from + distance * Vec2::from_angle(rng.random_range(0.0..std::f32::consts::TAU))
     }
+}
+
+/// How a level begins, and what draws its later goals.
+struct Beginning {
+    state: AntState,
+    goal: Vec2,
+    draws: ChaCha8Rng,
 }
 
 /// An ant and the goal it is to reach.
@@ -76,7 +100,8 @@ impl Default for Walker {
 }
 
 impl Walker {
-    fn place(&self) -> Vec2 {
+    /// Where the ant is, in metres.
+    pub(super) fn place(&self) -> Vec2 {
         self.body.torso().0.truncate()
     }
 }
@@ -89,10 +114,10 @@ impl HoldsAnt for Walker {
 
 pub(super) fn start_episode(event: On<StartEpisode>, task: Res<Task>, mut walkers: Query<&mut Walker>) {
     let Ok(mut walker) = walkers.get_mut(event.entity) else { return };
-    let mut rng = ChaCha8Rng::seed_from_u64(event.level);
-    walker.body.set_state(&AntState::reset(&mut rng));
-    walker.goal = task.next_goal(Vec2::ZERO, &mut rng);
-    walker.draws = rng;
+    let Beginning { state, goal, draws } = task.begin(event.level);
+    walker.body.set_state(&state);
+    walker.goal = goal;
+    walker.draws = draws;
 }
 
 pub(super) fn walk(

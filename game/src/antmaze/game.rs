@@ -59,6 +59,15 @@ impl Game for AntMaze {
         mode.parse::<AntMazeMode>().map(drop).map_err(|error| error.of(mode))
     }
 
+    fn family(&self, mode: &str) -> String {
+        let Ok(mode) = mode.parse::<AntMazeMode>() else { return mode.to_owned() };
+        mode.map.family().unwrap_or_else(|| mode.to_string())
+    }
+
+    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        mode.parse::<AntMazeMode>().ok()?.map.fingerprint(level)
+    }
+
     fn tick_hz(&self) -> f64 {
         ANT_HZ
     }

@@ -32,7 +32,7 @@ pub enum Pay {
     /// Minus the distance in metres, as in D4RL.
     #[default]
     Distance,
-    /// exp(-distance), as in Gymnasium-Robotics. Written `dense=exp`.
+    /// exp(-distance), as in Gymnasium-Robotics, and as there the episode goes on at the goal. Written `dense=exp`.
     Exponential,
     /// 1 at the goal and 0 elsewhere. Written `sparse`.
     Sparse,
@@ -244,7 +244,7 @@ mod tests {
             ("medium+limit=0", &["limit=0", "at least 1"]),
             ("medium+limit=many", &["limit=many", "at least 1"]),
             ("random+goals=demo", &["goals=demo", "goals=random"]),
-            ("random+size=3x3", &["3 x 3"]),
+            ("random+size=3x3", &["size=3x3"]),
             ("medium+sparse+dense=exp", &["`dense=exp`", "contradicts"]),
             ("medium+limit=5+limit=6", &["`limit=6`", "repeats"]),
             ("", &["unknown map ``", "medium"]),

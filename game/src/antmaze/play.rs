@@ -39,7 +39,11 @@ pub(super) fn play(
         *hash = state.hash();
         reward.add(pay(rules.0.pay, away));
         if away <= GOAL_RADIUS {
-            episode.terminate(true);
+            match rules.0.pay {
+                // Nobody would end what pays for every tick.
+                Pay::Exponential => episode.reach(),
+                Pay::Distance | Pay::Sparse => episode.terminate(true),
+            }
         }
         if episode.tick + 1 >= rules.0.limit {
             episode.truncate();

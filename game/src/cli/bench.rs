@@ -71,6 +71,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         ("sim/maze2d/physics", maze2d_physics, "medium", Vector, simulate),
         ("sim/maze2d/rapier", maze2d, "medium+contact=rapier", Vector, simulate),
         ("sim/maze2d/random", maze2d, "random", Vector, simulate),
+        ("sim/maze2d/sighted", registry::game("maze2d-sighted")?, "random", Vector, simulate),
         ("sim/maze2d/raster", maze2d, "medium", Raster, simulate),
         ("sim/antmaze/vector", antmaze, "medium", Vector, simulate),
         ("sim/antmaze/raster", antmaze, "medium", Raster, simulate),
@@ -87,7 +88,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     for (name, game, mode, kind, measure) in wanted {
         let measured = match measure(*game, mode, *kind, &args) {
             Err(CliError::Vision(error)) if args.case.is_empty() => {
-                eprintln!("{name}: {error}");
+                tell!("{name}: {error}");
                 continue;
             }
             measured => measured?,

@@ -1,13 +1,17 @@
 //! `playbot config`.
 
-use bevy_playbot::train::presets::{PRESETS, Preset};
+use bevy_playbot::train::{
+    Experiment,
+    presets::{PRESETS, Preset},
+};
 use clap::Subcommand;
 use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment::ExperimentArgs,
+    experiment::{ExperimentArgs, resolve},
 };
+use crate::registry;
 
 /// Shows what an experiment comes to, and what it can be built on.
 #[derive(clap::Args)]
@@ -37,10 +41,21 @@ enum What {
     },
 }
 
+/// Checks what an experiment says of its game. Recordings may still be made.
+fn check(experiment: &Experiment) -> Result<(), CliError> {
+    experiment.check_levels(registry::game(&experiment.game)?)?;
+    let demos = experiment.demos.as_deref().filter(|_| experiment.algorithm.needs_skills());
+    if let Some(path) = demos.filter(|path| !resolve(path).exists()) {
+        tell!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
+    }
+    Ok(())
+}
+
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     match args.what {
         What::Show { from } => {
             let experiment = from.load([])?;
+            check(&experiment)?;
             print_line(experiment.to_ron().map_err(|error| CliError::Usage(error.to_string()))?)?;
         }
         What::Presets { name, json } => {

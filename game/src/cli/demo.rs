@@ -7,13 +7,14 @@ use std::{
 
 use bevy_playbot::demo::{
     file::{Decider, DemoEpisode, DemoReader, DemoSummary, EpisodeActions, find_demos, repair},
-    verify::verify_file,
+    verify::{VerifyError, VerifyReport, verify_file},
 };
 use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
     experiment::resolve,
+    number::counted,
     progress,
 };
 use crate::registry;
@@ -24,6 +25,7 @@ use crate::registry;
   playbot demo ls
   playbot demo show demos/coinrun/easy.demo --episode 0
   playbot demo verify demos/coinrun
+  playbot demo verify a.demo b.demo --json
   playbot demo repair torn.demo --out whole.demo")]
 pub struct Args {
     #[command(subcommand)]
@@ -52,11 +54,11 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
-    /// Replay recordings; exit code 1 if one diverges.
+    /// Replay recordings; exit code 1 if one diverges, is damaged or cannot be replayed.
     Verify {
-        /// File or folder.
+        /// Files or folders.
         #[arg(default_value = "demos")]
-        path: PathBuf,
+        paths: Vec<PathBuf>,
         /// One line of JSON per recording.
         #[arg(long)]
         json: bool,
@@ -78,7 +80,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Ls { path, json } => ls(&resolve(&path), json),
         Verb::Show { file, episode, json } => show(&file, episode, json),
-        Verb::Verify { path, json } => verify(&resolve(&path), json),
+        Verb::Verify { paths, json } => verify(&paths, json),
         Verb::Repair { file, out, json } => mend(&file, out.as_deref().unwrap_or(&file), json),
     }
 }
@@ -89,7 +91,7 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
         let summary = match DemoSummary::read(&file) {
             Ok(summary) => summary,
             Err(error) => {
-                eprintln!("{error}");
+                tell!("{error}");
                 outcome = Outcome::Findings;
                 continue;
             }
@@ -98,14 +100,13 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
             print_line(json!(summary))?;
         } else {
             print_line(format!(
-                "{}: {} {}, {} episodes, {} steps, {:.1} % success{}, {} levels, {} KiB, by {}, decided by {}",
+                "{}: {} {}, {} episodes, {} steps, {}, {} levels, {} KiB, by {}, decided by {}",
                 file.display(),
                 summary.header.game,
                 summary.header.mode,
                 summary.episodes,
                 summary.steps,
-                100.0 * summary.success_share.unwrap_or(0.0),
-                out_of_time(&summary),
+                success(&summary),
                 summary.levels,
                 summary.bytes / 1024,
                 summary.header.demonstrator,
@@ -116,9 +117,17 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-/// Recordings do not say whether the aim was reached before time was up.
-fn out_of_time(summary: &DemoSummary) -> String {
-    if summary.truncated > 0 { format!(" ({} until time was up)", summary.truncated) } else { String::new() }
+/// The share of successes. Recordings do not say whether the aim was reached before time was up, and an episode that was
+/// cut off when the recording ended is none of those that the share is of.
+fn success(summary: &DemoSummary) -> String {
+    let share =
+        summary.success_share.map_or("no episode ended".to_owned(), |share| format!("{:.1} % success", 100.0 * share));
+    let notes: Vec<String> = [(summary.truncated, "until time was up"), (summary.aborted, "cut off")]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, how)| format!("{count} {how}"))
+        .collect();
+    if notes.is_empty() { share } else { format!("{share} ({})", notes.join(", ")) }
 }
 
 /// Who decided which share of the ticks.
@@ -188,58 +197,79 @@ fn show_ticks(episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-fn verify(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
+fn verify(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
+    let mut files = Vec::new();
+    for path in paths {
+        files.extend(find_demos(resolve(path))?);
+    }
     let mut outcome = Outcome::Pass;
-    for file in find_demos(path)? {
-        let header = DemoReader::open(&file)?.header().clone();
-        let game = registry::game(&header.game)?;
-        let episodes = DemoSummary::read(&file)?.episodes as u64;
-        let bar = progress::bar("replay", episodes, "episodes");
-        let report = verify_file(game, &file, |done| bar.set_position(done));
-        bar.finish_and_clear();
-        let report = report?;
+    for file in &files {
+        let checked = match replay(file) {
+            // The game is wrong, not what was recorded.
+            Err(error @ CliError::Verify(VerifyError::Fault(_))) => return Err(error),
+            checked => checked,
+        };
         // A verdict is never vacuous: nothing replayed proves nothing.
-        if !report.divergences.is_empty() || report.episodes == 0 {
+        if !checked.as_ref().is_ok_and(|report| report.divergences.is_empty() && report.episodes > 0) {
             outcome = Outcome::Findings;
         }
         if as_json {
-            print_line(json!({ "file": file, "report": report }))?;
-            continue;
+            let error = checked.as_ref().err().map(ToString::to_string);
+            print_line(json!({ "file": file, "report": checked.ok(), "error": error }))?;
+        } else {
+            print_report(file, checked)?;
         }
-        for (episode, divergence) in &report.divergences {
-            print_line(format!("{}: episode {episode}: {divergence}", file.display()))?;
-        }
-        let verdict = match report.divergences.len() {
-            0 if report.episodes == 0 => "nothing to replay".to_owned(),
-            0 => "all as recorded".to_owned(),
-            n => format!("{n} diverge"),
-        };
-        print_line(format!(
-            "{}: {} episodes, {} ticks replayed, {verdict}",
-            file.display(),
-            report.episodes,
-            report.ticks
-        ))?;
     }
     Ok(outcome)
 }
 
+/// Replays a file with a progress bar.
+fn replay(file: &Path) -> Result<VerifyReport, CliError> {
+    // The whole file is read before any of it is played: damage shows at once.
+    let summary = DemoSummary::read(file)?;
+    let game = registry::game(&summary.header.game).map_err(|error| in_file(file, &error))?;
+    let bar = progress::bar("replay", summary.episodes as u64, "episodes");
+    let report = verify_file(game, file, |done| bar.set_position(done));
+    bar.finish_and_clear();
+    Ok(report?)
+}
+
+fn in_file(file: &Path, error: &impl std::fmt::Display) -> CliError {
+    CliError::Usage(format!("{}: {error}", file.display()))
+}
+
+fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<(), CliError> {
+    let report = match checked {
+        Ok(report) => report,
+        Err(error) => return print_line(error),
+    };
+    for (episode, divergence) in &report.divergences {
+        print_line(format!("{}: episode {episode}: {divergence}", file.display()))?;
+    }
+    let verdict = match report.divergences.len() {
+        0 if report.episodes == 0 => "nothing to replay".to_owned(),
+        0 => "all as recorded".to_owned(),
+        n => format!("{n} diverge"),
+    };
+    let (episodes, ticks) = (report.episodes, report.ticks);
+    print_line(format!("{}: {episodes} episodes, {ticks} ticks replayed, {verdict}", file.display()))
+}
+
+/// Repairs a file. One in which no episode is whole is a finding.
 fn mend(file: &Path, out: &Path, as_json: bool) -> Result<Outcome, CliError> {
     let report = repair(file, out)?;
     if as_json {
         print_line(json!(report))?;
     } else {
-        print_line(format!(
-            "{}: kept {} episodes with {} steps, dropped {} bytes in {} places",
-            out.display(),
-            report.kept_episodes,
-            report.kept_steps,
-            report.dropped_bytes,
-            report.dropped_regions.len()
-        ))?;
+        let kept = match report.kept_episodes {
+            0 => "no episode is whole, so nothing is kept and there is nothing to replay or to learn from".to_owned(),
+            episodes => format!("kept {} with {} steps", counted(episodes as u64, "episode"), report.kept_steps),
+        };
+        let places = counted(report.dropped_regions.len() as u64, "place");
+        print_line(format!("{}: {kept}; dropped {} bytes in {places}", out.display(), report.dropped_bytes))?;
         if let Some(backup) = &report.backup {
             print_line(format!("the damaged file is kept as {}", backup.display()))?;
         }
     }
-    Ok(Outcome::Pass)
+    Ok(if report.kept_episodes == 0 { Outcome::Findings } else { Outcome::Pass })
 }

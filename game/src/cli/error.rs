@@ -3,7 +3,10 @@
 use std::{io, path::PathBuf};
 
 use bevy_playbot::{
-    demo::{file::DemoFileError, verify::VerifyError},
+    demo::{
+        file::{DemoFault, DemoFileError},
+        verify::VerifyError,
+    },
     eval::EvalError,
     fault::Fault,
     game::UnknownName,
@@ -28,6 +31,8 @@ pub enum Outcome {
     Pass,
     /// The command worked and found something wrong in what it looked at.
     Findings,
+    /// Somebody stopped it before it was done.
+    Stopped,
 }
 
 /// Why a command did not work.
@@ -54,6 +59,17 @@ pub enum CliError {
         step: u64,
         /// Its folder.
         checkpoint: PathBuf,
+    },
+    /// A training could not be saved even once.
+    #[error(
+        "{error}; nothing of {} is saved yet, so there is nothing to go on from: make room or rights and start again \
+         (`train` with --force, `study` with --resume)", run.display()
+    )]
+    NeverSaved {
+        /// Why.
+        error: Box<RunError>,
+        /// Folder of the run.
+        run: PathBuf,
     },
     /// A training could not be saved.
     #[error(
@@ -126,7 +142,6 @@ impl CliError {
             | Self::Config(_)
             | Self::Experiment(_)
             | Self::Study(_)
-            | Self::Demo(_)
             | Self::Misfit(_)
             | Self::Vision(_)
             | Self::Sight(_)
@@ -134,7 +149,8 @@ impl CliError {
             | Self::Export(ExportError::Vision(_) | ExportError::Sight(_)) => 3,
             Self::File(error) | Self::Export(ExportError::File(error)) => file_code(error),
             Self::Run(error) | Self::Runs(RunsError::Run(error)) => run_code(error),
-            Self::NotSaved { error, .. } => run_code(error),
+            Self::NotSaved { error, .. } | Self::NeverSaved { error, .. } => run_code(error),
+            Self::Demo(error) | Self::Verify(VerifyError::File(error)) => demo_code(error),
             Self::Train(error) => train_code(error),
             Self::Verify(VerifyError::Fault(_)) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
@@ -174,12 +190,25 @@ fn run_code(error: &RunError) -> u8 {
     }
 }
 
-/// A file that is not there or not what it should be was named by the caller; a disk that fails was not.
 fn file_code(error: &FileError) -> u8 {
     match error {
-        FileError::Io { source, .. } if source.kind() != io::ErrorKind::NotFound => 2,
+        FileError::Io { source, .. } => io_code(source),
         _ => 3,
     }
+}
+
+fn demo_code(error: &DemoFileError) -> u8 {
+    match &error.fault {
+        DemoFault::Io { source, .. } => io_code(source),
+        DemoFault::PushFailed { .. } | DemoFault::PushTorn { .. } | DemoFault::Torn => 2,
+        _ => 3,
+    }
+}
+
+/// A file that is not there, or a folder in place of one, was named by the caller; a disk that fails was not.
+fn io_code(error: &io::Error) -> u8 {
+    use io::ErrorKind::{IsADirectory, NotADirectory, NotFound};
+    if matches!(error.kind(), NotFound | IsADirectory | NotADirectory) { 3 } else { 2 }
 }
 
 fn train_code(error: &TrainError) -> u8 {

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use bevy_playbot::{
     eval::{EvalPlan, Player},
     game::Game,
-    learner::{DeviceKind, SkillModel, SkillSource},
-    policy::ActionDraw,
+    held_out::HeldOut,
+    learner::{DeviceKind, PolicyFile, SkillModel, SkillSource},
+    policy::{ActionDraw, in_words},
     report::to_text_table,
     skill_prior::SkillPrior,
     split::LevelSplit,
@@ -19,9 +20,10 @@ use super::{
     experiment::{ExperimentArgs, option},
     footprints::Footprints,
     methods,
+    number::at_least_one,
     player::Chosen,
 };
-use crate::registry;
+use crate::registry::{self, GAMES};
 
 /// Measures trained runs, behaviour cloning and bots on the held-out levels, every level equally often.
 #[derive(clap::Args)]
@@ -42,7 +44,7 @@ pub struct Args {
     /// Skill model: measures behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Vec<PathBuf>,
-    /// Policy file, as written by `playbot policy export`; may be given several times.
+    /// Policy file, as written by `playbot policy export`, which says what game is played; may be given several times.
     #[arg(long)]
     policy: Vec<PathBuf>,
     /// Bot of the game, such as random, right-jump or search; may be given several times.
@@ -51,7 +53,8 @@ pub struct Args {
     /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
     #[arg(long)]
     observation: Option<ObservationKind>,
-    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named.
+    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named, or the first 64 of
+    /// the game if a policy file is of another game than the built-in experiment.
     #[arg(long)]
     levels: Vec<LevelSplit>,
     /// Episodes on each level, instead of the experiment's.
@@ -66,7 +69,7 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
@@ -88,10 +91,14 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     }
     let experiment = read_experiment(&args)?;
     let game = registry::game(&experiment.game)?;
-    let players = players(game, &experiment, &args)?;
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
     let episodes = experiment.eval.episodes_per_level;
+    if args.levels.is_empty() {
+        let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
+        experiment.check_test(game).map_err(or_levels)?;
+    }
     splits.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    let players = players(game, &experiment, &args)?;
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
@@ -111,11 +118,12 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
             rows.push(measured.into_row());
         }
     }
-    if let Some(footprints) = footprints {
-        footprints.write(game)?;
-    }
     if !args.json {
         print_line(to_text_table(&rows))?;
+    }
+    // Last: a measurement is not lost because it cannot be drawn.
+    if let Some(footprints) = footprints {
+        footprints.write(game)?;
     }
     Ok(Outcome::Pass)
 }
@@ -135,8 +143,20 @@ fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
             experiment.check()?;
             Ok(experiment)
         }
-        _ => Ok(args.from.load(options)?),
+        _ => Ok(args.from.over(of_policy(args)?).load(options)?),
     }
+}
+
+/// The game of the first policy file, and levels of it, where nobody says which: the built-in experiment is CoinRun's.
+fn of_policy(args: &Args) -> Result<Vec<String>, CliError> {
+    let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
+    let file = PolicyFile::load(path, args.device)?;
+    let game = registry::game(&file.card.game)?;
+    if args.from.load([])?.game == game.name() {
+        return Ok(Vec::new());
+    }
+    let mode = game.modes().first().copied().unwrap_or_default();
+    Ok(vec![format!("game={}", game.name()), format!("test={mode}:0..63")])
 }
 
 fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<Chosen>, CliError> {
@@ -144,13 +164,13 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Vec<
     let mut players = Vec::new();
     for path in &args.run {
         let (run, own, info) = RunDir::open(path)?;
-        check_run(path, &own, experiment, args)?;
+        check_run(path, game, &own, experiment, args)?;
         let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.device)?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
-        let sight = Sight::from_card(model.picture(), &model.observation())?;
+        let sight = check_skills(path, &model, game, &args.from)?;
         let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), sight };
         players.push(named(chosen, path, args.skills.len()));
     }
@@ -186,7 +206,13 @@ fn look_through(sight: &mut Sight, eyes: Option<ObservationKind>, name: &str) ->
 }
 
 /// A run is measured in its own game, and on levels it was trained on only if somebody names them.
-fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) -> Result<(), CliError> {
+fn check_run(
+    path: &Path,
+    game: &dyn Game,
+    own: &Experiment,
+    measured: &Experiment,
+    args: &Args,
+) -> Result<(), CliError> {
     let path = path.display();
     if own.game != measured.game {
         return Err(CliError::Usage(format!(
@@ -194,7 +220,7 @@ fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) 
             own.game, measured.game
         )));
     }
-    if args.levels.is_empty() && own.train.overlaps(&measured.test) {
+    if args.levels.is_empty() && HeldOut::new(game, &measured.test).first_of(&own.train).is_some() {
         return Err(CliError::Usage(format!(
             "{path} was trained on {}, which shares levels with the held-out levels {}: choose levels that none of the \
              runs has seen, or measure there on purpose, with --levels",
@@ -207,6 +233,43 @@ fn check_run(path: &Path, own: &Experiment, measured: &Experiment, args: &Args) 
 /// A player, with its path in its name where there are several of its kind.
 fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
     if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
+}
+
+/// Checks that a skill model was learned for a game, and returns what it sees. The model's file does not name its game.
+///
+/// # Errors
+///
+/// What the model reads and how it acts, and which game has that.
+pub fn check_skills(
+    path: &Path,
+    model: &SkillModel,
+    game: &dyn Game,
+    from: &ExperimentArgs,
+) -> Result<Sight, CliError> {
+    let sight = Sight::from_card(model.picture(), &model.observation())?;
+    let fits = |game: &dyn Game| {
+        let can_see = sight.check(game).is_ok();
+        can_see && (model.observation(), model.action_space()) == (sight.obs_kind(game), game.actions())
+    };
+    if fits(game) {
+        return Ok(sight);
+    }
+    let others: Vec<_> = GAMES.into_iter().filter(|name| registry::game(name).is_ok_and(fits)).collect();
+    let whose = if others.is_empty() { "no game".to_owned() } else { others.join(" or ") };
+    let advice = match from.names_game() {
+        true => "name another one".to_owned(),
+        false => {
+            let game = others.first().copied().unwrap_or("NAME");
+            format!("name its experiment with --experiment, or its game and levels with --set game={game}")
+        }
+    };
+    Err(CliError::Usage(format!(
+        "{} holds skills for {} and {:?}, which are those of {whose}, not of `{}`: {advice}",
+        path.display(),
+        in_words(&model.observation()),
+        model.action_space(),
+        game.name()
+    )))
 }
 
 /// Behaviour cloning: the decoder under the prior, without any reinforcement learning.

@@ -39,10 +39,30 @@ impl ExperimentArgs {
         }
     }
 
+    /// Whether somebody said which game: in an experiment file, or with `--set`.
+    pub fn names_game(&self) -> bool {
+        self.experiment.is_some() || self.set.iter().any(|set| sets_key(set, "game"))
+    }
+
+    /// These, under what is already known of the experiment, as `key=value`.
+    pub fn over(&self, known: impl IntoIterator<Item = String>) -> Self {
+        Self { experiment: self.experiment.clone(), set: known.into_iter().chain(self.set.iter().cloned()).collect() }
+    }
+
     /// What `--set` and then what the options with names of their own say.
     pub fn sets(&self, options: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
         self.set.iter().cloned().chain(options.into_iter().flatten()).collect()
     }
+}
+
+fn sets_key(set: &str, key: &str) -> bool {
+    set.split_once('=').is_some_and(|(name, _)| name.trim() == key)
+}
+
+/// A word for the shell.
+pub fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
+    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }
 
 /// An option with a name of its own, as `key=value`.

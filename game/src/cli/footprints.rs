@@ -44,19 +44,22 @@ impl Footprints {
         }
     }
 
-    /// Adds what a player did on some levels. The trails come sorted by level.
+    /// Adds what a player did on some levels, from the start of each. The trails come sorted by level.
     pub fn add(&mut self, game: &dyn Game, split: &LevelSplit, player: &str, trails: Vec<Trail>) {
         let mut known = None;
-        for trail in trails {
+        for mut trail in trails {
             let level = trail.result.level;
-            let at = match known {
-                Some((same, at)) if same == level => at,
+            let (at, start) = match known {
+                Some((same, at, start)) if same == level => (at, start),
                 _ => {
                     let Some(plan) = game.floor_plan(&split.mode, level) else { continue };
-                    self.ground(&split.mode, level, plan)
+                    let start = plan.start;
+                    (self.ground(&split.mode, level, plan), start)
                 }
             };
-            known = Some((level, at));
+            known = Some((level, at, start));
+            // The first place is that after the first tick, which may be far from the mark of the start.
+            trail.places.insert(0, start);
             let walkers = &mut self.grounds[at].floor.walkers;
             match walkers.iter_mut().find(|walker| walker.name == player) {
                 Some(walker) => walker.trails.push(trail),
@@ -69,7 +72,8 @@ impl Footprints {
     fn ground(&mut self, mode: &str, level: u64, plan: FloorPlan) -> usize {
         let is_same = |ground: &Ground| {
             let known = &ground.floor.plan;
-            ground.mode == mode && known.bounds == plan.bounds && known.walls == plan.walls
+            let tiles = |plan: &FloorPlan| [&plan.walls, &plan.hazards, &plan.platforms].map(Vec::clone);
+            ground.mode == mode && known.bounds == plan.bounds && tiles(known) == tiles(&plan)
         };
         let (start, goal) = (plan.start, plan.goal);
         let at = self.grounds.iter().position(is_same).unwrap_or_else(|| {

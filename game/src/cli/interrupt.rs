@@ -5,6 +5,9 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
+/// The exit code of work that was stopped, as shells have it: 128 and the number of the signal.
+pub const EXIT_CODE: u8 = 130;
+
 static ASKED: AtomicBool = AtomicBool::new(false);
 static INSTALLED: OnceLock<()> = OnceLock::new();
 
@@ -13,9 +16,9 @@ pub fn listen() {
     INSTALLED.get_or_init(|| {
         let installed = ctrlc::set_handler(|| {
             if ASKED.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
+                std::process::exit(EXIT_CODE.into());
             }
-            eprintln!("\nstopping after this step; press Ctrl-C again to stop at once and lose it");
+            tell!("\nstopping after this step; press Ctrl-C again to stop at once and lose it");
         });
         if let Err(error) = installed {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");

@@ -16,7 +16,10 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     experiment::{self, ExperimentArgs, option},
-    interrupt, progress,
+    interrupt,
+    number::{at_least_one, counted},
+    output::{beside, prepare},
+    progress,
 };
 use crate::registry;
 
@@ -33,7 +36,8 @@ pub struct Args {
     /// File or folder of recordings, instead of the experiment's.
     #[arg(long)]
     demos: Option<PathBuf>,
-    /// Learn from at most so many recorded steps, instead of the experiment's `demo_steps`.
+    /// Learn from at most so many recorded steps, instead of the experiment's `demo_steps`. Whole episodes are taken, and
+    /// at least one, however long it is.
     #[arg(long)]
     max_steps: Option<u64>,
     /// Passes over the recordings, instead of the experiment's.
@@ -49,7 +53,7 @@ pub struct Args {
     #[arg(long)]
     resume: bool,
     /// Threads that replay recordings; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
@@ -61,12 +65,13 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let experiment = args.from.load([option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
-    let checkpoint = prepare(&args)?;
+    let checkpoint = checkpoint(&args)?;
     let game = registry::game(&experiment.game)?;
     let demos = match &args.demos {
         Some(demos) => demos.clone(),
         None => experiment::resolve(experiment.recordings()?),
     };
+    prepare(&args.out)?;
     let dataset = read_demos(game, &experiment, &demos, args.threads)?;
     if args.force {
         // Not earlier: what there is stays if there is nothing to learn from.
@@ -77,11 +82,14 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
     };
     match learn(&experiment, dataset, args.device, Some(&checkpoint), report)? {
-        None => eprintln!("stopped and saved: go on with the same command and --resume"),
+        None => {
+            tell!("stopped and saved; no skill model is written yet: go on with the same command and --resume");
+            return Ok(Outcome::Stopped);
+        }
         Some(model) => {
             model.save(&args.out)?;
             remove(&checkpoint)?;
-            eprintln!("skill model written to {}", args.out.display());
+            tell!("skill model written to {}", args.out.display());
         }
     }
     Ok(Outcome::Pass)
@@ -89,9 +97,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 
 /// Where the state of an unfinished training is kept.
 pub fn checkpoint_of(out: &Path) -> PathBuf {
-    let mut name = out.file_name().unwrap_or_default().to_owned();
-    name.push(".checkpoint");
-    out.with_file_name(name)
+    beside(out, ".checkpoint")
 }
 
 /// Removes a checkpoint that is not needed any more, if there is one.
@@ -109,7 +115,7 @@ pub fn remove(checkpoint: &Path) -> Result<(), CliError> {
 }
 
 /// The checkpoint's path, if what lies there fits what was asked for.
-fn prepare(args: &Args) -> Result<PathBuf, CliError> {
+fn checkpoint(args: &Args) -> Result<PathBuf, CliError> {
     let checkpoint = checkpoint_of(&args.out);
     if args.out.exists() && !args.force {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
@@ -145,11 +151,19 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
     if let Some(steps) = experiment.demo_steps {
         demos = demos.at_most(steps);
     }
-    let (steps, episodes, gib) = (demos.steps(), demos.episodes(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
-    eprint!("{steps} steps in {episodes} episodes from {}", path.display());
+    let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
+    begin_to_tell!(
+        "{} in {} from {}",
+        counted(steps, "step"),
+        counted(demos.episodes() as u64, "episode"),
+        path.display()
+    );
+    if experiment.demo_steps.is_some_and(|wanted| wanted < steps) {
+        begin_to_tell!(" (more than was asked for: episodes are kept whole)");
+    }
     match demos.picture_bytes() {
-        0 => eprintln!(),
-        bytes => eprintln!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+        0 => tell!(),
+        bytes => tell!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
     }
     let bar = progress::bar("replay recordings", steps, "steps");
     let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
@@ -211,6 +225,6 @@ fn begin(
             path.display()
         )));
     }
-    eprintln!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
+    tell!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
     Ok(trainer)
 }

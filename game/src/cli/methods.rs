@@ -113,8 +113,9 @@ fn timed<T>(
     let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
     let summary = summarize(name, &plan.split, &episodes);
     if summary.clipped > 0.0 {
-        eprintln!(
-            "{name}: {:.1} % of the actions lay outside the game's range and were clipped",
+        tell!(
+            "{name} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
+            plan.split,
             100.0 * summary.clipped
         );
     }

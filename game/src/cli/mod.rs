@@ -1,6 +1,9 @@
 //! The command line. One file per verb; data goes to standard output, everything else to standard error.
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 
+#[macro_use]
+mod tell;
+
 mod bench;
 mod config;
 mod demo;
@@ -12,7 +15,11 @@ mod footprints;
 mod interrupt;
 mod learn_skills;
 mod level;
+#[cfg(all(target_os = "linux", feature = "camera"))]
+mod mesa;
 mod methods;
+mod number;
+mod output;
 mod play;
 mod player;
 mod plot;
@@ -62,7 +69,8 @@ Examples:
   playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
 
-Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration.";
+Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
+130 stopped by Ctrl-C before it was done.";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -102,6 +110,8 @@ enum Verb {
 
 /// Runs the command line on the process's arguments.
 pub fn main() -> ExitCode {
+    #[cfg(all(target_os = "linux", feature = "camera"))]
+    mesa::hush();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -116,13 +126,14 @@ pub fn main() -> ExitCode {
     match std::panic::catch_unwind(|| run(verb)) {
         Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
         Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
+        Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            eprintln!("error: {error}");
+            tell!("error: {error}");
             ExitCode::from(error.exit_code())
         }
         Err(_) => {
-            eprintln!("error: the program failed, which is a bug in it; please report the lines above");
+            tell!("error: the program failed, which is a bug in it; please report the lines above");
             ExitCode::from(2)
         }
     }
@@ -154,5 +165,7 @@ fn init_tracing(verbose: u8) {
     let level = ["warn,winit=error,bevy_render::renderer=error", "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    // What cannot be written is not worth a word, which could not be written either.
+    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
+    format.with_writer(std::io::stderr).init();
 }

@@ -7,14 +7,14 @@ use bevy_playbot::{
     learner::{DeviceKind, PolicyFile, SkillModel},
     policy_file::{check_policy, export_policy, policy_file, policy_sight},
     train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
-    vision::Sight,
 };
 use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    eval::cloning_skills,
-    experiment::ExperimentArgs,
+    eval::{check_skills, cloning_skills},
+    experiment::{ExperimentArgs, quoted},
+    output::prepare,
 };
 use crate::registry;
 
@@ -79,6 +79,7 @@ fn export(args: &Export) -> Result<Outcome, CliError> {
     if args.out.exists() && !args.force {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
     }
+    prepare(&args.out)?;
     let (game, experiment, file) = match (&args.run, &args.skills) {
         (Some(run), _) => from_run(run, args.checkpoint)?,
         (None, Some(skills)) => from_skills(skills, &args.from)?,
@@ -86,7 +87,12 @@ fn export(args: &Export) -> Result<Outcome, CliError> {
     };
     check_policy(game, &file)?;
     export_policy(game, &file, &experiment.train, experiment.seed, &args.out)?;
-    eprintln!("policy written to {}: measure it with `playbot eval --policy {0}`", args.out.display());
+    let out = args.out.display().to_string();
+    let mut command = format!("playbot eval --policy {}", quoted(&out));
+    if experiment.check_test(game).is_ok() {
+        command += &format!(" --levels {}", quoted(&experiment.test.to_string()));
+    }
+    tell!("policy written to {out}: measure it with `{command}`");
     Ok(Outcome::Pass)
 }
 
@@ -118,7 +124,8 @@ fn from_skills(path: &Path, from: &ExperimentArgs) -> Result<Exported, CliError>
         None => "demonstrations".to_owned(),
     };
     let about = ("bc".to_owned(), training, code);
-    let sight = Sight::from_card(model.picture(), &model.observation())?;
+    let sight = check_skills(path, &model, game, from)?;
+    experiment.check_train(game)?;
     let file = policy_file(game, &sight, model.policy(), Some(cloning_skills(&model, &experiment)), about);
     Ok((game, experiment, file))
 }

@@ -1,18 +1,121 @@
-//! Progress bars on standard error, for everything that can take longer than two seconds.
+//! How far work is, on standard error, for everything that can take longer than two seconds: bars on a terminal, a plain
+//! line now and then elsewhere.
 
-use std::{sync::LazyLock, time::Duration};
+use std::{
+    fmt::Write as _,
+    io::{IsTerminal, Write as _, stderr},
+    sync::{LazyLock, Mutex, MutexGuard, Once, PoisonError},
+    thread,
+    time::Duration,
+};
 
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle, WeakProgressBar};
 
 /// All bars, so that a part's bar stands below that of the whole.
 static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
-/// A bar with a title, a count, the time left and room for a message.
+/// Time between two plain lines.
+const PAUSE: Duration = Duration::from_secs(10);
+
+/// What is told in plain lines.
+static TOLD: Mutex<Vec<Told>> = Mutex::new(Vec::new());
+static TELLER: Once = Once::new();
+
+/// A bar with a title, a count, the time left and room for a message. A length that grows with the position says nothing.
 pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
-    let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{eta}} left  {{msg}}");
-    let style =
-        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ");
-    let bar = BARS.add(ProgressBar::new(length)).with_style(style);
+    let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{left}}  {{msg}}");
+    let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = BARS.add(ProgressBar::new(length)).with_style(style.with_key("left", left).progress_chars("=> "));
     bar.enable_steady_tick(Duration::from_millis(250));
+    if !stderr().is_terminal() {
+        told().push(Told { title: title.to_owned(), unit: unit.to_owned(), bar: bar.downgrade() });
+        TELLER.call_once(|| drop(thread::spawn(tell)));
+    }
     bar
+}
+
+/// The time that is left, if anything has been done from which it can be told.
+fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
+    // What cannot be written is not drawn.
+    let _ = out.write_str(&left_in_words(state.eta()));
+}
+
+/// indicatif estimates no time at all as long as nothing is done.
+fn left_in_words(left: Duration) -> String {
+    if left.is_zero() { String::new() } else { format!("{:#} left", HumanDuration(left)) }
+}
+
+/// A bar that nobody sees, and how it is spoken of.
+struct Told {
+    title: String,
+    unit: String,
+    bar: WeakProgressBar,
+}
+
+impl Told {
+    /// Where the work is, as `record: 1200 of 20000 steps`; `None` if it is over.
+    fn line(&self) -> Option<String> {
+        let bar = self.bar.upgrade().filter(|bar| !bar.is_finished())?;
+        let (title, unit, done) = (&self.title, &self.unit, bar.position());
+        let mut line = match bar.length() {
+            Some(length) if length > done => format!("{title}: {done} of {length} {unit}"),
+            _ => format!("{title}: {done} {unit}"),
+        };
+        let message = bar.message();
+        if !message.is_empty() {
+            let _ = write!(line, ", {message}");
+        }
+        Some(line)
+    }
+}
+
+fn told() -> MutexGuard<'static, Vec<Told>> {
+    TOLD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Tells of all work that goes on, again and again.
+fn tell() {
+    loop {
+        thread::park_timeout(PAUSE);
+        let mut lines = String::new();
+        told().retain(|told| {
+            let line = told.line();
+            line.iter().for_each(|line| lines.extend([line, "\n"]));
+            line.is_some()
+        });
+        // Whoever closed standard error does not want to know.
+        let _ = stderr().write_all(lines.as_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(bar: &ProgressBar) -> Option<String> {
+        Told { title: "record".to_owned(), unit: "steps".to_owned(), bar: bar.downgrade() }.line()
+    }
+
+    #[test]
+    fn work_that_goes_on_is_told_in_words() {
+        let bar = ProgressBar::hidden();
+        bar.set_length(20_000);
+        bar.set_position(1200);
+        assert_eq!(words(&bar).as_deref(), Some("record: 1200 of 20000 steps"));
+        bar.set_message("return 3.00");
+        assert_eq!(words(&bar).as_deref(), Some("record: 1200 of 20000 steps, return 3.00"));
+        bar.set_length(1200);
+        bar.set_message("");
+        assert_eq!(words(&bar).as_deref(), Some("record: 1200 steps"), "the length is not known");
+        bar.finish_and_clear();
+        assert_eq!(words(&bar), None, "it is over");
+    }
+
+    #[test]
+    fn no_time_is_left_before_anything_is_done() {
+        let bar = ProgressBar::hidden();
+        bar.set_length(100);
+        assert_eq!(left_in_words(bar.eta()), "");
+        assert_eq!(left_in_words(Duration::from_secs(5)), "5s left");
+    }
 }

@@ -11,7 +11,13 @@ use bevy_playbot::{
     learner::{DeviceKind, SkillModel},
     policy::ActionDraw,
     report::{Chart, Curve, Report, ResultRow, ResultTable, Section, Table, to_text_table},
-    train::{Algorithm, Experiment, Trainer, run_dir::write_atomically, worlds::default_threads},
+    train::{
+        Algorithm, Experiment, Trainer,
+        metrics_log::{SUCCESS_RATE, range_of},
+        run_dir::{check_replaceable, is_unborn, write_atomically},
+        run_lock::RunLock,
+        worlds::default_threads,
+    },
 };
 use serde_json::json;
 
@@ -20,6 +26,7 @@ use super::{
     eval::cloning,
     experiment::{self, ExperimentArgs, option},
     interrupt, learn_skills, methods,
+    number::at_least_one,
     train::{create_run, drive},
 };
 use crate::registry;
@@ -36,7 +43,7 @@ const SKILLS: &str = "skills.safetensors";
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
-    /// Folder for everything the quickstart writes; its previous content is replaced.
+    /// Folder for everything the quickstart writes; what an earlier quickstart left there is replaced.
     #[arg(long, default_value = "runs/quickstart")]
     run: PathBuf,
     /// Seed, instead of the experiment's.
@@ -49,7 +56,7 @@ pub struct Args {
     #[arg(long)]
     epochs: Option<usize>,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// One line of JSON per method instead of a table.
     #[arg(long)]
@@ -89,9 +96,11 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let experiment = read_experiment(&args)?;
     let game = registry::game(&experiment.game)?;
+    Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() }.check_memory(game)?;
+    let _lock = take_folder(&args.run)?;
     let Some(skills) = skills(game, &experiment, &args)? else {
-        eprintln!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
-        return Ok(Outcome::Pass);
+        tell!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
+        return Ok(Outcome::Stopped);
     };
     let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut trained = Vec::new();
@@ -123,10 +132,10 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         print_line(to_text_table(&rows))?;
     }
     let comparison = compare(&trained);
-    eprintln!("{comparison}");
+    tell!("{comparison}");
     let report = args.run.join("report.html");
     write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
-    eprintln!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
+    tell!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
     Ok(Outcome::Pass)
 }
 
@@ -138,10 +147,31 @@ fn read_experiment(args: &Args) -> Result<Experiment, CliError> {
     ])?)
 }
 
+/// Makes the folder of the quickstart and locks it. Only that of an earlier quickstart is written into again.
+fn take_folder(path: &Path) -> Result<RunLock, CliError> {
+    let is_run = path.join("run.json").exists();
+    let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
+    if path.exists() && !is_unborn(path) && (is_run || !was_ours) {
+        return Err(CliError::Usage(format!(
+            "{} holds something else than an earlier quickstart, so it is left alone: choose another --run",
+            path.display()
+        )));
+    }
+    std::fs::create_dir_all(path)
+        .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+    let lock = RunLock::take(path)?;
+    for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
+        if run.exists() {
+            // Found out before skills are learned.
+            check_replaceable(&run)?;
+            RunLock::take(&run)?;
+        }
+    }
+    Ok(lock)
+}
+
 /// Learns the skill model and saves it; `None` after Ctrl-C.
 fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Option<SkillModel>, CliError> {
-    std::fs::create_dir_all(&args.run)
-        .map_err(|error| CliError::Io(format!("cannot create {}: {error}", args.run.display())))?;
     interrupt::listen();
     let demos = experiment::resolve(experiment.recordings()?);
     let dataset = learn_skills::read_demos(game, experiment, &demos, args.threads)?;
@@ -173,7 +203,7 @@ fn train_one(
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {
-            eprintln!("{algorithm}: the first policy is the decoder, KL {kl}");
+            tell!("{algorithm}: the first policy is the decoder, KL {kl}");
         }
         if let (Some(episodic_return), Some(success_rate)) = (report.episodic_return, report.success_rate) {
             curve.push(CurvePoint { step: report.step, episodic_return, success_rate });
@@ -186,8 +216,12 @@ fn train_one(
 
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     let run = args.run.join(algorithm.name());
-    eprintln!("stopped and saved: go on with `playbot train --run {} --resume`", run.display());
-    Outcome::Pass
+    tell!(
+        "stopped and saved; there is no report yet: go on with this training alone, `playbot train --run {} --resume`, \
+         or start again with `playbot quickstart`",
+        run.display()
+    );
+    Outcome::Stopped
 }
 
 /// How many steps SCORE needed for what PPO reached in the end, in words.
@@ -224,6 +258,7 @@ fn write_report(
         x_label: "environment steps".to_owned(),
         y_label: y_label.to_owned(),
         curves,
+        y_range: None,
         marks: Vec::new(),
     };
     let table = ResultTable {
@@ -257,7 +292,10 @@ fn write_report(
                 text: "Means over the last 100 training episodes.".to_owned(),
                 charts: vec![
                     chart("Return on training levels", "return", curve(|point| point.episodic_return)),
-                    chart("Success on training levels", "success rate", curve(|point| point.success_rate)),
+                    Chart {
+                        y_range: range_of(SUCCESS_RATE),
+                        ..chart("Success on training levels", "success rate", curve(|point| point.success_rate))
+                    },
                 ],
                 ..Section::default()
             },

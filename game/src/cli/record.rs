@@ -8,6 +8,7 @@ use bevy_playbot::{
         recorder::{Recorder, Recording, demo_actions, flush_unfinished},
     },
     game::{Game, build_world},
+    held_out::HeldOut,
     prelude::*,
 };
 
@@ -23,6 +24,7 @@ use crate::registry;
 #[command(after_help = "Examples:
   playbot record coinrun --levels hard:0..9 --out my.demo
   playbot record coinrun --levels easy:0..499 --noise 0.2 --steps 100000 --out demos/coinrun/easy.demo
+  playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
   playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo")]
 pub struct Args {
     /// Name of the game.
@@ -31,6 +33,9 @@ pub struct Args {
     /// levels 0 to 499 of the game's first mode.
     #[arg(long)]
     levels: Option<LevelSplit>,
+    /// Leave out these levels, and any that look like one of them; may be given several times.
+    #[arg(long, value_name = "LEVELS")]
+    hold_out: Vec<LevelSplit>,
     /// File to write.
     #[arg(long)]
     out: PathBuf,
@@ -38,7 +43,8 @@ pub struct Args {
     /// deviation of the normal noise on each value, before it is clipped.
     #[arg(long, default_value_t = 0.0)]
     noise: f64,
-    /// Stop after exactly this many steps; without it, after one round of the levels.
+    /// Stop after exactly this many steps, not counting those that --append finds; without it, after one round of the
+    /// levels.
     #[arg(long)]
     steps: Option<u64>,
     /// Seed of the noise.
@@ -55,10 +61,12 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let game = registry::game(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| usual_levels(game));
     game.check_mode(&levels.mode)?;
+    check_demonstrator(game)?;
     check_noise(game, args.noise)?;
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
     }
+    let chosen = choose_levels(game, &levels, &args.hold_out)?;
     let writer = open_writer(game, &levels.mode, &args)?;
     let (mut world, agents) = build_world(game, &levels.mode, args.seed, 0, 1);
     let agent = agents[0];
@@ -68,13 +76,60 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
         recorder = recorder.with_step_limit(steps);
     }
     world.insert_resource(recorder);
-    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue(&levels, args.steps)));
-    play(&mut world, agent, &levels, args.steps)?;
+    let count = chosen.len() as u64;
+    let queue = if args.steps.is_some() { LevelQueue::rounds(chosen) } else { LevelQueue::list(chosen) };
+    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue));
+    let finished = play(&mut world, agent, count, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
-    let count = *world.get::<EpisodeCount>(agent).expect("required by Agent");
-    let share = 100.0 * count.successes as f64 / count.finished.max(1) as f64;
-    eprintln!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
-    Ok(Outcome::Pass)
+    let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
+    let share = 100.0 * ended.successes as f64 / ended.finished.max(1) as f64;
+    tell!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
+    if finished {
+        return Ok(Outcome::Pass);
+    }
+    let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
+    let rest = Rest { level, steps };
+    tell!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
+    Ok(Outcome::Stopped)
+}
+
+/// Where a recording was stopped.
+struct Rest {
+    /// The level that was being played, unless every level has been played already.
+    level: Option<u64>,
+    /// Steps that this call has recorded.
+    steps: u64,
+}
+
+impl Rest {
+    /// What is to be changed in the call. Each call begins with the first of its levels, counts its own steps, and draws
+    /// the same noise from the same seed.
+    fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
+        let mut changes = "--append".to_owned();
+        if let Some(first) = self.level {
+            changes += &format!(" --levels {}", LevelSplit { first, ..levels.clone() });
+        }
+        if let Some(steps) = args.steps {
+            changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
+        }
+        if args.noise > 0.0 {
+            changes += &format!(" --seed {}", args.seed.wrapping_add(1));
+        }
+        format!("add the rest with the same command and `{changes}`")
+    }
+}
+
+/// Somebody must play.
+fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
+    if game.demonstrator().is_some() {
+        return Ok(());
+    }
+    let name = game.name();
+    let mut advice = "train a policy without demonstrations (`playbot train --algorithm ppo`)".to_owned();
+    if game.input_map().is_some() {
+        advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
+    }
+    Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
 }
 
 fn usual_levels(game: &dyn Game) -> LevelSplit {
@@ -102,32 +157,42 @@ fn open_writer(game: &dyn Game, mode: &str, args: &Args) -> Result<DemoWriter, C
     args.existing.open(&args.out, header)
 }
 
-/// One round of the levels, or as many rounds as the steps can need: every level takes at least one step.
-fn queue(levels: &LevelSplit, steps: Option<u64>) -> LevelQueue {
-    let rounds = steps.map_or(1, |steps| steps.div_ceil(levels.len()));
-    LevelQueue::list((0..rounds).flat_map(|_| levels.levels()).collect::<Vec<_>>())
+/// The levels but for those that are held out.
+fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
+    held_out.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
+    let chosen: Vec<u64> =
+        levels.levels().filter(|&level| !hidden.iter().any(|hidden| hidden.contains(&levels.mode, level))).collect();
+    if chosen.is_empty() {
+        return Err(CliError::Usage(format!("every one of the levels {levels} is held out: record others")));
+    }
+    Ok(chosen)
 }
 
+/// Plays until enough is recorded; false if somebody stopped it before.
 fn play(
     world: &mut bevy::prelude::World,
     agent: bevy::prelude::Entity,
-    levels: &LevelSplit,
+    levels: u64,
     steps: Option<u64>,
-) -> Result<(), CliError> {
+) -> Result<bool, CliError> {
     interrupt::listen();
-    let (length, unit) = steps.map_or((levels.len(), "levels"), |steps| (steps, "steps"));
+    let (length, unit) = steps.map_or((levels, "levels"), |steps| (steps, "steps"));
     let bar = progress::bar("record", length, unit);
-    loop {
+    let finished = loop {
         world.tick()?;
         let recorder = world.resource::<Recorder>();
         let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
         bar.set_position(done);
         let idle = !world.get::<Control>(agent).is_some_and(|control| control.is_active());
-        if idle || steps.is_some_and(|steps| done >= steps) || interrupt::asked() {
-            break;
+        if idle || steps.is_some_and(|steps| done >= steps) {
+            break true;
         }
-    }
+        if interrupt::asked() {
+            break false;
+        }
+    };
     bar.finish_and_clear();
     flush_unfinished(world)?;
-    Ok(())
+    Ok(finished)
 }

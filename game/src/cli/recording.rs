@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bevy_playbot::demo::file::{DemoHeader, DemoWriter};
 
-use super::error::CliError;
+use super::{error::CliError, output::make_folder_of};
 
 /// What becomes of a recording that exists.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
@@ -24,10 +24,7 @@ impl Existing {
     ///
     /// The file exists and nobody said what to do about it, was recorded under other conditions, or cannot be written.
     pub fn open(self, path: &Path, header: DemoHeader) -> Result<DemoWriter, CliError> {
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)
-                .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
-        }
+        make_folder_of(path)?;
         if self.append {
             return Ok(DemoWriter::append(path, &header)?);
         }

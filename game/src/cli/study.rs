@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
+    game::UnknownName,
     learner::DeviceKind,
     report::StudyReport,
     train::{
         Experiment,
-        run_dir::write_atomically,
+        run_dir::{is_unborn, write_atomically},
         study::{StudyRun, study_runs},
         worlds::default_threads,
     },
@@ -17,8 +18,10 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment::ExperimentArgs,
-    interrupt, progress,
+    experiment::{ExperimentArgs, quoted},
+    interrupt,
+    number::at_least_one,
+    progress,
     study_run::Runner,
 };
 use crate::registry;
@@ -29,10 +32,14 @@ use crate::registry;
 #[command(after_help = "Examples:
   playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
+  playbot study --experiment my.ron --variant full --variant no-kl --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
+    /// Only this variant of the experiment's; may be given several times. All of them if none is named.
+    #[arg(long, value_name = "NAME")]
+    variant: Vec<String>,
     /// Seeds, instead of the experiment's.
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
@@ -49,7 +56,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     force: bool,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Where to compute: flex or ndarray.
     #[arg(long, default_value_t)]
@@ -61,8 +68,9 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
-    let experiment = args.from.load([seeds])?;
-    let runs = study_runs(&experiment)?;
+    let mut experiment = args.from.load([seeds])?;
+    let runs = chosen(study_runs(&experiment)?, &args.variant)?;
+    experiment.variants.retain(|variant| runs.iter().any(|run| run.variant == variant.name));
     check_games(&runs)?;
     let folder = runs_folder(&args);
     check_folder(&folder, &args)?;
@@ -72,12 +80,16 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     }
     interrupt::listen();
     let mut runner = Runner::new(&folder, args.force, args.device, args.threads);
+    runner.check_folders(&runs)?;
     if args.force {
         runner.check_demos(&runs)?;
     }
     let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
-        eprintln!("stopped and saved: go on with `{} --resume`", restart(&args));
-        return Ok(Outcome::Pass);
+        tell!(
+            "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
+            restart(&args)
+        );
+        return Ok(Outcome::Stopped);
     };
     write(&args.out, &report)?;
     if args.json {
@@ -85,7 +97,7 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     } else {
         print_line(report.summary().trim_end())?;
     }
-    eprintln!("written to {}: table.md, curves.svg, results.json", args.out.display());
+    tell!("written to {}: table.md, curves.svg, results.json", args.out.display());
     Ok(Outcome::Pass)
 }
 
@@ -118,14 +130,25 @@ fn all(
 }
 
 fn say(bar: &ProgressBar, line: &str) {
-    bar.suspend(|| eprintln!("{line}"));
+    bar.suspend(|| tell!("{line}"));
+}
+
+/// The runs of some variants, in the order of the experiment; of all variants if none is named.
+fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>, CliError> {
+    let mut names: Vec<&str> = runs.iter().map(|run| run.variant.as_str()).collect();
+    names.dedup();
+    if let Some(unknown) = variants.iter().find(|name| !names.contains(&name.as_str())) {
+        return Err(UnknownName::new("variant", unknown, &names).into());
+    }
+    runs.retain(|run| variants.is_empty() || variants.contains(&run.variant));
+    Ok(runs)
 }
 
 fn check_games(runs: &[StudyRun]) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
         let game = registry::game(&experiment.game)?;
-        game.check_mode(&experiment.train.mode)?;
-        game.check_mode(&experiment.test.mode)?;
+        experiment.check_levels(game)?;
+        experiment.check_memory(game)?;
     }
     Ok(())
 }
@@ -137,7 +160,8 @@ fn runs_folder(args: &Args) -> PathBuf {
 
 /// Runs that are there are neither overwritten nor mixed with new ones unless somebody says so.
 fn check_folder(folder: &Path, args: &Args) -> Result<(), CliError> {
-    let is_used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    let is_used =
+        std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| !is_unborn(&entry.path())));
     if !is_used || args.resume || args.force {
         return Ok(());
     }
@@ -166,6 +190,9 @@ fn command(args: &Args) -> String {
     for set in &args.from.set {
         push("set", set.clone());
     }
+    for variant in &args.variant {
+        push("variant", variant.clone());
+    }
     if !args.seeds.is_empty() {
         push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
     }
@@ -180,10 +207,4 @@ fn command(args: &Args) -> String {
 fn restart(args: &Args) -> String {
     let runs = args.runs.as_ref().map(|path| format!(" --runs {}", quoted(&path.display().to_string())));
     command(args) + &runs.unwrap_or_default()
-}
-
-/// A word for the shell.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
-    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -18,7 +18,8 @@ use bevy_playbot::{
         Experiment, Trainer,
         checkpoint::Which,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
-        run_dir::{RunDir, RunInfo, write_atomically},
+        run_dir::{RunDir, RunInfo, check_replaceable, is_unborn, write_atomically},
+        run_lock::RunLock,
         study::StudyRun,
     },
     vision::Sight,
@@ -29,7 +30,7 @@ use super::{
     error::CliError,
     eval::cloning,
     experiment, learn_skills, methods,
-    train::{create_run, drive},
+    train::{drive, run_info},
 };
 use crate::registry;
 
@@ -54,6 +55,14 @@ pub struct Runner {
 /// Game, path, the levels that must not be among them, what is seen, and how many steps at most.
 type Recordings = (String, PathBuf, LevelSplit, Sight, Option<u64>);
 
+/// The folder of a run, locked.
+enum Place {
+    /// What is there is gone on with.
+    Begun(RunDir),
+    /// What is there, if anything, is replaced.
+    New(RunLock),
+}
+
 /// What came of a run, or `None` after Ctrl-C.
 pub type Ended = Option<(StudyResult, SuccessCurve)>;
 
@@ -70,11 +79,17 @@ impl Runner {
     pub fn run(&mut self, run: &StudyRun, title: &str, on_step: impl FnMut(u64)) -> Result<Ended, CliError> {
         let game = registry::game(&run.experiment.game)?;
         let folder = self.folder.join(run.id());
-        let saved = self.saved(run, &folder)?;
-        if saved.is_some() && folder.join(RESULT).exists() {
+        let is_saved = self.is_saved(run, &folder)?;
+        if is_saved && folder.join(RESULT).exists() {
             return Ok(Some((read_result(&folder.join(RESULT))?, success_curve(&folder)?)));
         }
-        let Some((player, training, curve)) = self.player(game, run, saved, title, on_step)? else { return Ok(None) };
+        fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
+        let lock = RunLock::take(&folder)?;
+        let dir = if is_saved { Place::Begun(RunDir::open_with(lock)?.0) } else { Place::New(lock) };
+        // Nobody else writes there until the result is written.
+        let Some((_dir, player, training, curve)) = self.player(game, run, dir, title, on_step)? else {
+            return Ok(None);
+        };
         let experiment = &run.experiment;
         let plan = methods::plan(experiment, &experiment.test, experiment.eval.episodes_per_level, self.threads);
         let measured = methods::measure(game, &run.id(), &player, &plan)?;
@@ -101,15 +116,33 @@ impl Runner {
         Ok(())
     }
 
-    /// The folder of a run that is there and is gone on with, if it holds the same run.
-    fn saved(&self, run: &StudyRun, folder: &Path) -> Result<Option<RunDir>, CliError> {
-        if self.force || !folder.exists() || is_unborn(folder) {
-            return Ok(None);
+    /// Looks at the folders of all runs that are there, so that nothing is begun if one of them is in use, or is no run
+    /// and would have to be replaced.
+    ///
+    /// # Errors
+    ///
+    /// The folder, and what it is.
+    pub fn check_folders(&self, runs: &[StudyRun]) -> Result<(), CliError> {
+        for folder in runs.iter().map(|run| self.folder.join(run.id())).filter(|folder| folder.exists()) {
+            if self.force {
+                check_replaceable(&folder)?;
+            }
+            if RunLock::is_known(&folder) {
+                RunLock::take(&folder)?;
+            }
         }
-        let (dir, saved, info) = RunDir::open(folder)?;
+        Ok(())
+    }
+
+    /// Whether there is a folder with this run that is gone on with.
+    fn is_saved(&self, run: &StudyRun, folder: &Path) -> Result<bool, CliError> {
+        if self.force || !folder.exists() || is_unborn(folder) {
+            return Ok(false);
+        }
+        let (_, saved, info) = RunDir::open(folder)?;
         if saved == run.experiment {
             self.warn_of_others(folder, &info);
-            return Ok(Some(dir));
+            return Ok(true);
         }
         Err(CliError::Usage(format!(
             "{} holds a run with other settings: choose another folder with --runs, or replace all with --force",
@@ -122,23 +155,19 @@ impl Runner {
         let revision = env!("PLAYBOT_REVISION");
         if info.revision != revision {
             let folder = folder.display();
-            eprintln!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+            tell!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
         }
         if info.device != self.device {
-            eprintln!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
+            tell!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
         }
     }
 
-    /// A new folder for a run, in place of what is there.
-    fn create(&self, run: &StudyRun) -> Result<RunDir, CliError> {
-        let folder = self.folder.join(run.id());
-        if is_unborn(&folder) {
-            // The program was stopped while it made the folder.
-            fs::remove_dir_all(&folder).map_err(|error| io_error("remove", &folder, &error))?;
-        }
+    /// Makes a folder that of a run, in place of what is there.
+    fn begin(&self, run: &StudyRun, lock: RunLock) -> Result<RunDir, CliError> {
         let skills = self.skill_file(run)?;
         let game = registry::game(&run.experiment.game)?;
-        Ok(create_run(&folder, game, &run.experiment, Some(&skills), self.device, self.force)?)
+        let info = run_info(game, &run.experiment, Some(&skills), self.device)?;
+        Ok(RunDir::begin(lock, &run.experiment, &info)?)
     }
 
     /// Trains what has to be trained. What is to be replaced stays until its skills are there.
@@ -146,13 +175,13 @@ impl Runner {
         &mut self,
         game: &dyn Game,
         run: &StudyRun,
-        saved: Option<RunDir>,
+        place: Place,
         title: &str,
         mut on_step: impl FnMut(u64),
-    ) -> Result<Option<(Player, Option<TrainingResult>, SuccessCurve)>, CliError> {
+    ) -> Result<Option<(RunDir, Player, Option<TrainingResult>, SuccessCurve)>, CliError> {
         let experiment = &run.experiment;
         let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
-        let begun = saved.as_ref().is_some_and(|dir| dir.checkpoint(Which::Last).is_ok());
+        let begun = matches!(&place, Place::Begun(dir) if dir.checkpoint(Which::Last).is_ok());
         let skills = match experiment.algorithm.needs_skills() && !begun {
             true => match self.skills(game, run)? {
                 Some(skills) => Some(skills),
@@ -160,12 +189,12 @@ impl Runner {
             },
             false => None,
         };
-        let dir = match saved {
-            Some(dir) => dir,
-            None => self.create(run)?,
+        let dir = match place {
+            Place::Begun(dir) => dir,
+            Place::New(lock) => self.begin(run, lock)?,
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
-            return Ok(Some((cloning(skills, experiment, draw), None, Vec::new())));
+            return Ok(Some((dir, cloning(skills, experiment, draw), None, Vec::new())));
         }
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
@@ -177,7 +206,8 @@ impl Runner {
         }
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
         let training = training_result(dir.path(), experiment, trainer.steps())?;
-        Ok(Some((player, Some(training), success_curve(dir.path())?)))
+        let curve = success_curve(dir.path())?;
+        Ok(Some((dir, player, Some(training), curve)))
     }
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
@@ -217,13 +247,6 @@ impl Runner {
             }
         }
     }
-}
-
-/// Whether a folder holds at most what is written before `run.json`.
-fn is_unborn(folder: &Path) -> bool {
-    let comes_first = |name: &str| name.starts_with("experiment.ron") || name.starts_with("run.json.tmp");
-    fs::read_dir(folder)
-        .is_ok_and(|entries| entries.flatten().all(|entry| entry.file_name().to_str().is_some_and(comes_first)))
 }
 
 fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, CliError> {

@@ -18,7 +18,9 @@ use bevy_playbot::{
 use super::{
     error::{CliError, Outcome},
     experiment::{ExperimentArgs, option},
-    interrupt, progress,
+    interrupt,
+    number::at_least_one,
+    progress,
 };
 use crate::registry;
 
@@ -54,7 +56,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     seed: Option<u64>,
     /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads())]
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
     threads: usize,
     /// Save a checkpoint every so many updates, instead of the experiment's.
     #[arg(long)]
@@ -68,11 +70,17 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
     let (run, mut trainer) = if args.resume { resume(&args)? } else { start(&args)? };
     let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
-        eprintln!("done: test it with `playbot eval --run {}`", args.run.display());
+        tell!("done: test it with `playbot eval --run {}`", args.run.display());
+        Ok(Outcome::Pass)
     } else {
-        eprintln!("stopped and saved: go on with `playbot train --run {} --resume`", args.run.display());
+        let (steps, wanted) = (trainer.steps(), trainer.experiment().steps);
+        let run = args.run.display();
+        tell!(
+            "stopped and saved after {steps} of {wanted} steps, so the training is incomplete: go on with \
+             `playbot train --run {run} --resume`"
+        );
+        Ok(Outcome::Stopped)
     }
-    Ok(Outcome::Pass)
 }
 
 fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
@@ -93,7 +101,7 @@ fn start(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 }
 
 fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
-    let (run, saved, _) = RunDir::open(&args.run)?;
+    let (run, saved, _) = RunDir::open_to_write(&args.run)?;
     let game = registry::game(&saved.game)?;
     let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
     let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
@@ -102,7 +110,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
     if experiment != saved {
         run.write_experiment(&experiment)?;
     }
-    eprintln!("going on at step {} of {}", trainer.steps(), experiment.steps);
+    tell!("going on at step {} of {}", trainer.steps(), experiment.steps);
     Ok((run, trainer))
 }
 
@@ -110,7 +118,7 @@ fn resume(args: &Args) -> Result<(RunDir, Trainer), CliError> {
 ///
 /// # Errors
 ///
-/// It exists and `force` is off, or it cannot be written.
+/// It exists and `force` is off, it is in use or no run, or it cannot be written.
 pub fn create_run(
     path: &Path,
     game: &dyn Game,
@@ -119,8 +127,23 @@ pub fn create_run(
     device: DeviceKind,
     force: bool,
 ) -> Result<RunDir, RunError> {
+    let info = run_info(game, experiment, skills, device)?;
+    RunDir::create(path, &experiment.without_study(), &info, force)
+}
+
+/// What the folder of a run says of it.
+///
+/// # Errors
+///
+/// The skill model's file cannot be read.
+pub fn run_info(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&Path>,
+    device: DeviceKind,
+) -> Result<RunInfo, RunError> {
     let skills = skills.filter(|_| experiment.algorithm.needs_skills());
-    let info = RunInfo {
+    Ok(RunInfo {
         algorithm: experiment.algorithm,
         seed: experiment.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -128,8 +151,7 @@ pub fn create_run(
         game_version: game.version(),
         skills: skills.map(file_checksum).transpose()?,
         device,
-    };
-    RunDir::create(path, &experiment.without_study(), &info, force)
+    })
 }
 
 /// Trains to the end of the experiment or to Ctrl-C, with progress bar, log and checkpoints. Returns whether the end
@@ -172,7 +194,11 @@ pub fn drive(
 }
 
 fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
-    run.save(trainer).map_err(|error| CliError::NotSaved { error: error.into(), run: run.path().into() })
+    let is_first = run.checkpoint(Which::Last).is_err();
+    run.save(trainer).map_err(|error| {
+        let (error, run) = (error.into(), run.path().into());
+        if is_first { CliError::NeverSaved { error, run } } else { CliError::NotSaved { error, run } }
+    })
 }
 
 /// The error of a training, with the checkpoint that is left if its numbers ran away.

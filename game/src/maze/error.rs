@@ -35,7 +35,7 @@ pub enum MazeError {
     },
     /// A character that means nothing.
     #[error(
-        "row {row}, column {column}: `{character}` means nothing; write # or 1 for a wall, O or 0 for a free cell, S or r for the start, G or g for the goal"
+        "row {row}, column {column}: `{character}` means nothing; write # or 1 for a wall, O, 0, a blank or a point for a free cell, S or r for the start, G or g for the goal"
     )]
     UnknownCharacter {
         /// Row of the character.
@@ -76,10 +76,7 @@ pub enum MazeError {
         goal: Cell,
     },
     /// Too small to hold two free cells.
-    #[error(
-        "a maze of {rows} x {columns} cells has no room for corridors {corridor} wide: it needs {least} cells or more to \
-         each side"
-    )]
+    #[error("`size={rows}x{columns}` has no room for corridors {corridor} wide: each side needs {least} cells or more")]
     TooSmall {
         /// Rows asked for.
         rows: usize,

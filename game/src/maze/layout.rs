@@ -1,5 +1,7 @@
 //! A maze: walls, a start and a goal.
 
+use bevy_playbot::state_hash::StateHash;
+
 use super::{cell::Cell, distances::Distances, error::MazeError};
 
 /// Most cells to a side.
@@ -115,6 +117,12 @@ impl Maze {
         self.walls.columns
     }
 
+    /// A hash of the walls, whatever start and goal are.
+    pub fn fingerprint(&self) -> u64 {
+        let size = [self.walls.rows as u64, self.walls.columns as u64];
+        StateHash::of(size.into_iter().chain(self.walls.free.iter().map(|&free| free.into()))).0
+    }
+
     /// Whether a cell is no wall; false outside the maze.
     pub fn is_free(&self, cell: Cell) -> bool {
         self.walls.is_free(cell)
@@ -163,9 +171,5 @@ impl Maze {
     /// Number of moves on a shortest path from the start to the goal.
     pub fn difficulty(&self) -> usize {
         self.shortest_path().len() - 1
-    }
-
-    pub(super) fn walls(&self) -> &Walls {
-        &self.walls
     }
 }

@@ -87,6 +87,20 @@ impl Map {
         }
     }
 
+    /// What the mazes of all specs have in common: one seed draws related ones.
+    pub fn family(&self) -> Option<String> {
+        matches!(self, Self::Random(_)).then(|| self.name().to_owned())
+    }
+
+    /// A hash of a generated maze's walls; `None` for a fixed map, for a spec that gives no maze, and for mazes of so many
+    /// rooms that no two are alike.
+    pub fn fingerprint(&self, seed: u64) -> Option<u64> {
+        match self {
+            Self::Random(spec) if spec.may_repeat() => Some(generate(spec, seed).ok()?.fingerprint()),
+            _ => None,
+        }
+    }
+
     /// Options that this map takes, each with an example of a value.
     pub fn valid_options(&self) -> &'static [&'static str] {
         match self {
@@ -182,10 +196,11 @@ mod tests {
         let error = |text: &str| text.parse::<Map>().expect_err("no map").to_string();
         assert!(error("medum").contains("did you mean `medium`"), "{}", error("medum"));
         assert!(error("random+lops=0.1").contains("did you mean `loops=0.2`"), "{}", error("random+lops=0.1"));
-        assert!(error("medium+loops=0.1").contains("unknown map option"));
+        assert_eq!(error("medium+loops=0.1"), "unknown map option `loops=0.1`; there is none here");
         assert!(error("random+size=9").contains("rows x columns"));
         assert!(error("random+size=9x5000").contains("too large"));
-        assert!(error("random+size=4x9").contains("no room"));
+        assert!(error("random+size=4x9").contains("`size=4x9` has no room"));
+        assert!(error("random+size=0x0").contains("`size=0x0` has no room"));
         assert!(error("random+corridor=0").contains("at least 1"));
         assert!(error("random+loops=1.5").contains("between 0 and 1"));
         assert!(error("random+loops=NaN").contains("between 0 and 1"));

@@ -9,6 +9,9 @@ pub const TRAIN_SEEDS: RangeInclusive<u64> = 0..=63;
 /// Seeds of the mazes that are held out for the test, unless somebody names others.
 pub const HELD_OUT_SEEDS: RangeInclusive<u64> = 64..=127;
 
+/// Walls that stand between rooms by chance, from which on two seeds do not draw the same ones.
+const UNLIKELY: f64 = 36.0;
+
 /// Size and shape of generated mazes.
 ///
 /// Corridors join rooms of `corridor` x `corridor` cells that stand in a grid, one wall apart. Cells that a row of rooms
@@ -42,7 +45,6 @@ impl MazeSpec {
     /// [`MazeError`] names the value that cannot be.
     pub fn check(&self) -> Result<(), MazeError> {
         let Self { rows, columns, loops, corridor, .. } = *self;
-        check_size(rows, columns)?;
         if corridor == 0 {
             return Err(MazeError::NoCorridor);
         }
@@ -50,6 +52,7 @@ impl MazeSpec {
         if rows < least || columns < least {
             return Err(MazeError::TooSmall { rows, columns, corridor, least });
         }
+        check_size(rows, columns)?;
         if !(0.0..=1.0).contains(&loops) {
             return Err(MazeError::Loops(loops.to_string()));
         }
@@ -59,5 +62,11 @@ impl MazeSpec {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Whether two seeds may well draw the same walls: where there are few rooms, or few walls between them.
+    pub(super) fn may_repeat(&self) -> bool {
+        let rooms = [self.rows, self.columns].map(|cells| cells.saturating_sub(1) / (self.corridor + 1));
+        rooms.iter().product::<usize>() as f64 * (1.0 - self.loops) <= UNLIKELY
     }
 }

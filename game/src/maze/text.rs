@@ -7,7 +7,7 @@ use super::{
 };
 
 impl Maze {
-    /// Reads a maze from its rows: `#` or `1` is a wall, `O` or `0` a free cell, `S` or `r` the start and `G` or `g` the
+    /// Reads a maze from its rows: `#` or `1` is a wall, `O`, `0`, a blank or `.` a free cell, `S` or `r` the start and `G` or `g` the
     /// goal.
     ///
     /// # Errors
@@ -26,7 +26,7 @@ impl Maze {
                 let cell = Cell { row, col };
                 match character {
                     '#' | '1' => continue,
-                    'O' | '0' => {}
+                    'O' | '0' | ' ' | '.' => {}
                     'S' | 'r' => mark(&mut start, cell, "start")?,
                     'G' | 'g' => mark(&mut goal, cell, "goal")?,
                     _ => return Err(MazeError::UnknownCharacter { row, column: col, character }),
@@ -67,10 +67,12 @@ mod tests {
     }
 
     #[test]
-    fn both_alphabets_read_the_same() {
+    fn all_alphabets_read_the_same() {
         let letters = Maze::parse(&["#####", "#SOG#", "#####"]).expect("a maze");
         let digits = Maze::parse(&["11111", "1r0g1", "11111"]).expect("a maze");
         assert_eq!(letters, digits);
+        let seen = ["#####", "# S #", "# .G#", "#####"];
+        assert_eq!(Maze::parse(&seen), Maze::parse(&["#####", "#OSO#", "#OOG#", "#####"]));
         assert_eq!((letters.start(), letters.goal(), letters.difficulty()), (Cell::new(1, 1), Cell::new(1, 3), 2));
         assert_eq!(letters.to_rows(), ["#####", "#SOG#", "#####"]);
     }

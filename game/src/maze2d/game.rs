@@ -60,6 +60,15 @@ impl Game for Maze2d {
         mode.parse::<Maze2dMode>().map(drop).map_err(|error| error.of(mode))
     }
 
+    fn family(&self, mode: &str) -> String {
+        let Ok(mode) = mode.parse::<Maze2dMode>() else { return mode.to_owned() };
+        mode.map.family().unwrap_or_else(|| mode.to_string())
+    }
+
+    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        mode.parse::<Maze2dMode>().ok()?.map.fingerprint(level)
+    }
+
     fn tick_hz(&self) -> f64 {
         100.0
     }

@@ -41,11 +41,11 @@ impl Maze2dLevel {
     pub fn new(mode: &Maze2dMode, seed: u64) -> Result<Self, MazeError> {
         let maze = mode.maze(seed)?;
         let mut rng = Streams::new(seed).stream("maze2d/reset", 0);
-        let goal_cell = if mode.random_goal { any_cell(&maze, &mut rng) } else { maze.goal() };
+        let mut goal_cell = if mode.random_goal { any_cell(&maze, &mut rng) } else { maze.goal() };
         let mut start_cell = if mode.fixed_start { maze.start() } else { any_cell(&maze, &mut rng) };
         while mode.end_at_goal && start_cell == goal_cell {
-            // Nothing would be left to play. One of two free cells is not the goal.
-            start_cell = any_cell(&maze, &mut rng);
+            // Nothing would be left to play. What may be anywhere is drawn again: one of two free cells is another one.
+            *(if mode.fixed_start { &mut goal_cell } else { &mut start_cell }) = any_cell(&maze, &mut rng);
         }
         let position = centre(start_cell).map(|along| along + uniform(&mut rng, START_NOISE));
         let velocity = [(); 2].map(|()| START_SPEED * normal(&mut rng));

@@ -3,7 +3,7 @@
 //! [`ball`], [`soft`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
 //! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
-//! makes of a seed.
+//! makes of a seed. [`SightedMaze2d`] is the same game for agents that see walls and goal.
 
 pub mod arena;
 pub mod ball;
@@ -19,6 +19,8 @@ pub mod physics;
 pub mod picture;
 mod play;
 pub mod plugin;
+mod ray;
+pub mod sighted;
 pub mod sim;
 pub mod soft;
 pub mod walls;
@@ -30,3 +32,4 @@ pub use game::Maze2d;
 pub use level::Maze2dLevel;
 pub use mode::{Contact, Maze2dMode, Maze2dModeError};
 pub use plugin::{Maze2dPlugin, Maze2dSystems};
+pub use sighted::SightedMaze2d;

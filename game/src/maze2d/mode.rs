@@ -31,7 +31,8 @@ pub struct Maze2dMode {
     pub random_goal: bool,
     /// Steps after which an episode is truncated.
     pub limit: u32,
-    /// Reaching the goal terminates the episode. D4RL's never terminate.
+    /// Reaching the goal terminates the episode. D4RL's never terminate. Better with `sparse`: the dense reward is never
+    /// negative, so that whoever keeps away from the goal until time is up earns more than who reaches it.
     pub end_at_goal: bool,
     /// The walls stand 0.2 aside, as D4RL's do.
     pub offset: bool,
@@ -60,7 +61,7 @@ pub enum Maze2dModeError {
     #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
     Twice(String),
     /// Episodes end before the demonstrator can turn to another cell.
-    #[error("`retarget` needs episodes that go on at the goal: add no-end-at-goal")]
+    #[error("`retarget` needs episodes that go on at the goal: leave out end-at-goal")]
     RetargetEnds,
 }
 
@@ -93,16 +94,16 @@ impl Maze2dMode {
     /// The modes without options.
     pub const NAMES: [&'static str; 5] = Map::NAMES;
 
-    /// D4RL's rules on a map: random start, dense reward, its time limit (version 1). Generated mazes end at the goal.
+    /// D4RL's rules on a map: random start, dense reward, its time limit (version 1).
     pub fn new(map: Map) -> Self {
-        let (limit, end_at_goal) = (usual_limit(&map), ends_at_goal(&map));
+        let limit = usual_limit(&map);
         Self {
             map,
             sparse: false,
             fixed_start: false,
             random_goal: false,
             limit,
-            end_at_goal,
+            end_at_goal: false,
             offset: true,
             contact: Contact::Soft,
             retarget: false,
@@ -165,7 +166,7 @@ impl Maze2dMode {
         add(self.fixed_start, "fixed-start");
         add(self.random_goal, "goal=random");
         add(self.limit != usual.limit, &format!("limit={}", self.limit));
-        add(self.end_at_goal != usual.end_at_goal, if self.end_at_goal { "end-at-goal" } else { "no-end-at-goal" });
+        add(self.end_at_goal, "end-at-goal");
         add(!self.offset, "no-offset");
         add(self.contact == Contact::Rapier, "contact=rapier");
         add(self.retarget, "retarget");
@@ -187,10 +188,6 @@ fn usual_limit(map: &Map) -> u32 {
 /// Time for a generated maze with so many cells.
 fn steps_for(cells: u32) -> u32 {
     cells.saturating_mul(15).max(300)
-}
-
-fn ends_at_goal(map: &Map) -> bool {
-    matches!(map, Map::Random(_))
 }
 
 /// What an option is about, so that it is said only once.
@@ -249,7 +246,7 @@ mod tests {
             "large+goal=random+end-at-goal+no-offset+contact=rapier",
             "medium+retarget",
             "random+size=9x9+loops=0.2",
-            "random+no-end-at-goal+retarget",
+            "random+size=9x9+end-at-goal",
         ] {
             assert_eq!(mode(text).to_string(), text);
         }
@@ -263,7 +260,7 @@ mod tests {
             let mode = mode(map);
             assert_eq!((mode.limit, mode.end_at_goal, mode.fixed_start, mode.offset), (limit, false, false, true));
         }
-        assert!(mode("random").end_at_goal);
+        assert!(!mode("random").end_at_goal);
     }
 
     #[test]
@@ -279,7 +276,7 @@ mod tests {
             ("medium+limit=1+limit=2", "`limit=2` repeats"),
             ("medium+end-at-goal+no-end-at-goal", "contradicts"),
             ("random+loops=2", "loops = 2"),
-            ("random+retarget", "no-end-at-goal"),
+            ("random+retarget+end-at-goal", "leave out end-at-goal"),
         ] {
             let error = text.parse::<Maze2dMode>().expect_err(text).to_string();
             assert!(error.contains(part), "{text}: {error}");

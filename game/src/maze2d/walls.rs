@@ -56,7 +56,7 @@ impl Walls {
     }
 
     /// Whether a cell is a wall; everything outside the maze is.
-    fn is_solid(&self, row: i32, column: i32) -> bool {
+    pub(super) fn is_solid(&self, row: i32, column: i32) -> bool {
         match (usize::try_from(row), usize::try_from(column)) {
             (Ok(row), Ok(column)) if row < self.rows && column < self.columns => {
                 self.solid[row * self.columns + column]

@@ -76,12 +76,16 @@ impl GameWindow {
         app.world_mut().entity_mut(agent).insert((Control::Human, keys, playlist.queue()));
         app.insert_resource(seats).insert_resource(playlist);
         camera::build(&mut app, picture.width);
+        let has_ants = app.is_plugin_added::<crate::antview::AntViewPlugin>();
         #[cfg(feature = "view3d")]
-        if app.is_plugin_added::<crate::antview::AntViewPlugin>() {
+        if has_ants {
             super::solid::build(&mut app);
         }
         ending::build(&mut app, stop);
         keys::build(&mut app);
+        if has_ants && cfg!(not(feature = "view3d")) {
+            keys::excuse_view(&mut app);
+        }
         pace::build(&mut app);
         score::build(&mut app);
         title::build(&mut app, game.name());

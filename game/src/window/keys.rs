@@ -9,6 +9,16 @@ pub(super) fn build(app: &mut App) {
     app.add_systems(PreUpdate, (hand_over, change_level, other_keys).after(InputSystems));
 }
 
+/// Has V say why it does nothing, where ants could be seen in space by another build of the program.
+pub(super) fn excuse_view(app: &mut App) {
+    let says = |keys: Res<ButtonInput<KeyCode>>, mut notice: ResMut<Notice>| {
+        if keys.just_pressed(KeyCode::KeyV) {
+            notice.say("no view in space: this program was built without --features view3d");
+        }
+    };
+    app.add_systems(PreUpdate, says.after(InputSystems));
+}
+
 /// Tab: the partner takes over, or gives back.
 fn hand_over(
     keys: Res<ButtonInput<KeyCode>>,

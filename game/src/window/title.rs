@@ -42,6 +42,12 @@ fn age_notice(clock: Res<Time<Real>>, mut notice: ResMut<Notice>) {
     }
 }
 
+/// With as many decimals as it needs, at most two.
+fn to_cents(value: f64) -> String {
+    // Adding 0 takes the sign from what rounds to nothing.
+    ((value * 100.0).round() / 100.0 + 0.0).to_string()
+}
+
 fn write_title(
     game: Res<GameName>,
     playlist: Res<Playlist>,
@@ -56,7 +62,7 @@ fn write_title(
         format!("{} {} {}", game.0, playlist.mode(), episode.level),
         format!("tick {}", episode.tick),
         seats.who(*control),
-        format!("return {}", episode.total_reward),
+        format!("return {}", to_cents(episode.total_reward)),
     ];
     parts.extend(last.words());
     parts.push(match recorder {
@@ -70,5 +76,16 @@ fn write_title(
     let title = parts.join(" · ");
     if window.title != title {
         window.title = title;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::to_cents;
+
+    #[test]
+    fn returns_have_no_more_decimals_than_they_need() {
+        let values = [-17616.085180282593, 10.0, 2.5, -0.001, 0.1 + 0.2];
+        assert_eq!(values.map(to_cents), ["-17616.09", "10", "2.5", "0", "0.3"]);
     }
 }

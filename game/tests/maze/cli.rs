@@ -32,6 +32,10 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
     assert_eq!(level(&["antmaze", "--map", "xl"])["shortest_path_length"], 29);
     let (ball, ant) = (level(&["maze2d", "--map", "umaze"]), level(&["antmaze", "--map", "umaze"]));
     assert_eq!((&ball["goal"], &ant["goal"]), (&json!([1, 1]), &json!([3, 1])));
+    assert_eq!(
+        (level(&["maze2d-sighted", "--map", "umaze"]), level(&["antmaze-sighted", "--map", "umaze"])),
+        (ball, ant)
+    );
 }
 
 #[test]
@@ -64,6 +68,33 @@ fn a_file_of_rows_is_a_map() {
 }
 
 #[test]
+fn what_is_shown_can_be_edited_and_read_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shown = text(&playbot(folder.path(), &["level", "antmaze", "--map", "umaze"]));
+    std::fs::write(folder.path().join("mine.txt"), format!("\u{feff}{shown}")).expect("writable");
+    let again = text(&playbot(folder.path(), &["level", "antmaze", "--map", "mine.txt"]));
+    assert_eq!(again, shown);
+}
+
+#[test]
+fn a_whole_mode_names_the_level_that_is_played() {
+    use playbot_games::{antmaze, maze2d};
+    let text = "random+size=15x15+loops=0.2+goals=random";
+    let mode: antmaze::AntMazeMode = text.parse().expect("a mode");
+    let played = antmaze::generate(&mode, 3).expect("a level");
+    assert_ne!(played.goal, played.maze.goal(), "the mode draws another goal than the map's");
+    for game in ["antmaze", "antmaze-sighted"] {
+        let shown = level(&[game, "--map", text, "--seed", "3"]);
+        assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start), &json!(played.goal)));
+    }
+    let mode: maze2d::Maze2dMode = "medium+sparse".parse().expect("a mode");
+    let played = maze2d::Maze2dLevel::new(&mode, 5).expect("a level");
+    let shown = level(&["maze2d", "--map", "medium+sparse", "--seed", "5"]);
+    assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start_cell), &json!(played.goal_cell)));
+    assert_eq!(level(&["antmaze-sighted", "--map", "xl"]), level(&["antmaze", "--map", "xl"]));
+}
+
+#[test]
 fn what_is_wrong_with_a_map_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, rows) in [
@@ -88,6 +119,8 @@ fn what_is_wrong_with_a_map_is_said() {
         (&["--map", "medum"], &["did you mean `medium`?", "no file"]),
         (&["--map", "medium", "--seed", "1"], &["no seed"]),
         (&["--map", "random+size=5000x5000"], &["too large"]),
+        (&["--map", "random+size=0x0"], &["`size=0x0`"]),
+        (&["--map", "medium+sprse"], &["did you mean `sparse`?", "valid: sparse, fixed-start"]),
         (&["--map", "random+lops=1"], &["did you mean `loops"]),
         (&["--mode", "medium"], &["--map"]),
         (&["--map", "medium", "--png", "a.gif"], &[".png or .svg"]),
@@ -118,7 +151,7 @@ fn eval_draws_where_players_went() {
     for (args, words) in [
         (&["eval", "--bot", "random", "--plot", "where.gif"][..], ".png or .svg"),
         (
-            &["eval", "--bot", "random", "--set", "game=\"ant\"", "--levels", "goal:0..0", "--plot", "a.png"],
+            &["eval", "--bot", "random", "--set", "game=\"ant\"", "--levels", "chase:0..0", "--plot", "a.png"],
             "no floor plan",
         ),
     ] {

@@ -115,7 +115,8 @@ fn a_maze_is_the_same_on_every_machine() {
 fn what_cannot_be_made_is_refused_with_the_value() {
     let usual = MazeSpec::default();
     let error = |spec: MazeSpec| generate(&spec, 0).expect_err("no maze");
-    assert_eq!(error(MazeSpec { rows: 0, ..usual.clone() }), MazeError::Empty);
+    let nothing = MazeError::TooSmall { rows: 0, columns: 11, corridor: 1, least: 5 };
+    assert_eq!(error(MazeSpec { rows: 0, ..usual.clone() }), nothing);
     assert_eq!(error(MazeSpec { rows: 4097, ..usual.clone() }), MazeError::TooLarge { rows: 4097, columns: 11 });
     assert_eq!(
         error(MazeSpec { rows: 4000, columns: 4000, ..usual.clone() }),

@@ -1,5 +1,7 @@
 //! The planner finds a way wherever there is one, and none that is longer than need be.
 
+use std::collections::BTreeMap;
+
 use playbot_games::maze::{Cell, GridMove, Map, Maze, MazeSpec, Planner, generate};
 use rand_mt::Mt64;
 
@@ -61,30 +63,49 @@ fn a_thousand_random_pairs_on_generated_mazes() {
     }
 }
 
-#[test]
-fn goals_farther_than_fifty_moves_need_more_sweeps_than_the_original_makes() {
-    let corridor = format!("#S{}G#", "O".repeat(198));
-    let wall = "#".repeat(corridor.len());
-    let maze = Maze::parse(&[&wall, &corridor, &wall]).expect("a maze");
-    let planner = Planner::new(&maze, maze.goal());
-    assert_eq!(planner.path(maze.start()).map(|path| path.len()), Some(200));
-    assert!(planner.sweeps() > 200, "{}", planner.sweeps());
-    let medium = by_id("maze2d-medium");
-    assert_eq!(Planner::new(&medium, medium.goal()).sweeps(), 50);
+/// Q-value iteration as the original makes it: reward 1 in the goal cell, discount 0.99, 50 sweeps over all cells.
+fn swept(maze: &Maze, goal: Cell) -> impl Fn(Cell, GridMove) -> f64 {
+    let cells: Vec<_> = maze.free_cells().collect();
+    let mut values: BTreeMap<_, f64> = cells.iter().map(|&cell| (cell, 0.0)).collect();
+    let maze = maze.clone();
+    let q = move |values: &BTreeMap<Cell, f64>, cell, step: GridMove| {
+        f64::from(u8::from(cell == goal)) + 0.99 * values[&step.from(&maze, cell)]
+    };
+    for _ in 0..50 {
+        let best = |cell| GridMove::ALL.map(|step| q(&values, cell, step)).into_iter().fold(0.0, f64::max);
+        values = cells.iter().map(|&cell| (cell, best(cell))).collect();
+    }
+    move |cell, step| q(&values, cell, step)
 }
 
 #[test]
-fn values_by_hand() {
-    let maze = Maze::parse(&["#####", "#SOG#", "#####"]).expect("a maze");
+fn the_best_moves_are_those_of_the_original() {
+    for name in ["umaze", "medium", "large"] {
+        let map = Map::named(name).expect("a map");
+        for maze in [map.maze2d(0).expect("fixed"), map.antmaze(0).expect("fixed")] {
+            for goal in maze.free_cells().step_by(3) {
+                let (planner, q) = (Planner::new(&maze, goal), swept(&maze, goal));
+                for cell in maze.free_cells() {
+                    let better = |best, step| if q(cell, step) > q(cell, best) { step } else { best };
+                    let best = GridMove::ALL.into_iter().fold(GridMove::Stay, better);
+                    assert_eq!(planner.best_move(cell), best, "{name}: {cell} to {goal}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn far_goals_and_large_mazes_are_planned() {
+    let corridor = format!("#S{}G#", "O".repeat(4000));
+    let wall = "#".repeat(corridor.len());
+    let maze = Maze::parse(&[&wall, &corridor, &wall]).expect("a maze");
     let planner = Planner::new(&maze, maze.goal());
-    // 50 rewards of 1, each 0.99 of the one before; a cell further away, 49 of them, and so on.
-    let sum = |n: i32| (1.0 - 0.99f64.powi(n)) / 0.01;
-    let value = |cell, step| planner.action_value(cell, step);
-    assert!((value(Cell::new(1, 3), GridMove::Stay) - (1.0 + 0.99 * sum(50))).abs() < 1e-9);
-    assert!((value(Cell::new(1, 2), GridMove::Right) - 0.99 * sum(50)).abs() < 1e-9);
-    assert!((value(Cell::new(1, 1), GridMove::Right) - 0.99 * 0.99 * sum(49)).abs() < 1e-9);
-    assert_eq!(planner.best_move(Cell::new(1, 3)), GridMove::Stay);
-    assert_eq!(planner.next_cell(Cell::new(1, 1)), Cell::new(1, 2));
+    assert_eq!(planner.path(maze.start()).map(|path| path.len()), Some(4002), "the original sees 50 moves ahead");
+    let spec = MazeSpec { rows: 1001, columns: 1001, loops: 0.0, corridor: 1, difficulty: None };
+    let maze = generate(&spec, 1).expect("a maze");
+    let path = Planner::new(&maze, maze.goal()).path(maze.start()).expect("a way");
+    assert_eq!(Some(moves(&maze, &path, maze.start(), maze.goal())), maze.distances_to(maze.goal()).get(maze.start()));
 }
 
 #[test]

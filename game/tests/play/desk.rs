@@ -160,7 +160,8 @@ impl Seat<'_> {
         tick.and_then(|tick| tick.parse().ok()).unwrap_or_else(|| panic!("no tick in the title `{title}`"))
     }
 
-    fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+    /// Waits until something is so, and fails if it takes too long.
+    pub fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
         while !done(self) {
             let gone = self.program.try_wait().expect("a child of this test");

@@ -99,9 +99,9 @@ fn an_ant_on_the_open_floor_is_played_with_keys() {
     seat.pass_ticks(25);
     let picture = desk.pixels(SIDE);
     let colour = |x: usize, y: usize| [16, 8, 0].map(|shift| picture[y * SIDE + x] >> shift & 255);
-    // The corners show floor, light grey.
+    // The corners show floor, light grey, in space as from above.
     for (x, y) in [(20, 20), (SIDE - 20, 20), (20, SIDE - 20), (SIDE - 20, SIDE - 20)] {
-        assert!(colour(x, y).iter().all(|channel| (170..=215).contains(channel)), "{:?} at {x}, {y}", colour(x, y));
+        assert!(colour(x, y).iter().all(|channel| (170..=225).contains(channel)), "{:?} at {x}, {y}", colour(x, y));
     }
     let [red, _, blue] = colour(SIDE / 2, SIDE / 2);
     assert!(red > blue + 60, "the ant is in the middle");
@@ -174,4 +174,24 @@ fn what_is_missing_is_named() {
     ] {
         refuse(&mut desk.playbot(folder.path(), &[&play[..], args].concat()), words);
     }
+}
+
+/// In space there is light and shadow; from above every surface has one colour.
+#[cfg(feature = "view3d")]
+#[test]
+fn an_ant_is_seen_in_space_and_from_above() {
+    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let mut seat = desk.open(folder.path(), &["play", "antmaze", "--mode", "medium", "--bot", "waypoints"]);
+    seat.tap("Tab");
+    seat.read("waypoints plays");
+    seat.pass_ticks(10);
+    let colours = || desk.pixels(SIDE).into_iter().collect::<BTreeSet<_>>().len();
+    seat.wait("light and shadow", |_| colours() > 1000);
+    seat.tap("v");
+    seat.wait("flat colours", |_| (5..200).contains(&colours()));
+    seat.tap("v");
+    seat.wait("light and shadow", |_| colours() > 1000);
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
 }

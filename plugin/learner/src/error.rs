@@ -111,8 +111,10 @@ fn after(steps: Option<u64>) -> String {
 #[non_exhaustive]
 pub enum FileError {
     /// Reading, writing, flushing or renaming failed.
-    #[error("{path}: {source}")]
+    #[error("cannot {action} {path}: {source}")]
     Io {
+        /// What was tried: `read` or `write`.
+        action: &'static str,
         /// The file.
         path: PathBuf,
         /// The cause.

@@ -103,12 +103,16 @@ impl TensorFile {
         let bytes = views
             .and_then(|views| safetensors::serialize(views, Some(header)))
             .map_err(|e| self.format(e.to_string()))?;
-        write_atomically(&self.path, &bytes).map_err(|source| FileError::Io { path: self.path.clone(), source })
+        write_atomically(&self.path, &bytes).map_err(|source| FileError::Io {
+            action: "write",
+            path: self.path.clone(),
+            source,
+        })
     }
 
     /// Reads a whole file.
     pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
-        let bytes = fs::read(path).map_err(|source| FileError::Io { path: path.to_owned(), source })?;
+        let bytes = fs::read(path).map_err(|source| FileError::Io { action: "read", path: path.to_owned(), source })?;
         Self::parse(path, &bytes)
     }
 

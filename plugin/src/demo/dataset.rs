@@ -9,7 +9,7 @@ use super::{
     onlooker::{Watched, watch},
     verify::VerifyError,
 };
-use crate::{game::Game, split::LevelSplit, vision::Sight};
+use crate::{game::Game, held_out::HeldOut, split::LevelSplit, vision::Sight};
 
 /// Most memory that the pictures of a data set may take.
 pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
@@ -54,6 +54,7 @@ impl Demonstrations {
         sight.check(game)?;
         let names = game.observation().names;
         let mut episodes = Vec::new();
+        let held_out = held_out.map(|split| HeldOut::new(game, split));
         for file in find_demos(path)? {
             let reader = DemoReader::open_for_game(&file, game.name(), game.version(), None)?;
             let header = reader.header().clone();
@@ -63,8 +64,8 @@ impl Demonstrations {
             for (index, episode) in reader.enumerate() {
                 let mut episode = episode?;
                 let level = episode.level_seed;
-                if let Some(split) = held_out.filter(|split| split.contains(&header.mode, level)) {
-                    return Err(VerifyError::HeldOut { path: file, level, split: split.clone() });
+                if let Some(hidden) = held_out.as_ref().filter(|hidden| hidden.contains(&header.mode, level)) {
+                    return Err(VerifyError::HeldOut { path: file, level, split: hidden.split().clone() });
                 }
                 if !is_seen {
                     // Vectors that are not used would only take room.

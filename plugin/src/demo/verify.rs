@@ -63,8 +63,9 @@ pub enum VerifyError {
     },
     /// A recording shows a level that is kept for the test.
     #[error(
-        "{}: level {level} is one of the held-out levels {split}, which nobody may learn from: take recordings of other \
-         levels, or hold out others with `test`", path.display()
+        "{}: level {level} is, or looks like, one of the held-out levels {split}, which nobody may learn from: take \
+         recordings of other levels (`playbot record --hold-out {split}` leaves these out), or hold out others with `test`",
+        path.display()
     )]
     HeldOut {
         /// The file.

@@ -67,7 +67,11 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     if high - low > least {
         return (low, high);
     }
-    let margin = if low.abs() < 1e-280 { 1.0 } else { low.abs() * 0.1 };
+    if low.abs() < 1e-280 {
+        // What is 0 throughout is mostly a count, a rate or a time.
+        return (0.0, 1.0);
+    }
+    let margin = low.abs() * 0.1;
     (low - margin, high + margin)
 }
 
@@ -108,6 +112,14 @@ mod tests {
                 assert!(axis.ticks.iter().all(|t| t.is_finite()), "{values:?}: {axis:?}");
             }
         }
+    }
+
+    #[test]
+    fn nothing_at_all_needs_no_negative_axis() {
+        let axis = Axis::rounded([0.0, 0.0].into_iter(), 5);
+        assert_eq!((axis.low, axis.high), (0.0, 1.0));
+        let axis = Axis::rounded([0.3; 4].into_iter(), 5);
+        assert!(axis.low >= 0.0 && axis.high > 0.3, "{axis:?}");
     }
 
     #[test]

@@ -52,6 +52,7 @@ pub(super) fn is_point(&(x, y): &(f64, f64)) -> bool {
 ///     x_label: "environment steps".into(),
 ///     y_label: "episodic return".into(),
 ///     curves: vec![Curve::new("SCORE-PPO", vec![(0.0, 2.1), (1e6, 7.9), (2e6, 9.4)])],
+///     y_range: None,
 ///     marks: vec![("policy starts to change".into(), 2e5)],
 /// };
 /// assert!(chart.to_svg().starts_with("<svg "));
@@ -66,6 +67,8 @@ pub struct Chart {
     pub y_label: String,
     /// The lines, in the order of their colours.
     pub curves: Vec<Curve>,
+    /// What the y axis shows at least, such as 0 to 1 for a rate; as much as the values need if it is `None`.
+    pub y_range: Option<(f64, f64)>,
     /// Vertical marks: a label and its x.
     pub marks: Vec<(String, f64)>,
 }

@@ -8,7 +8,10 @@ use super::{
 };
 use crate::{
     eval::EvalSummary,
-    train::{Algorithm, Experiment},
+    train::{
+        Algorithm, Experiment,
+        metrics_log::{SUCCESS_RATE, range_of},
+    },
 };
 
 /// A learning curve: steps and success rates over the last 100 training episodes.
@@ -119,6 +122,7 @@ impl StudyReport {
             x_label: "environment steps".to_owned(),
             y_label: "success rate of the last 100 training episodes, mean and spread over the seeds".to_owned(),
             curves: curves.collect(),
+            y_range: range_of(SUCCESS_RATE),
             marks: Vec::new(),
         }
     }

@@ -101,7 +101,8 @@ impl Layout {
         let points = || chart.curves.iter().flat_map(|c| c.points.iter().copied()).filter(is_point);
         let bands = chart.curves.iter().flat_map(|c| c.band.iter().flatten().copied()).filter(is_point);
         let x = Axis::tight(points().map(|p| p.0).chain(chart.marks.iter().map(|m| m.1)), 6);
-        let y = Axis::rounded(points().map(|p| p.1).chain(bands.flat_map(|b| [b.0, b.1])), 5);
+        let wanted = chart.y_range.into_iter().flat_map(|(low, high)| [low, high]);
+        let y = Axis::rounded(points().map(|p| p.1).chain(bands.flat_map(|b| [b.0, b.1])).chain(wanted), 5);
 
         let drawn = || chart.curves.iter().filter(|c| !c.is_blank() && !c.label.is_empty());
         let label = drawn().map(|c| text_width(&c.label, SIZE)).fold(0.0, f64::max);

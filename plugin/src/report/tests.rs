@@ -4,7 +4,7 @@ use super::result::sample_rows;
 use super::*;
 
 fn chart(curves: Vec<Curve>) -> Chart {
-    Chart { title: "Return".into(), x_label: "steps".into(), y_label: "return".into(), curves, marks: Vec::new() }
+    Chart { title: "Return".into(), x_label: "steps".into(), y_label: "return".into(), curves, ..Chart::default() }
 }
 
 /// Tags that open must close, in order; attributes are quoted. Enough to catch text that was not escaped.
@@ -44,6 +44,7 @@ fn everything_is_escaped() {
                     x_label: evil.into(),
                     y_label: evil.into(),
                     curves: vec![Curve::new(evil, vec![(0.0, 1.0), (1.0, f64::NAN)]), Curve::new(evil, vec![])],
+                    y_range: None,
                     marks: vec![(evil.into(), 0.5)],
                 }],
                 tables: vec![

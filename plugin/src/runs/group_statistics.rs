@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{curves::check_metric, error::RunsError, group::RunGroup};
+use super::{curves::check_metric, error::RunsError, group::RunGroup, record::RunRecord};
 use crate::report::{
     Curve,
     statistics::{mean_and_sd, mean_curve, steps_to_reach},
@@ -27,6 +27,9 @@ pub struct GroupStatistics {
     pub highest: f64,
     /// For each run the first step at which it reached the threshold; none if no threshold was given.
     pub steps_to_threshold: Vec<Option<u64>>,
+    /// Runs that did not reach the threshold because too few of their episodes ended: means over fewer than 100 do not
+    /// count.
+    pub too_few_episodes: usize,
     /// Mean over the runs of their environment steps per second.
     pub steps_per_s: f64,
 }
@@ -38,6 +41,7 @@ impl GroupStatistics {
         let (last_mean, last_sd) = mean_and_sd(&last);
         let speeds: Vec<f64> = group.runs.iter().filter_map(|run| run.curves.steps_per_s()).collect();
         let values = || group.runs.iter().flat_map(|run| run.curves.curve(metric)).map(|(_, value)| *value);
+        let is_early = |run: &RunRecord| run.curves.settled(metric).is_empty() && !run.curves.curve(metric).is_empty();
         let reached =
             |threshold| group.runs.iter().map(move |run| steps_to_reach(run.curves.settled(metric), threshold));
         Self {
@@ -48,6 +52,7 @@ impl GroupStatistics {
             last,
             lowest: values().fold(f64::NAN, f64::min),
             highest: values().fold(f64::NAN, f64::max),
+            too_few_episodes: threshold.map_or(0, |_| group.runs.iter().filter(|run| is_early(run)).count()),
             steps_to_threshold: threshold.into_iter().flat_map(reached).collect(),
             steps_per_s: mean_and_sd(&speeds).0,
         }
@@ -92,7 +97,6 @@ mod tests {
         super::{
             curves::RunCurves,
             group::{group_runs, tests::run},
-            record::RunRecord,
         },
         *,
     };

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use playbot_learner::{ActionSpace, PpoConfig, SacConfig, ScoreConfig, SkillConfig};
+use playbot_learner::{ActionSpace, LearnError, PpoConfig, SacConfig, ScoreConfig, SkillConfig};
 use serde::{Deserialize, Serialize, Serializer};
 use thiserror::Error;
 
@@ -10,6 +10,9 @@ pub use super::algorithm::Algorithm;
 use super::checkpoint::CheckpointConfig;
 pub use crate::vision::ObservationKind;
 use crate::{
+    game::Game,
+    held_out::HeldOut,
+    mode::ModeError,
     split::LevelSplit,
     vision::{ImageOptions, Sight},
 };
@@ -162,6 +165,42 @@ pub enum ExperimentError {
         /// Held-out levels.
         test: LevelSplit,
     },
+    /// A training level shows what a held-out level shows.
+    #[error(
+        "level {level} of the training levels {train} is, or looks like, one of the held-out levels {test}: choose others"
+    )]
+    Leak {
+        /// Training levels.
+        train: Box<LevelSplit>,
+        /// The first of them that gives something away.
+        level: u64,
+        /// Held-out levels.
+        test: Box<LevelSplit>,
+    },
+    /// The game has no such mode.
+    #[error("`{key}` is {levels}: {source}; name levels of this game, as in `--set {key}={example}:0..63`")]
+    Mode {
+        /// Key in the file.
+        key: &'static str,
+        /// Its value.
+        levels: Box<LevelSplit>,
+        /// What is wrong with the mode.
+        source: Box<ModeError>,
+        /// A mode that the game has.
+        example: &'static str,
+    },
+    /// What a training keeps is more than the machine has room for.
+    #[error("{what} need {:.1} GiB, and {:.1} GiB of memory are free: lower {keys}", gib(.needed), gib(.free))]
+    Memory {
+        /// What it is, with the factors.
+        what: String,
+        /// Bytes that it takes.
+        needed: u64,
+        /// Bytes that are free.
+        free: u64,
+        /// What to lower.
+        keys: String,
+    },
     /// A number is out of range.
     #[error("`{key}` is {value}: {why}")]
     Value {
@@ -180,6 +219,18 @@ pub enum ExperimentError {
     Settings(String),
 }
 
+fn gib(bytes: &u64) -> f64 {
+    *bytes as f64 / f64::from(1 << 30)
+}
+
+/// What a learner has against its settings; that they are settings goes without saying.
+fn settings(error: LearnError) -> ExperimentError {
+    ExperimentError::Settings(match error {
+        LearnError::Config(text) => text,
+        other => other.to_string(),
+    })
+}
+
 fn refuse(key: &'static str, value: impl ToString, why: impl Into<String>) -> Result<(), ExperimentError> {
     Err(ExperimentError::Value { key, value: value.to_string(), why: why.into() })
 }
@@ -193,6 +244,12 @@ impl Experiment {
     pub fn check(&self) -> Result<(), ExperimentError> {
         if self.train.overlaps(&self.test) {
             return Err(ExperimentError::Overlap { train: self.train.clone(), test: self.test.clone() });
+        }
+        if self.arenas == 0 {
+            return refuse("arenas", 0, "somebody has to play");
+        }
+        if self.worlds == 0 {
+            return refuse("worlds", 0, "the arenas must be somewhere");
         }
         if self.steps == 0 {
             return refuse("steps", 0, "train for at least one step");
@@ -212,7 +269,6 @@ impl Experiment {
         if !(0.0..=1.0).contains(&self.study.threshold) {
             return refuse("study.threshold", self.study.threshold, "a success rate lies in 0..1");
         }
-        let settings = |error: playbot_learner::LearnError| ExperimentError::Settings(error.to_string());
         self.image.check().map_err(|error| ExperimentError::Settings(format!("image: {error}")))?;
         self.skills.validate().map_err(settings)?;
         self.score.validate().map_err(settings)?;
@@ -225,13 +281,48 @@ impl Experiment {
         self.check_batches()
     }
 
+    /// Checks that the game has the modes, and that no held-out level is trained on, be it by another name
+    /// ([`Game::family`], [`Game::fingerprint`]).
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the levels.
+    pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        self.check_train(game)?;
+        self.check_test(game)?;
+        match HeldOut::new(game, &self.test).first_of(&self.train) {
+            Some(level) => {
+                let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
+                Err(ExperimentError::Leak { train, level, test })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that the game has the mode of the training levels.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Mode`].
+    pub fn check_train(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_mode("train", &self.train, game)
+    }
+
+    /// Checks that the game has the mode of the held-out levels.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Mode`].
+    pub fn check_test(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_mode("test", &self.test, game)
+    }
+
     /// Checks what goes with the game's actions, before hours are spent on skills.
     ///
     /// # Errors
     ///
     /// [`ExperimentError`] with the key to change.
     pub fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
-        let settings = |error: playbot_learner::LearnError| ExperimentError::Settings(error.to_string());
         self.skills.check_space(space).map_err(settings)?;
         if !(self.algorithm.needs_skills() && self.algorithm.is_trained()) {
             return Ok(());
@@ -283,11 +374,8 @@ impl Experiment {
     }
 
     fn check_batches(&self) -> Result<(), ExperimentError> {
-        if self.arenas == 0 {
-            return refuse("arenas", 0, "somebody has to play");
-        }
         let (arenas, worlds) = (u64::from(self.arenas), u64::from(self.worlds));
-        if worlds == 0 || !arenas.is_multiple_of(worlds) {
+        if !arenas.is_multiple_of(worlds) {
             let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
             return refuse("worlds", worlds, why);
         }
@@ -345,6 +433,16 @@ impl Experiment {
     }
 }
 
+fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result<(), ExperimentError> {
+    let example = game.modes().first().copied().unwrap_or_default();
+    game.check_mode(&levels.mode).map_err(|source| ExperimentError::Mode {
+        key,
+        levels: Box::new(levels.clone()),
+        source: Box::new(source),
+        example,
+    })
+}
+
 /// The divisor of `n` nearest to `wanted`, the larger one of two.
 fn nearest_divisor(n: u64, wanted: u64) -> u64 {
     let distance = |divisor: &u64| (divisor.abs_diff(wanted), u64::MAX - divisor);
@@ -378,6 +476,15 @@ mod tests {
             let score = "score: (init_from_decoder: false)";
             assert_eq!(check(&format!(r#"algorithm: "{algorithm}", demos: "d", {score}"#)), Ok(()));
         }
+    }
+
+    #[test]
+    fn nobody_plays_nowhere() {
+        // Not with the learning rate that cannot fall over no updates.
+        let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("nobody");
+        assert!(text.starts_with("`arenas` is 0"), "{text}");
+        let text = check(r#"algorithm: "ppo", worlds: 0"#).expect_err("nowhere");
+        assert!(text.starts_with("`worlds` is 0"), "{text}");
     }
 
     #[test]

@@ -38,6 +38,14 @@ pub enum ConfigError {
         /// What is wrong with it.
         message: String,
     },
+    /// What `key=value` changes does not go with the rest, which was sound before.
+    #[error("`{}`: {source}", sets.join("`, `"))]
+    Sets {
+        /// The texts, those that are to blame if it can be told.
+        sets: Vec<String>,
+        /// Why.
+        source: Box<ExperimentError>,
+    },
     /// The values do not go together.
     #[error("{}: {source}", path.display())]
     Values {

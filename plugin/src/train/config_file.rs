@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use super::{
-    config::Experiment,
+    config::{Experiment, ExperimentError},
     config_keys::{Keys, Origin},
     presets::Preset,
 };
@@ -41,9 +41,31 @@ pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Ex
 ///
 /// [`ConfigError`].
 pub fn parse_experiment_with<S: AsRef<str>>(text: &str, path: &Path, sets: &[S]) -> Result<Experiment, ConfigError> {
-    let experiment = parse_experiment(text, path)?.with_set(sets)?;
-    experiment.check().map_err(|source| ConfigError::Values { path: path.into(), source })?;
-    Ok(experiment)
+    let own = parse_experiment(text, path)?;
+    let experiment = own.with_set(sets)?;
+    match experiment.check() {
+        Ok(()) => Ok(experiment),
+        Err(source) => Err(blame(&own, sets, source, path)),
+    }
+}
+
+/// Who is to blame for values that do not go together: the file, if it is no better without the sets; otherwise those
+/// sets without which the error would be gone, or all of them together.
+fn blame<S: AsRef<str>>(own: &Experiment, sets: &[S], source: ExperimentError, path: &Path) -> ConfigError {
+    let fails = |sets: &[&str]| own.with_set(sets).is_ok_and(|changed| changed.check().as_ref() == Err(&source));
+    if fails(&[]) {
+        return ConfigError::Values { path: path.into(), source };
+    }
+    let all: Vec<&str> = sets.iter().map(AsRef::as_ref).collect();
+    let without = |left_out: usize| -> Vec<&str> {
+        all.iter().enumerate().filter(|(at, _)| *at != left_out).map(|(_, set)| *set).collect()
+    };
+    let mut sets: Vec<String> =
+        (0..all.len()).filter(|&at| !fails(&without(at))).map(|at| all[at].to_owned()).collect();
+    if sets.is_empty() {
+        sets = all.into_iter().map(str::to_owned).collect();
+    }
+    ConfigError::Sets { sets, source: source.into() }
 }
 
 /// Parses the text of an experiment. `path` is for messages and says where to look for files that it is built on.
@@ -186,6 +208,20 @@ mod tests {
         let idle = "algorithm: \"sac\", sac: (num_steps: 0), ppo: (anneal_lr: true)";
         assert!(values(&GOOD.replace("ppo: (gamma: 0.99)", idle)).contains("num_steps must be at least 1"));
         assert!(values(&GOOD.replace("gamma: 0.99", "gamma: 1.5")).contains("gamma must lie in 0..1"));
+    }
+
+    #[test]
+    fn who_spoils_a_sound_file_is_named() {
+        let error = |text: &str, sets: &[&str]| {
+            parse_experiment_with(text, Path::new("x.ron"), sets).expect_err("must be refused").to_string()
+        };
+        let text = error(GOOD, &["seed=3", "ppo.lr=NaN"]);
+        assert!(text.starts_with("`ppo.lr=NaN`: ppo lr must be"), "{text}");
+        let text = error(GOOD, &["arenas=6", "worlds=4", "seed=3"]);
+        assert!(text.starts_with("`arenas=6`, `worlds=4`: `worlds` is 4"), "{text}");
+        let bad = GOOD.replace("gamma: 0.99", "gamma: 1.5");
+        assert!(error(&bad, &["seed=3"]).starts_with("x.ron: ppo gamma"), "the file is wrong by itself");
+        assert!(error(GOOD, &["ppo.lr=0", "ppo.lr=-1"]).starts_with("`ppo.lr=-1`: "), "the last one counts");
     }
 
     #[test]

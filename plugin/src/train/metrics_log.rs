@@ -34,6 +34,11 @@ pub const EPISODES: &str = "charts/episodes";
 /// Tags of the means over the last 100 episodes.
 pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
 
+/// The range that a metric lies in by its nature; `None` if it may have any value.
+pub fn range_of(tag: &str) -> Option<(f64, f64)> {
+    [SUCCESS_RATE, CLIPPED_SHARE].contains(&tag).then_some((0.0, 1.0))
+}
+
 /// The files of a run that hold its metrics.
 #[derive(Clone, Debug)]
 pub struct MetricsLog {

@@ -7,9 +7,11 @@
 //! runs/<id>/timing.jsonl       seconds and steps per second of each update
 //! runs/<id>/tensorboard/       both, as an event file for TensorBoard
 //! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`](super::checkpoint)
+//! runs/<id>/run.lock           locked while somebody trains, see [`RunLock`]
 //! ```
 
 use std::{
+    ffi::OsString,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -26,6 +28,7 @@ use super::{
     config_file::{ConfigError, read_experiment},
     learner::Learner,
     metrics_log::MetricsLog,
+    run_lock::{LOCK_FILE, RunLock},
     trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
@@ -39,6 +42,11 @@ pub enum RunError {
     /// The folder to overwrite is something else.
     #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
     NotARun(PathBuf),
+    /// Another process trains in the folder.
+    #[error(
+        "{} is in use by another process that trains there: wait for it or stop it, or choose another folder", .0.display()
+    )]
+    Busy(PathBuf),
     /// There is no such checkpoint.
     #[error("{} has no such checkpoint; it has {}", path.display(), list_steps(steps))]
     NoCheckpoint {
@@ -128,32 +136,54 @@ struct TrainState {
 /// An open folder of a run.
 pub struct RunDir {
     path: PathBuf,
+    /// Held by who writes.
+    _lock: Option<RunLock>,
 }
 
 impl RunDir {
-    /// Makes the folder and writes what the run is.
+    /// Makes the folder, locks it, and writes what the run is.
     ///
     /// # Errors
     ///
-    /// [`RunError::Exists`] unless `force`, which empties the folder; [`RunError::Io`] if it cannot be written.
+    /// [`RunError::Exists`] unless `force`, which replaces a run; what is no run is left alone with
+    /// [`RunError::NotARun`], and what is in use with [`RunError::Busy`]. [`RunError::Io`] if it cannot be written.
     pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
         if path.exists() {
             if !force {
                 return Err(RunError::Exists(path.into()));
             }
-            if !is_run(path) {
-                return Err(RunError::NotARun(path.into()));
-            }
-            fs::remove_dir_all(path).map_err(io_error("empty", path))?;
+            check_replaceable(path)?;
         }
         fs::create_dir_all(path).map_err(io_error("create", path))?;
-        let run = Self { path: path.into() };
-        run.write_experiment(experiment)?;
-        write_atomically(&path.join("run.json"), json!(info).to_string().as_bytes())?;
+        Self::begin(RunLock::take(path)?, experiment, info)
+    }
+
+    /// Writes what the run is into a folder that is locked. A run that lies there is moved aside and removed once the new
+    /// one is written; it comes back if that fails.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::NotARun`] for a folder with something else; [`RunError::Io`] if it cannot be written.
+    pub fn begin(lock: RunLock, experiment: &Experiment, info: &RunInfo) -> Result<Self, RunError> {
+        let path = lock.folder().to_owned();
+        check_replaceable(&path)?;
+        let run = Self { path: path.clone(), _lock: Some(lock) };
+        let aside = Aside::put(&path)?;
+        let written = run.write_experiment(experiment).and_then(|()| {
+            let text = json!(info).to_string();
+            write_atomically(&path.join("run.json"), text.as_bytes())
+        });
+        match written {
+            Ok(()) => aside.remove(),
+            Err(error) => {
+                aside.put_back();
+                return Err(error);
+            }
+        }
         Ok(run)
     }
 
-    /// Opens the folder of a run that exists.
+    /// Opens the folder of a run that exists, to read.
     ///
     /// # Errors
     ///
@@ -163,7 +193,28 @@ impl RunDir {
         let info_path = path.join("run.json");
         let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;
         let info = serde_json::from_str(&text).map_err(|error| damaged(&info_path, &error))?;
-        Ok((Self { path: path.into() }, experiment, info))
+        Ok((Self { path: path.into(), _lock: None }, experiment, info))
+    }
+
+    /// [`open`](Self::open), to go on with it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open`](Self::open), and [`RunError::Busy`].
+    pub fn open_to_write(path: &Path) -> Result<(Self, Experiment, RunInfo), RunError> {
+        // A folder that is no run gets no lock file.
+        Self::open(path)?;
+        Self::open_with(RunLock::take(path)?)
+    }
+
+    /// [`open`](Self::open) in a folder that is locked, to go on with it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open`](Self::open).
+    pub fn open_with(lock: RunLock) -> Result<(Self, Experiment, RunInfo), RunError> {
+        let (run, experiment, info) = Self::open(lock.folder())?;
+        Ok((Self { _lock: Some(lock), ..run }, experiment, info))
     }
 
     /// Writes the experiment anew, after its steps were raised.
@@ -274,10 +325,82 @@ fn read_checkpoint(
     Ok((learner, state))
 }
 
-/// Whether a folder is empty or was made by [`RunDir::create`].
-fn is_run(path: &Path) -> bool {
-    let is_empty = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-    is_empty || (path.join("run.json").is_file() && path.join("experiment.ron").is_file())
+/// What a run was before another one took its place.
+struct Aside {
+    run: PathBuf,
+    /// Beside the run; `None` if there was nothing to move.
+    folder: Option<PathBuf>,
+}
+
+impl Aside {
+    /// Moves everything but the lock aside. What makes it a run goes first, so that no half run is left by a kill.
+    fn put(run: &Path) -> Result<Self, RunError> {
+        let mut names = names_in(run)?;
+        names.retain(|name| name != LOCK_FILE);
+        names.sort_by_key(|name| (name != "run.json", name == "experiment.ron"));
+        let mut aside = Self { run: run.into(), folder: None };
+        if names.is_empty() {
+            return Ok(aside);
+        }
+        let mut name = run.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".replaced-{}", std::process::id()));
+        let folder = run.with_file_name(name);
+        fs::create_dir_all(&folder).map_err(io_error("create", &folder))?;
+        aside.folder = Some(folder.clone());
+        for name in names {
+            if let Err(error) = fs::rename(run.join(&name), folder.join(&name)) {
+                aside.put_back();
+                return Err(io_error("replace", run)(error));
+            }
+        }
+        Ok(aside)
+    }
+
+    /// Forgets it. The new run does not depend on whether this works.
+    fn remove(self) {
+        if let Some(folder) = self.folder
+            && let Err(error) = fs::remove_dir_all(&folder)
+        {
+            tracing::warn!("cannot remove the old run in {}: {error}", folder.display());
+        }
+    }
+
+    /// Brings back what can be brought back, after something worse has gone wrong.
+    fn put_back(self) {
+        let Some(folder) = self.folder else { return };
+        for name in names_in(&folder).unwrap_or_default() {
+            let _ = fs::rename(folder.join(&name), self.run.join(&name));
+        }
+        if fs::remove_dir(&folder).is_err() {
+            tracing::warn!("the old run is in {}", folder.display());
+        }
+    }
+}
+
+fn names_in(folder: &Path) -> Result<Vec<OsString>, RunError> {
+    let names = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
+    names.map_err(io_error("list", folder))
+}
+
+/// Checks that a folder holds a run, or nothing: anything else is never replaced.
+///
+/// # Errors
+///
+/// [`RunError::NotARun`].
+pub fn check_replaceable(path: &Path) -> Result<(), RunError> {
+    let is_known = path.join("run.json").is_file() || RunLock::is_known(path);
+    if (is_known && path.join("experiment.ron").is_file()) || is_unborn(path) {
+        return Ok(());
+    }
+    Err(RunError::NotARun(path.into()))
+}
+
+/// Whether a folder holds at most what is written before `run.json`.
+pub fn is_unborn(path: &Path) -> bool {
+    let first = |name: &str| {
+        name == LOCK_FILE || ["experiment.ron", "run.json.tmp"].iter().any(|known| name.starts_with(known))
+    };
+    names_in(path).is_ok_and(|names| names.iter().all(|name| name.to_str().is_some_and(first)))
 }
 
 pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {

@@ -20,7 +20,6 @@ use crate::{
     episode::EpisodeEnded,
     fault::Fault,
     game::Game,
-    mode::ModeError,
     policy::in_words,
     skill_prior::SkillPrior,
     vision::{Sight, UnknownSight, VisionError},
@@ -38,9 +37,6 @@ pub enum TrainError {
     /// The experiment makes no sense.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// The game has no such mode.
-    #[error(transparent)]
-    Mode(#[from] ModeError),
     /// The game cannot be seen this way.
     #[error(transparent)]
     Vision(#[from] VisionError),
@@ -287,9 +283,9 @@ impl Trainer {
 /// Whether the experiment can be run on this game.
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
     experiment.check()?;
-    game.check_mode(&experiment.train.mode)?;
-    game.check_mode(&experiment.test.mode)?;
-    Ok(experiment.sight().check(game)?)
+    experiment.check_levels(game)?;
+    experiment.sight().check(game)?;
+    Ok(experiment.check_memory(game)?)
 }
 
 impl Progress {

@@ -13,6 +13,7 @@ use super::Args;
 use crate::{
     cli::{
         error::{CliError, Outcome, print_line},
+        output,
         view::{self, film::Film},
     },
     coinrun::{Level, Mode, components::PlaysIn, generate},
@@ -26,6 +27,9 @@ const LEGEND: &str =
 pub fn show(args: &Args) -> Result<Outcome, CliError> {
     if args.map.is_some() {
         return Err(CliError::Usage("CoinRun has no maps: name a --mode and a --seed".to_owned()));
+    }
+    if let Some(path) = &args.png {
+        output::png(&path.to_string_lossy()).map_err(|why| CliError::Usage(format!("{}: {why}", path.display())))?;
     }
     let game = registry::game("coinrun")?;
     let mode = args.mode.as_deref().unwrap_or("hard");

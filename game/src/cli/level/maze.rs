@@ -1,4 +1,4 @@
-//! `playbot level maze2d` and `playbot level antmaze`.
+//! `playbot level` of the games with mazes.
 
 use std::{fs::File, io::Read, path::Path};
 
@@ -8,23 +8,56 @@ use serde_json::json;
 
 use super::Args;
 use crate::{
+    antmaze::{AntMazeMode, AntMazeModeError, generate},
     cli::{
         error::{CliError, Outcome, print_line},
         plot::PlotFile,
     },
-    maze::{Cell, MAX_CELLS, Map, MapError, Maze},
+    maze::{Cell, MAX_CELLS, Map, MapError, Maze, MazeError},
+    maze2d::{Maze2dLevel, Maze2dMode, Maze2dModeError},
 };
 
 /// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
 const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
 
+/// Where the mazes of a game come from.
+pub struct MazeGame {
+    /// A map and a seed, with the start and the goal of the map.
+    map: fn(&Map, u64) -> Result<Maze, MazeError>,
+    /// A whole mode and a seed, with the start and the goal of that level.
+    level: fn(&str, u64) -> Result<Maze, CliError>,
+}
+
+impl MazeGame {
+    /// The game with this name, if it has mazes.
+    pub fn named(game: &str) -> Option<Self> {
+        match game {
+            "maze2d" | "maze2d-sighted" => Some(Self { map: Map::maze2d, level: of_ball }),
+            "antmaze" | "antmaze-sighted" => Some(Self { map: Map::antmaze, level: of_ant }),
+            _ => None,
+        }
+    }
+}
+
+fn of_ball(mode: &str, seed: u64) -> Result<Maze, CliError> {
+    let parsed: Maze2dMode = mode.parse().map_err(|error: Maze2dModeError| error.of(mode))?;
+    let Maze2dLevel { maze, start_cell, goal_cell, .. } = Maze2dLevel::new(&parsed, seed)?;
+    Ok(maze.with_ends(start_cell, goal_cell)?)
+}
+
+fn of_ant(mode: &str, seed: u64) -> Result<Maze, CliError> {
+    let parsed: AntMazeMode = mode.parse().map_err(|error: AntMazeModeError| error.of(mode))?;
+    let level = generate(&parsed, seed)?;
+    Ok(level.maze.with_ends(level.start, level.goal)?)
+}
+
 /// Shows a maze.
-pub fn show(args: &Args) -> Result<Outcome, CliError> {
+pub fn show(args: &Args, game: &MazeGame) -> Result<Outcome, CliError> {
     if args.mode.is_some() {
-        return Err(CliError::Usage("mazes are named by --map and --seed, without the rest of a mode".to_owned()));
+        return Err(CliError::Usage("mazes are named by --map, which takes whole modes too, and --seed".to_owned()));
     }
     let file = args.png.as_deref().map(PlotFile::new).transpose()?;
-    let maze = maze(args)?;
+    let maze = maze(args, game)?;
     if let Some(file) = file {
         file.write(&draw(&maze)?)?;
     }
@@ -36,26 +69,28 @@ pub fn show(args: &Args) -> Result<Outcome, CliError> {
             "shortest_path_length": maze.difficulty(),
         }))?;
     } else {
-        print_line(picture(&maze).join("\n"))?;
+        // The empty line ends the rows for whoever reads this as a file.
+        print_line(format!("{}\n", picture(&maze).join("\n")))?;
         print_line(format!("S start  G goal  # wall  . shortest path: {} moves", maze.difficulty()))?;
     }
     Ok(Outcome::Pass)
 }
 
-fn maze(args: &Args) -> Result<Maze, CliError> {
+fn maze(args: &Args, game: &MazeGame) -> Result<Maze, CliError> {
     let text = args.map.as_deref().unwrap_or("random");
+    let seed = args.seed.unwrap_or(0);
     let map: Map = match text.parse() {
         Ok(map) => map,
         Err(MapError::Name(error)) if error.what == "map" => {
             return from_file(Path::new(text), args, &error.to_string());
         }
-        Err(error) => return Err(error.into()),
+        // Not an option of the map: one of the game's.
+        Err(_) => return (game.level)(text, seed),
     };
     if args.seed.is_some() && !matches!(map, Map::Random(_)) {
         return Err(no_seed(&map.to_string()));
     }
-    let seed = args.seed.unwrap_or(0);
-    Ok(if args.game == "antmaze" { map.antmaze(seed) } else { map.maze2d(seed) }?)
+    Ok((game.map)(&map, seed)?)
 }
 
 fn no_seed(map: &str) -> CliError {
@@ -75,7 +110,9 @@ fn from_file(path: &Path, args: &Args, unknown: &str) -> Result<Maze, CliError> 
     if text.len() as u64 > MAX_BYTES {
         return Err(CliError::Usage(format!("{shown}: more than {MAX_CELLS} cells are no maze that fits into memory")));
     }
-    let rows: Vec<&str> = text.trim_end().lines().map(str::trim_end).collect();
+    // Some editors put a mark in front of all they write.
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim_end);
+    let rows: Vec<&str> = lines.skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();
     Maze::parse(&rows).map_err(|error| CliError::Usage(format!("{shown}: {error}")))
 }
 

@@ -81,12 +81,12 @@ fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
 
 fn announce(game: &dyn Game, args: &Args) {
     if let Some(keys) = game.input_map() {
-        eprintln!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
+        tell!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
     }
     if args.partner.is_named() {
-        eprintln!("Tab hands over and takes over again");
+        tell!("Tab hands over and takes over again");
     } else {
-        eprintln!("there is nobody to hand over to: name a --policy, a --run or a --bot");
+        tell!("there is nobody to hand over to: name a --policy, a --run or a --bot");
     }
 }
 
@@ -94,13 +94,13 @@ fn announce(game: &dyn Game, args: &Args) {
 fn conclude(path: &Path) -> Result<Outcome, CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();
-    eprintln!(
+    tell!(
         "{file}: {} episodes, {} steps, decided by {}",
         summary.episodes,
         summary.steps,
         deciders(&summary.steps_by_decider)
     );
-    eprintln!("  playbot demo verify {file}   proves that it replays");
-    eprintln!("  playbot learn-skills --set demos={file} --out skills.safetensors   learns from it");
+    tell!("  playbot demo verify {file}   proves that it replays");
+    tell!("  playbot learn-skills --set demos={file} --out skills.safetensors   learns from it");
     Ok(Outcome::Pass)
 }

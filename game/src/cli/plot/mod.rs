@@ -16,11 +16,12 @@ pub struct PlotFile {
 }
 
 impl PlotFile {
-    /// A file by its path; its ending says its kind.
+    /// A file by its path; its ending says its kind. The folder it lies in is made, so that nothing is computed for a file
+    /// that cannot be written.
     ///
     /// # Errors
     ///
-    /// The ending is neither `.png` nor `.svg`.
+    /// The ending is neither `.png` nor `.svg`, the path is that of a folder, or its folder cannot be made.
     pub fn new(path: &Path) -> Result<Self, CliError> {
         let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
         let is_svg = match ending.as_deref() {
@@ -33,6 +34,13 @@ impl PlotFile {
                 )));
             }
         };
+        if path.is_dir() {
+            return Err(CliError::Usage(format!("{} is a folder: name a file for the picture", path.display())));
+        }
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)
+                .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
+        }
         Ok(Self { path: path.to_owned(), is_svg })
     }
 

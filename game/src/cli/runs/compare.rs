@@ -8,12 +8,15 @@ use std::{
 use bevy_playbot::{
     report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole},
     runs::{GroupStatistics, RunGroup, RunRecord, find_runs, group_runs, mean_and_spread},
-    train::metrics_log::SUCCESS_RATE,
+    train::metrics_log::{EPISODE_MEANS, SUCCESS_RATE, range_of},
 };
 use serde_json::json;
 
 use super::{
-    super::error::{CliError, Outcome, print_line},
+    super::{
+        error::{CliError, Outcome, print_line},
+        output,
+    },
     write_plot,
 };
 
@@ -28,15 +31,15 @@ pub struct Args {
     /// Folders of runs, or folders with runs below them.
     #[arg(required = true)]
     runs: Vec<PathBuf>,
-    /// The metric, by its TensorBoard tag.
-    #[arg(long, default_value = SUCCESS_RATE)]
-    metric: String,
+    /// The metric, by its TensorBoard tag; charts/success_rate if none is named.
+    #[arg(long)]
+    metric: Option<String>,
     /// Count the steps until the metric first reaches this value; for the success rate the runs' `study.threshold`
-    /// if not given.
+    /// if not given. Means over the last 100 episodes count from the 100th episode on.
     #[arg(long)]
     threshold: Option<f64>,
     /// Draw mean and spread over the seeds into this SVG file.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", value_parser = output::svg)]
     plot: Option<PathBuf>,
     /// One line of JSON per group.
     #[arg(long)]
@@ -48,29 +51,45 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     if runs.iter().any(|run| run.curves.last_step() > 0) {
         // Behaviour cloning trains nothing, and a run that has just begun has nothing to show.
         for run in runs.extract_if(.., |run| run.curves.last_step() == 0) {
-            eprintln!("warning: {} is left out: it has no metrics", run.path.display());
+            tell!("warning: {} is left out: it has no metrics", run.path.display());
+        }
+    }
+    let metric = args.metric.as_deref().unwrap_or(SUCCESS_RATE);
+    let has_metric = |run: &RunRecord| !run.curves.curve(metric).is_empty();
+    if runs.iter().all(|run| run.curves.last_step() > 0) && (args.metric.is_none() || runs.iter().any(has_metric)) {
+        for run in runs.extract_if(.., |run| !has_metric(run)) {
+            tell!("warning: {} is left out: it has no {metric}{}", run.path.display(), why_not(metric));
+        }
+        if runs.is_empty() {
+            tell!("nothing to compare yet: train for longer, or name another --metric");
+            return Ok(Outcome::Pass);
         }
     }
     let groups = group_runs(&runs);
-    let curves = mean_and_spread(&groups, &args.metric)?;
-    groups.iter().flat_map(RunGroup::warnings).for_each(|warning| eprintln!("warning: {warning}"));
-    let threshold = args.threshold.or_else(|| if args.metric == SUCCESS_RATE { common_threshold(&runs) } else { None });
-    let rows: Vec<_> = groups.iter().map(|group| GroupStatistics::new(group, &args.metric, threshold)).collect();
+    let curves = mean_and_spread(&groups, metric)?;
+    groups.iter().flat_map(RunGroup::warnings).for_each(|warning| tell!("warning: {warning}"));
+    let threshold = args.threshold.or_else(|| if metric == SUCCESS_RATE { common_threshold(&runs) } else { None });
+    let rows: Vec<_> = groups.iter().map(|group| GroupStatistics::new(group, metric, threshold)).collect();
     if args.json {
         for (group, row) in groups.iter().zip(&rows) {
             let paths: Vec<&Path> = group.runs.iter().map(|run| run.path.as_path()).collect();
             print_line(json!({
-                "metric": args.metric, "threshold": threshold, "group": row, "settings": group.differing, "runs": paths,
+                "metric": metric, "threshold": threshold, "group": row, "settings": group.differing, "runs": paths,
             }))?;
         }
     } else {
-        print_line(table(&args.metric, threshold, &rows).to_text().trim_end())?;
+        print_line(table(metric, threshold, &rows).to_text().trim_end())?;
         print_settings(&groups)?;
     }
     if let Some(path) = &args.plot {
-        write_plot(path, &chart(&args.metric, &groups, curves).to_svg())?;
+        write_plot(path, &chart(metric, &groups, curves).to_svg())?;
     }
     Ok(Outcome::Pass)
+}
+
+/// Why a run may lack a metric, as far as it is known.
+fn why_not(metric: &str) -> &'static str {
+    if EPISODE_MEANS.contains(&metric) { ", since no episode has ended" } else { "" }
 }
 
 /// Reads the runs at all paths, each of them once.
@@ -84,7 +103,7 @@ fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
             }
             seen.push(same);
             let run = RunRecord::read(&path)?;
-            run.curves.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+            run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
             runs.push(run);
         }
     }
@@ -98,7 +117,7 @@ fn common_threshold(runs: &[RunRecord]) -> Option<f64> {
     if runs.iter().all(|run| threshold(run) == first) {
         return Some(first);
     }
-    eprintln!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
+    tell!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
     None
 }
 
@@ -115,29 +134,29 @@ fn table(metric: &str, threshold: Option<f64>, groups: &[GroupStatistics]) -> Pl
         };
         let mut row = vec![group.label.clone(), seeds.join(" "), last];
         row.extend([readable(group.lowest), readable(group.highest)]);
-        row.extend(threshold.map(|_| reached(&group.steps_to_threshold)));
+        row.extend(threshold.map(|_| reached(&group.steps_to_threshold, group.too_few_episodes)));
         row.push(whole(group.steps_per_s));
         row
     };
     PlainTable { caption: metric.to_owned(), columns, rows: groups.iter().map(row).collect() }
 }
 
-/// Mean and range of the steps to the threshold, and how many runs never got there.
-fn reached(steps: &[Option<u64>]) -> String {
+/// Mean and range of the steps to the threshold, how many runs never got there, and how many had too few episodes to tell.
+fn reached(steps: &[Option<u64>], early: usize) -> String {
     let known: Vec<f64> = steps.iter().flatten().map(|step| *step as f64).collect();
-    let never = steps.len() - known.len();
-    let (Some(least), Some(most)) = (known.iter().copied().reduce(f64::min), known.iter().copied().reduce(f64::max))
-    else {
-        return format!("never in {never} of {never}");
-    };
-    let mut text = whole(mean_and_sd(&known).0);
-    if known.len() > 1 {
-        text += &format!(" ({} to {})", whole(least), whole(most));
+    let (all, never) = (steps.len(), steps.len() - known.len() - early);
+    let mut parts = Vec::new();
+    if let (Some(least), Some(most)) = (known.iter().copied().reduce(f64::min), known.iter().copied().reduce(f64::max))
+    {
+        let range = if known.len() > 1 { format!(" ({} to {})", whole(least), whole(most)) } else { String::new() };
+        parts.push(whole(mean_and_sd(&known).0) + &range);
     }
-    if never > 0 {
-        text += &format!(", never in {never} of {}", steps.len());
+    for (count, words) in [(never, "never"), (early, "too few episodes")] {
+        if count > 0 {
+            parts.push(format!("{words} in {count} of {all}"));
+        }
     }
-    text
+    parts.join(", ")
 }
 
 /// What differs between the groups, where their labels do not say it.
@@ -165,6 +184,7 @@ fn chart(metric: &str, groups: &[RunGroup], curves: Vec<Curve>) -> Chart {
         x_label: "environment steps".to_owned(),
         y_label: y_label.to_owned(),
         curves,
+        y_range: range_of(metric),
         marks: Vec::new(),
     }
 }

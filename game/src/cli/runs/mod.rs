@@ -44,6 +44,6 @@ pub fn run(args: Args) -> Result<Outcome, CliError> {
 /// Writes a plot, whole or not at all, and says where.
 fn write_plot(path: &Path, svg: &str) -> Result<(), CliError> {
     write_atomically(path, svg.as_bytes())?;
-    eprintln!("plot: {}", path.display());
+    tell!("plot: {}", path.display());
     Ok(())
 }

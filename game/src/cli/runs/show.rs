@@ -7,13 +7,16 @@ use bevy_playbot::{
     runs::{RunRecord, changed_settings},
     train::{
         checkpoint::Checkpoint,
-        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     },
 };
 use serde_json::{Value, json};
 
 use super::{
-    super::error::{CliError, Outcome, print_line},
+    super::{
+        error::{CliError, Outcome, print_line},
+        output,
+    },
     ls::{UNKNOWN, age_s, duration, to_json},
     write_plot,
 };
@@ -34,7 +37,7 @@ pub struct Args {
     #[arg(long)]
     metric: Vec<String>,
     /// Draw the curves into this SVG file.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", value_parser = output::svg)]
     plot: Option<PathBuf>,
     /// Print everything as one line of JSON.
     #[arg(long)]
@@ -43,8 +46,14 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let run = RunRecord::read(&args.run)?;
-    run.curves.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
     let curves = curves(&run, &args.metric)?;
+    if args.plot.is_some() && curves.is_empty() {
+        return Err(CliError::Usage(format!(
+            "{}: no episode has ended yet, so there is no curve to draw: train for longer, or name a --metric",
+            run.path.display()
+        )));
+    }
     if args.json {
         print_line(full_json(&run))?;
     } else {
@@ -164,6 +173,7 @@ fn chart(run: &RunRecord, tag: &str, curve: &[(u64, f64)]) -> Chart {
         x_label: "environment steps".to_owned(),
         y_label: format!("{} on {}, seed {}", run.info.algorithm, run.experiment.game, run.info.seed),
         curves: vec![Curve::new("", points)],
+        y_range: range_of(tag),
         marks: Vec::new(),
     }
 }

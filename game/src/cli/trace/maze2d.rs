@@ -43,7 +43,7 @@ pub(super) fn run(args: Args) -> Result<Outcome, CliError> {
         }
     }
     if clipped > 0 {
-        eprintln!("{}: {clipped} pushes lay outside -1 to 1 and were clipped", path.display());
+        tell!("{}: {clipped} pushes lay outside -1 to 1 and were clipped", path.display());
     }
     Ok(Outcome::Pass)
 }

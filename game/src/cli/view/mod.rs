@@ -22,6 +22,7 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     interrupt,
+    output::{self, make_folder_of},
     player::{Chosen, PlayerArgs},
     progress,
 };
@@ -63,8 +64,8 @@ pub struct Args {
     /// Episode of the recording, counted from 0.
     #[arg(long, default_value_t = 0, requires = "demo")]
     episode_number: usize,
-    /// File to write.
-    #[arg(long, default_value = "view.png")]
+    /// File to write, a .png.
+    #[arg(long, default_value = "view.png", value_parser = output::png)]
     out: PathBuf,
     /// How many times as large as the bot sees it.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
@@ -196,10 +197,7 @@ fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
 ///
 /// The folder or the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
-    }
+    make_folder_of(path)?;
     Ok(write_atomically(path, bytes)?)
 }
 
@@ -220,7 +218,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
         }))?;
     } else {
         let how = stage.end().map_or("still running", stage::end_in_words);
-        eprintln!(
+        tell!(
             "{path}: {width} × {height}, {} frames of level {} played by {}; after {} ticks: {how}",
             written.frames,
             stage.level(),
@@ -231,7 +229,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
     match stage.divergence() {
         None => Ok(Outcome::Pass),
         Some(divergence) => {
-            eprintln!("from there on it is not the game that was recorded: {divergence}");
+            tell!("from there on it is not the game that was recorded: {divergence}");
             Ok(Outcome::Findings)
         }
     }

@@ -122,6 +122,7 @@ impl SkillConfig {
             ("gru_hidden", self.gru_hidden),
             ("gru_layers", self.gru_layers),
             ("batch", self.batch),
+            ("epochs", self.epochs),
             ("hidden", self.hidden.iter().copied().min().unwrap_or(1)),
             ("cnn", self.cnn.smallest()),
         ];
@@ -184,5 +185,7 @@ mod tests {
         assert_eq!((config.latent, config.window), (4, 10));
         let error = SkillConfig { batch: 0, ..SkillConfig::default() }.validate();
         assert!(error.expect_err("no windows").to_string().contains("batch"));
+        let error = SkillConfig { epochs: 0, ..SkillConfig::default() }.validate();
+        assert!(error.expect_err("an untrained model").to_string().contains("epochs must be at least 1"));
     }
 }

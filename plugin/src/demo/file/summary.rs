@@ -12,7 +12,7 @@ use super::reader::DemoReader;
 
 /// What a demonstration file holds, in a few numbers.
 ///
-/// Means and shares are `None` for a file without episodes: they are not 0.
+/// Means and shares are `None` where there are no episodes to take them from: they are not 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DemoSummary {
     /// The file.
@@ -33,7 +33,8 @@ pub struct DemoSummary {
     pub truncated: usize,
     /// Episodes whose recording stopped before their end.
     pub aborted: usize,
-    /// Share of all episodes that terminated with success, 0 to 1.
+    /// Share that terminated with success of the episodes that were recorded to their end, 0 to 1: those that are
+    /// `aborted` neither reached anything nor failed.
     pub success_share: Option<f64>,
     /// Mean of the undiscounted returns.
     pub return_mean: Option<f64>,
@@ -95,10 +96,11 @@ impl DemoSummary {
         }
         if summary.episodes > 0 {
             let episodes = summary.episodes as f64;
-            summary.success_share = Some(summary.successes as f64 / episodes);
             summary.return_mean = Some(return_sum / episodes);
             summary.length_mean = Some(summary.steps as f64 / episodes);
         }
+        let ended = summary.episodes - summary.aborted;
+        summary.success_share = (ended > 0).then(|| summary.successes as f64 / ended as f64);
         summary.level_seed_min = seeds.first().copied();
         summary.level_seed_max = seeds.last().copied();
         summary.levels = seeds.len();
@@ -120,14 +122,15 @@ mod tests {
             episode(7, 4),
             lost(7, 6, DemoEnd::Terminated { success: false }),
             lost(9, 10, DemoEnd::Truncated),
+            lost(9, 0, DemoEnd::Truncated),
             lost(2, 0, DemoEnd::Aborted),
         ];
         let summary = DemoSummary::read(write(folder.path(), "a.demo", &episodes)).expect("sound");
-        assert_eq!((summary.episodes, summary.steps, summary.levels), (4, 20, 3));
-        assert_eq!((summary.successes, summary.failures, summary.truncated, summary.aborted), (1, 1, 1, 1));
+        assert_eq!((summary.episodes, summary.steps, summary.levels), (5, 20, 3));
+        assert_eq!((summary.successes, summary.failures, summary.truncated, summary.aborted), (1, 1, 2, 1));
         assert_eq!(
             (summary.success_share, summary.return_mean, summary.length_mean),
-            (Some(0.25), Some(2.5), Some(5.0))
+            (Some(0.25), Some(2.0), Some(4.0))
         );
         assert_eq!((summary.level_seed_min, summary.level_seed_max), (Some(2), Some(9)));
         let deciders: Vec<_> = summary.steps_by_decider.clone().into_iter().collect();

@@ -6,6 +6,8 @@ pub const INK: Rgb = [31, 35, 40];
 pub const SOFT: Rgb = [87, 96, 106];
 pub const PAPER: Rgb = [255, 255, 255];
 pub const WALL: Rgb = [190, 195, 201];
+pub const HAZARD: Rgb = [236, 148, 138];
+pub const PLATFORM: Rgb = [226, 209, 176];
 
 /// The colours of lines, those of the other charts.
 pub const LINES: [Rgb; 7] =

@@ -4,12 +4,12 @@ use bevy::math::{Rect, Vec2};
 
 use super::{
     Floor, TrailChart, Walker,
-    colours::{INK, SOFT, heat},
+    colours::{HAZARD, INK, PLATFORM, SOFT, heat},
     frame::Frame,
     panel::{Content, goal_mark, start_mark},
 };
 use crate::report::{
-    drawing::{Drawing, Shape},
+    drawing::{Drawing, Rgb, Shape},
     text_width::text_width,
 };
 
@@ -36,7 +36,12 @@ struct Paper {
 pub fn draw(chart: &TrailChart) -> Drawing {
     let mut paper = Paper { shapes: Vec::new(), width: 0.0, y: GAP };
     paper.text(0.0, TITLE, INK, &chart.title);
-    paper.legend();
+    let has = |kind: fn(&Floor) -> bool| chart.floors.iter().take(MOST_FLOORS).any(kind);
+    let tiles = [
+        ("what kills", HAZARD, has(|floor| !floor.plan.hazards.is_empty())),
+        ("crates and the like", PLATFORM, has(|floor| !floor.plan.platforms.is_empty())),
+    ];
+    paper.legend(&tiles);
     for floor in chart.floors.iter().take(MOST_FLOORS) {
         paper.floor(floor);
     }
@@ -64,12 +69,18 @@ impl Paper {
         right - GAP
     }
 
-    fn legend(&mut self) {
+    /// Says what is what; of some kinds of tiles only if there are any.
+    fn legend(&mut self, tiles: &[(&str, Rgb, bool)]) {
         let middle = self.y + TEXT - 4.5;
         self.shapes.push(start_mark(Vec2::new(GAP + 8.0, middle), 6.0));
         let x = self.words(20.0, TEXT, SOFT, "start") + 24.0;
         self.shapes.push(goal_mark(Vec2::new(GAP + x, middle), 6.0));
         let mut x = self.words(x + 12.0, TEXT, SOFT, "goal") + 16.0;
+        for &(words, fill, _) in tiles.iter().filter(|(.., is_there)| *is_there) {
+            let corner = Vec2::new(GAP + x, middle - 6.0);
+            self.shapes.push(Shape::Block { area: Rect::from_corners(corner, corner + 12.0), fill });
+            x = self.words(x + 20.0, TEXT, SOFT, words) + 16.0;
+        }
         for step in 0..8 {
             let corner = Vec2::new(GAP + x, middle - 6.0);
             let fill = heat(f64::from(step) / 7.0);

@@ -4,12 +4,13 @@ use bevy::math::Vec2;
 
 use super::{
     Floor, Walker,
-    colours::{INK, LINES, PAPER, WALL, heat},
+    colours::{HAZARD, INK, LINES, PAPER, PLATFORM, WALL, heat},
     frame::Frame,
     visits::Visits,
 };
 use crate::{
     eval::Trail,
+    floor_plan::FloorPlan,
     report::drawing::{MarkForm, Shape},
 };
 
@@ -44,15 +45,11 @@ impl Content {
         if self == Self::Visits {
             visits(&walker.trails, frame, out);
         }
-        out.extend(
-            floor
-                .plan
-                .walls
-                .iter()
-                .map(|&wall| frame.area(wall))
-                .filter(|area| !area.is_empty())
-                .map(|area| Shape::Block { area, fill: WALL }),
-        );
+        let FloorPlan { walls, hazards, platforms, .. } = &floor.plan;
+        for (areas, fill) in [(walls, WALL), (platforms, PLATFORM), (hazards, HAZARD)] {
+            let seen = areas.iter().map(|&area| frame.area(area)).filter(|area| !area.is_empty());
+            out.extend(seen.map(|area| Shape::Block { area, fill }));
+        }
         if self == Self::Trajectories {
             lines(&walker.trails, frame, out);
         }

@@ -1,0 +1,68 @@
+//! Files to write: looked at before the work whose result they are to hold.
+
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+};
+
+use super::error::CliError;
+
+/// Makes the folder that a file lies in, and tries whether one can be written there.
+///
+/// # Errors
+///
+/// The path is a folder's, or the system refuses.
+pub fn prepare(path: &Path) -> Result<(), CliError> {
+    if path.is_dir() {
+        return Err(CliError::Usage(format!("{} is a folder: name a file to write", path.display())));
+    }
+    make_folder_of(path)?;
+    let probe = beside(path, ".probe");
+    File::create(&probe)
+        .and_then(|_| fs::remove_file(&probe))
+        .map_err(|error| CliError::Io(format!("cannot write {}: {error}", path.display())))
+}
+
+/// Makes the folder that a file lies in.
+///
+/// # Errors
+///
+/// The system refuses.
+pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
+    let folder = path.parent().unwrap_or(path);
+    fs::create_dir_all(folder).map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))
+}
+
+/// The file in the same folder whose name goes on with `ending`.
+pub fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(ending);
+    path.with_file_name(name)
+}
+
+/// A picture to write that can be a PNG only, as the command line names it.
+///
+/// # Errors
+///
+/// Its name says that it is something else.
+pub fn png(text: &str) -> Result<PathBuf, String> {
+    picture(text, "png")
+}
+
+/// A drawing to write that can be an SVG only, as the command line names it.
+///
+/// # Errors
+///
+/// Its name says that it is something else.
+pub fn svg(text: &str) -> Result<PathBuf, String> {
+    picture(text, "svg")
+}
+
+fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(kind)) {
+        Ok(path)
+    } else {
+        Err(format!("this picture is written as .{kind}: choose a name that ends so"))
+    }
+}

@@ -1,0 +1,101 @@
+//! Maze2D for balls that see.
+
+use bevy::prelude::*;
+use bevy_playbot::{prelude::*, vision::VisionSystems};
+
+use super::{
+    ball::sub,
+    components::{MazeArena, MazeBall, PlaysIn},
+    game::Maze2d,
+    play,
+};
+use crate::sighted::{GiveEyes, Sighted, add_sights};
+
+/// How far a ball sees from its centre, in metres: four cells.
+pub const SIGHT: f64 = 4.0;
+
+/// Maze2D with eyes, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up the
+/// rows, against x.
+pub type SightedMaze2d = Sighted<Maze2d>;
+
+impl GiveEyes for Maze2d {
+    const SIGHTED: &'static str = "maze2d-sighted";
+
+    fn build_eyes(&self, app: &mut App) {
+        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Dress));
+    }
+}
+
+/// The walls are squares on a grid, and arenas have no rapier context in training: rays walk the grid, which is exact and
+/// takes no more than a few steps.
+fn see(
+    mut balls: Query<(&Episode, &MazeBall, &PlaysIn, &mut Observation), With<VectorSensor>>,
+    arenas: Query<&MazeArena>,
+) {
+    for (episode, ball, plays_in, mut observation) in &mut balls {
+        let Ok(arena) = arenas.get(plays_in.0) else { continue };
+        if episode.is_running() {
+            let (place, level) = (ball.0.position, &arena.level);
+            let to_goal = sub(level.goal(), place).map(|along| along as f32);
+            let wall = |[east, north]: [f64; 2]| level.walls.ray(place, [-north, east], SIGHT) as f32;
+            add_sights(&mut observation, to_goal, wall);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::SQRT_2;
+
+    use bevy_playbot::game::build_world;
+
+    use super::*;
+    use crate::maze2d::Ball;
+
+    /// What a ball at rest in this place observes.
+    fn seen(mode: &str, place: [f64; 2]) -> Vec<f32> {
+        let game = SightedMaze2d::default();
+        let (mut world, agents) = build_world(&game, mode, 0, 0, 1);
+        let still = Action(ActionValue::Continuous(vec![0.0; 2]));
+        world.entity_mut(agents[0]).insert((Control::Human, still, LevelQueue::Always(0)));
+        world.tick().expect("sound");
+        world.entity_mut(agents[0]).insert(MazeBall(Ball::at(place)));
+        world.tick().expect("sound");
+        let seen = world.get::<Observation>(agents[0]).expect("an agent").vector.clone();
+        assert_eq!(seen.len(), game.observation().len());
+        seen
+    }
+
+    fn assert_near(seen: &[f32], wanted: &[f32]) {
+        assert_eq!(seen.len(), wanted.len());
+        assert!(seen.iter().zip(wanted).all(|(seen, wanted)| (seen - wanted).abs() < 1e-5), "{seen:?}, not {wanted:?}");
+    }
+
+    #[test]
+    fn a_ball_in_medium_sees_the_walls_where_they_stand_and_the_way_to_the_goal() {
+        // Cell (2, 2) of medium; by hand, from its map:
+        //     01234567
+        //   0 ########
+        //   1 #SO##OO#
+        //   2 #OO#OOO#
+        //   3 ##OOO###
+        //   4 #OO#OOO#
+        //   5 #O#OO#O#
+        // East is wall (2, 3), north-east the same, north (0, 2), north-west (1, 0), west (2, 0), south-west (3, 1), south
+        // (5, 2), south-east (4, 3). The goal is in (6, 6).
+        let place = [2.1, 2.05];
+        let walls = |[e, ne, n, nw, w, sw, s, se]: [f32; 8]| {
+            [2.1, 2.05, 0.0, 0.0, 3.9, 3.95, e, SQRT_2 * ne, n, SQRT_2 * nw, w, SQRT_2 * sw, s, SQRT_2 * se]
+        };
+        assert_near(&seen("medium+no-offset", place), &walls([0.45, 0.45, 1.6, 1.55, 1.55, 0.55, 2.4, 1.4]));
+        // With D4RL's offset they stand 0.2 nearer in the east and south, and farther in the west and north; the goal stays.
+        assert_near(&seen("medium", place), &walls([0.25, 0.25, 1.8, 1.75, 1.75, 0.75, 2.2, 1.2]));
+    }
+
+    #[test]
+    fn nobody_sees_farther_than_four_cells() {
+        // Six free cells to the east of (3, 1), a wall right behind it.
+        let seen = seen("large+no-offset", [3.0, 1.0]);
+        assert_near(&[seen[6], seen[10]], &[4.0, 0.5]);
+    }
+}

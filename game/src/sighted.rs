@@ -1,0 +1,158 @@
+//! Maze games for agents that see: the same games with the goal's direction and the distance of the walls around added to
+//! what an agent is told.
+//!
+//! In the originals an agent knows its own state only. That will do on one map, which can be learned by heart; in a maze
+//! that nobody has seen it leaves nothing but wandering about.
+
+use bevy::prelude::*;
+use bevy_playbot::{floor_plan::FloorPlan, mode::ModeError, prelude::*, vision::Picture};
+
+/// The eight ways that eyes look, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
+/// a turn to the left. North is up in the game's own picture.
+pub const WAYS: [(&str, [f64; 2]); 8] = {
+    const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
+    [
+        ("east", [1.0, 0.0]),
+        ("north-east", [DIAGONAL, DIAGONAL]),
+        ("north", [0.0, 1.0]),
+        ("north-west", [-DIAGONAL, DIAGONAL]),
+        ("west", [-1.0, 0.0]),
+        ("south-west", [-DIAGONAL, -DIAGONAL]),
+        ("south", [0.0, -1.0]),
+        ("south-east", [DIAGONAL, -DIAGONAL]),
+    ]
+};
+
+/// Adds what eyes see to an observation, in the order of the names: the way to the goal along x and y, then the distance
+/// of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
+pub fn add_sights(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
+    observation.vector.extend(to_goal);
+    observation.vector.extend(WAYS.map(|(_, way)| wall(way)));
+}
+
+/// A game whose agents can be given eyes.
+pub trait GiveEyes: Game {
+    /// Name of the game with eyes.
+    const SIGHTED: &'static str;
+
+    /// Adds a system that calls [`add_sights`] for every agent that plays and reads a vector, once that has been filled.
+    fn build_eyes(&self, app: &mut App);
+}
+
+/// A game with eyes: the inner one in everything but its name and what its agents observe.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sighted<G>(pub G);
+
+impl<G: GiveEyes> Game for Sighted<G> {
+    fn name(&self) -> &'static str {
+        G::SIGHTED
+    }
+
+    fn version(&self) -> u32 {
+        self.0.version()
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        self.0.modes()
+    }
+
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        self.0.check_mode(mode)
+    }
+
+    fn family(&self, mode: &str) -> String {
+        self.0.family(mode)
+    }
+
+    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        self.0.fingerprint(mode, level)
+    }
+
+    fn tick_hz(&self) -> f64 {
+        self.0.tick_hz()
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.0.actions()
+    }
+
+    fn action_names(&self) -> Vec<String> {
+        self.0.action_names()
+    }
+
+    fn input_map(&self) -> Option<InputMap> {
+        self.0.input_map()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        let goal = ["goal x", "goal y"].map(str::to_owned);
+        let walls = WAYS.map(|(way, _)| format!("wall {way}"));
+        ObservationSpace { names: self.0.observation().names.into_iter().chain(goal).chain(walls).collect() }
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        self.0.picture()
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        self.0.build_picture(app);
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        self.0.build(app, mode);
+        self.0.build_eyes(app);
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let agent = self.0.spawn_agent(world, index);
+        world.entity_mut(agent).insert(VectorSensor::new(self.observation().names));
+        agent
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        self.0.floor_plan(mode, level)
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        self.0.whereabouts(world, agent)
+    }
+
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        self.0.blind_bots()
+    }
+
+    fn demonstrator(&self) -> Option<&'static str> {
+        self.0.demonstrator()
+    }
+
+    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        self.0.arm_demonstrator(world, agent, noise);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{antmaze::SightedAntMaze, maze2d::SightedMaze2d};
+
+    #[test]
+    fn ways_go_round_by_eighths_of_a_turn() {
+        for (index, (name, [east, north])) in WAYS.into_iter().enumerate() {
+            let angle = std::f64::consts::FRAC_PI_4 * index as f64;
+            assert!((east - libm::cos(angle)).abs() < 1e-12 && (north - libm::sin(angle)).abs() < 1e-12, "{name}");
+        }
+    }
+
+    #[test]
+    fn names_are_told_apart_and_go_on_from_those_of_the_blind() {
+        let games: [(&dyn Game, usize); 2] = [(&SightedAntMaze::default(), 29), (&SightedMaze2d::default(), 4)];
+        for (game, own) in games {
+            let names = game.observation().names;
+            assert_eq!((names.len(), names[own].as_str(), names[own + 2].as_str()), (own + 10, "goal x", "wall east"));
+            let mut different = names.clone();
+            different.sort();
+            different.dedup();
+            assert_eq!(names.len(), different.len(), "{}", game.name());
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Recordings that are whole, torn, empty, or cannot be made.
+
+use std::{fs, path::Path};
+
+use super::{code, errors, lines, playbot, said};
+
+fn record(folder: &Path, file: &str, more: &[&str]) {
+    let output = playbot(folder, &[&["record", "coinrun", "--out", file], more].concat());
+    assert_eq!(code(&output), Some(0), "{}", errors(&output));
+}
+
+#[test]
+fn every_recording_is_verified_whatever_is_wrong_with_another() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    for file in ["a.demo", "b.demo", "z.demo"] {
+        record(folder, file, &["--levels", "easy:0..1"]);
+    }
+    let bytes = fs::read(folder.join("b.demo")).expect("readable");
+    fs::write(folder.join("b.demo"), &bytes[..bytes.len() - 5]).expect("writable");
+    fs::write(folder.join("c.demo"), "not a recording").expect("writable");
+
+    let all = playbot(folder, &["demo", "verify", ".", "--json"]);
+    assert_eq!(code(&all), Some(1), "{}", errors(&all));
+    let rows = lines(&all);
+    let file = |index: usize| rows[index]["file"].as_str().expect("a path").trim_start_matches("./").to_owned();
+    assert_eq!([0, 1, 2, 3].map(file), ["a.demo", "b.demo", "c.demo", "z.demo"]);
+    assert_eq!([0, 3].map(|index| rows[index]["report"]["episodes"].as_u64()), [Some(2); 2]);
+    assert!(rows[0]["error"].is_null() && rows[1]["report"].is_null() && rows[2]["report"].is_null());
+    assert!(rows[1]["error"].as_str().is_some_and(|words| words.contains("playbot demo repair")), "{}", rows[1]);
+    let words = said(&playbot(folder, &["demo", "verify", "."]));
+    assert!(words.contains("b.demo: episode 1") && words.contains("z.demo: 2 episodes"), "{words}");
+
+    let sound = playbot(folder, &["demo", "verify", "a.demo", "z.demo"]);
+    assert_eq!((code(&sound), said(&sound).lines().count()), (Some(0), 2));
+    let missing = playbot(folder, &["demo", "verify", "a.demo", "nothing.demo"]);
+    assert_eq!((code(&missing), said(&missing)), (Some(3), String::new()), "a path that is not there is wrong usage");
+}
+
+#[test]
+fn a_repair_that_saves_nothing_says_so() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "one.demo", &["--levels", "easy:0..0"]);
+    let bytes = fs::read(folder.join("one.demo")).expect("readable");
+    fs::write(folder.join("one.demo"), &bytes[..bytes.len() - 5]).expect("writable");
+    let repaired = playbot(folder, &["demo", "repair", "one.demo", "--out", "none.demo"]);
+    assert_eq!(code(&repaired), Some(1), "{}", errors(&repaired));
+    assert!(said(&repaired).contains("no episode is whole, so nothing is kept"), "{}", said(&repaired));
+}
+
+#[test]
+fn an_episode_that_was_cut_off_is_in_no_share() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "cut.demo", &["--levels", "easy:0..9", "--steps", "200"]);
+    let listed = playbot(folder, &["demo", "ls", "cut.demo", "--json"]);
+    let summary = lines(&listed).remove(0);
+    assert_eq!((&summary["aborted"], &summary["failures"]), (&1.into(), &0.into()), "{summary}");
+    assert_eq!(summary["success_share"], 1.0);
+    let words = said(&playbot(folder, &["demo", "ls", "cut.demo"]));
+    assert!(words.contains("100.0 % success (1 cut off)"), "{words}");
+}
+
+#[test]
+fn a_game_without_demonstrator_is_not_recorded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = playbot(folder.path(), &["record", "ant", "--out", "y.demo", "--steps", "100"]);
+    assert_eq!(code(&output), Some(3), "{}", errors(&output));
+    for words in ["`ant` has no demonstrator", "train a policy", "playbot play ant --record"] {
+        assert!(errors(&output).contains(words), "{}", errors(&output));
+    }
+    assert!(!folder.path().join("y.demo").exists(), "no empty file is left");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_no_wrong_usage() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = super::on_full_disk(folder.path(), 0, "record coinrun --levels easy:0..0 --out full.demo");
+    assert_eq!(code(&output), Some(2), "{}", errors(&output));
+    assert!(errors(&output).contains("cannot write the header"), "{}", errors(&output));
+    fs::create_dir(folder.path().join("a.demo")).expect("writable");
+    let output = playbot(folder.path(), &["record", "coinrun", "--levels", "easy:0..0", "--out", "a.demo", "--force"]);
+    assert_eq!(code(&output), Some(3), "a folder was named: {}", errors(&output));
+}

@@ -1,0 +1,82 @@
+//! Ctrl-C: what was stopped is not done, and says how to go on.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output, Stdio},
+    time::Duration,
+};
+
+use super::{code, errors, lines, playbot};
+
+const ENDLESS: u64 = 1_000_000_000;
+
+/// Starts the program, waits until it is at work, presses Ctrl-C and waits for its end.
+fn interrupted(folder: &Path, args: &[&str], at_work: impl Fn() -> bool) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+    let command = command.args(args).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the program starts");
+    while !at_work() {
+        assert!(child.try_wait().expect("a child").is_none(), "{args:?} ended by itself");
+        std::thread::park_timeout(Duration::from_millis(5));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a shell's kill");
+    assert!(sent.success());
+    let output = child.wait_with_output().expect("a child");
+    assert_eq!(code(&output), Some(130), "{args:?}: {}", errors(&output));
+    output
+}
+
+#[test]
+fn a_stopped_recording_says_how_the_rest_is_added() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let (folder, file) = (temporary.path(), temporary.path().join("a.demo"));
+    let steps = ENDLESS.to_string();
+    let base = ["record", "coinrun", "--out", "a.demo", "--noise", "0.2"];
+    let first = [&base[..], &["--levels", "easy:0..4000", "--steps", &steps]].concat();
+    let output = interrupted(folder, &first, || fs::metadata(&file).is_ok_and(|file| file.len() > 3_000));
+    let listed = |what: &str| lines(&playbot(folder, &["demo", "ls", "a.demo", "--json"]))[0][what].as_u64();
+    let recorded = listed("steps").expect("a number");
+    let words = errors(&output);
+    let (_, advice) = words.split_once('`').expect("what to change");
+    let (advice, _) = advice.split_once('`').expect("what to change");
+    assert!(words.contains("incomplete") && advice.starts_with("--append --levels easy:"), "{words}");
+    let rest = (ENDLESS - recorded).to_string();
+    assert!(advice.ends_with(&format!("..4000 --steps {rest} --seed 2")), "{recorded} steps: {words}");
+
+    // As it says, but for the number of steps.
+    let advice = advice.replace(&rest, "100");
+    let output = playbot(folder, &base.into_iter().chain(advice.split(' ')).collect::<Vec<_>>());
+    assert_eq!(code(&output), Some(0), "{}", errors(&output));
+    assert_eq!(listed("steps"), Some(recorded + 100), "the steps that were there are not counted again");
+}
+
+#[test]
+fn stopped_learning_is_not_done() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let text = format!(
+        r#"(
+    game: "coinrun", train: "hard:0..7", test: "hard:64..71", demos: "few.demo", steps: {ENDLESS}, arenas: 8, worlds: 2,
+    skills: (window: 5, epochs: 1000000, batch: 16, hidden: [16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+    ppo: (num_steps: 16, minibatches: 2, hidden: [16]), algorithm: "ppo",
+)"#
+    );
+    fs::write(folder.join("small.ron"), text).expect("writable");
+    let recorded = playbot(folder, &["record", "coinrun", "--levels", "easy:0..3", "--out", "few.demo"]);
+    assert_eq!(code(&recorded), Some(0), "{}", errors(&recorded));
+    let from = ["--experiment", "small.ron"];
+    for (args, sign, words) in [
+        (&["learn-skills", "--out", "skills"][..], "skills.checkpoint", "the same command and --resume"),
+        (&["train", "--run", "run"], "run/metrics.jsonl", "playbot train --run run --resume"),
+        (
+            &["study", "--out", "o", "--runs", "runs", "--seeds", "1"],
+            "runs/ppo-seed1/metrics.jsonl",
+            "--runs runs --resume",
+        ),
+    ] {
+        let output = interrupted(folder, &[args, &from].concat(), || folder.join(sign).exists());
+        let said = errors(&output);
+        assert!(said.contains("stopped and saved") && said.contains(words), "{args:?}: {said}");
+    }
+}

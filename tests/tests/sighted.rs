@@ -1,0 +1,113 @@
+//! Games with eyes: the same games, to the bit, whose agents are told more.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    game::{build_seeing_world, build_world, furnish_app, spawn_agents},
+    prelude::*,
+    test_app::{PlaybotTestExt, test_app},
+    train::worlds::on_threads,
+    vision::{ObservationKind, Sight},
+};
+use playbot_games::{
+    antmaze::{AntMaze, SightedAntMaze},
+    maze2d::{Maze2d, SightedMaze2d},
+};
+
+/// Every game with eyes, the same without, a mode, and how long an episode may take there.
+fn games() -> [(Arc<dyn Game>, Arc<dyn Game>, &'static str, u64); 2] {
+    [
+        (Arc::new(SightedMaze2d::default()), Arc::new(Maze2d::default()), "random+goal=random+limit=60", 60),
+        (Arc::new(SightedAntMaze::default()), Arc::new(AntMaze), "random+goals=random+random-start+limit=60", 60),
+    ]
+}
+
+/// Two agents that push at random.
+fn build(game: &dyn Game, mode: &str, sight: &Sight, first: u32) -> (World, Vec<Entity>) {
+    let (mut world, agents) = build_seeing_world(game, mode, sight, 3, first, 2).expect("can be drawn");
+    for &agent in &agents {
+        let levels = LevelQueue::Uniform { first: 0, last: 63 };
+        world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, levels));
+    }
+    (world, agents)
+}
+
+#[test]
+fn eyes_change_nothing_in_the_game() {
+    for (sighted, blind, mode, _) in games() {
+        let mut pair = [&sighted, &blind].map(|game| build(&**game, mode, &Sight::default(), 0));
+        let (all, own) = (sighted.observation().len(), blind.observation().len());
+        assert_eq!((all, sighted.version()), (own + 10, blind.version()));
+        for tick in 0..150 {
+            let [(seen, hashes), (told, others)] = pair.each_mut().map(|(world, agents)| {
+                world.tick().expect("sound");
+                let vectors: Vec<_> = agents
+                    .iter()
+                    .map(|&agent| world.get::<Observation>(agent).expect("an agent").vector.clone())
+                    .collect();
+                let hashes: Vec<_> =
+                    agents.iter().map(|&agent| world.get::<StateHash>(agent).map(|hash| hash.0)).collect();
+                (vectors, hashes)
+            });
+            assert_eq!(hashes, others, "{}, tick {tick}", sighted.name());
+            for (seen, told) in seen.iter().zip(&told) {
+                assert_eq!((seen.len(), &seen[..own]), (all, &told[..]), "{}, tick {tick}", sighted.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn threads_change_nothing_that_is_seen() {
+    for (game, _, mode, _) in games() {
+        let seen = |threads| {
+            let mut worlds = [0, 2].map(|first| build(&*game, mode, &Sight::default(), first));
+            on_threads(&mut worlds, threads, |(world, agents)| {
+                let mut seen = Vec::new();
+                for _ in 0..120 {
+                    world.tick().expect("sound");
+                    let vectors = agents.iter().filter_map(|&agent| world.get::<Observation>(agent));
+                    seen.extend(vectors.flat_map(|observation| observation.vector.iter().map(|value| value.to_bits())));
+                }
+                seen
+            })
+        };
+        assert!(seen(1) == seen(2), "{}", game.name());
+    }
+}
+
+#[test]
+fn systems_are_in_one_order_with_pictures_and_without() {
+    for (game, _, mode, limit) in games() {
+        for kind in [ObservationKind::Vector, ObservationKind::Raster] {
+            let mut app = test_app();
+            let sight = Sight { kind, ..Sight::default() };
+            furnish_app(&*game, &mut app, mode, &sight, 1).expect("can be drawn");
+            let agent = spawn_agents(&*game, app.world_mut(), &sight, 0, 1)[0];
+            game.arm_demonstrator(app.world_mut(), agent, 0.2);
+            app.world_mut().entity_mut(agent).insert(Control::Bot);
+            app.play_episodes(2, 2 * limit + 10).expect("sound");
+            let vector = &app.world().get::<Observation>(agent).expect("an agent").vector;
+            assert_eq!(vector.is_empty(), kind == ObservationKind::Raster, "pictures are all that their agents get");
+        }
+    }
+}
+
+#[test]
+fn who_stands_at_the_goal_sees_no_way_left() {
+    // Nobody but the demonstrator gets there: the way is the same that episodes are judged by.
+    for (game, _, _, _) in games() {
+        let (mut world, agents) = build_world(&*game, "umaze", 0, 0, 1);
+        game.arm_demonstrator(&mut world, agents[0], 0.0);
+        world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
+        let at = game.observation().names.iter().position(|name| name == "goal x").expect("named");
+        let mut left = f32::INFINITY;
+        while world.get::<EpisodeCount>(agents[0]).expect("an agent").finished == 0 {
+            world.tick().expect("sound");
+            let vector = &world.get::<Observation>(agents[0]).expect("an agent").vector;
+            left = left.min(Vec2::new(vector[at], vector[at + 1]).length());
+        }
+        assert!(left < 0.8, "{}: {left} m from the goal at the nearest", game.name());
+    }
+}
