@@ -27,7 +27,7 @@ impl<'a> HeldOut<'a> {
 
     /// Whether this level is one of them, or looks like one.
     pub fn contains(&self, mode: &str, level: u64) -> bool {
-        let is_named = (self.split.first..=self.split.last).contains(&level) && self.game.family(mode) == self.family;
+        let is_named = self.split.contains(&self.split.mode, level) && self.game.family(mode) == self.family;
         is_named || self.game.fingerprint(mode, level).is_some_and(|print| self.fingerprints.contains(&print))
     }
 

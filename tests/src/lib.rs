@@ -3,6 +3,7 @@
 pub mod memory;
 mod painted;
 pub mod scene;
+pub mod soak;
 
 pub use painted::PaintedCorridor;
 

@@ -194,8 +194,8 @@ pub fn drive(
 }
 
 fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
-    let is_first = run.checkpoint(Which::Last).is_err();
     run.save(trainer).map_err(|error| {
+        let is_first = run.checkpoint(Which::Last).is_err();
         let (error, run) = (error.into(), run.path().into());
         if is_first { CliError::NeverSaved { error, run } } else { CliError::NotSaved { error, run } }
     })
