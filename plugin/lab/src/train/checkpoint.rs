@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::run_dir::{RunError, damaged, io_error, write_atomically};
+pub use super::which_checkpoint::Which;
 use bevy_playbot::unknown_name::UnknownName;
 
 const PREFIX: &str = "step-";
@@ -70,32 +71,6 @@ impl Checkpoint {
     /// The file of the arenas.
     pub fn arenas_file(&self) -> PathBuf {
         self.path.join("arenas.json")
-    }
-}
-
-/// Which checkpoint of a run is meant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Which {
-    /// The latest.
-    #[default]
-    Last,
-    /// The one with the highest return in training.
-    Best,
-    /// The one at this step.
-    Step(u64),
-}
-
-impl FromStr for Which {
-    type Err = UnknownName;
-
-    fn from_str(name: &str) -> Result<Self, UnknownName> {
-        match name {
-            "last" => Ok(Self::Last),
-            "best" => Ok(Self::Best),
-            step => step.parse().map(Self::Step).map_err(|_| {
-                UnknownName::new("checkpoint", name, &["last", "best", "the number of environment steps of one"])
-            }),
-        }
     }
 }
 
@@ -296,13 +271,5 @@ mod tests {
         save(run.path(), 25, 1.5, 1).expect("writable");
         assert_eq!(steps(run.path()), [20, 25], "the best and the last of those that can be read");
         assert!(folder(run.path()).join("damaged-step-000000000030").exists());
-    }
-
-    #[test]
-    fn checkpoints_are_named_on_the_command_line() {
-        assert_eq!("last".parse(), Ok(Which::Last));
-        assert_eq!("best".parse(), Ok(Which::Best));
-        assert_eq!("4096".parse(), Ok(Which::Step(4096)));
-        assert!("newest".parse::<Which>().expect_err("no such word").to_string().contains("last, best"));
     }
 }

@@ -28,73 +28,17 @@ use super::{
     config_file::{ConfigError, read_experiment},
     learner::Learner,
     metrics_log::MetricsLog,
-    run_lock::{LOCK_FILE, RunLock},
+    replaced_run::ReplacedRun,
+    run_lock::RunLock,
     trainer::{self, Progress, TrainError, Trainer, UpdateReport},
 };
 use crate::game::Game;
 
-/// A run's folder cannot be used.
-#[derive(Debug, Error)]
-pub enum RunError {
-    /// The folder exists already.
-    #[error("{} exists already: choose another --run, go on with --resume, or overwrite with --force", .0.display())]
-    Exists(PathBuf),
-    /// The folder to overwrite is something else.
-    #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
-    NotARun(PathBuf),
-    /// Another process trains in the folder.
-    #[error(
-        "{} is in use by another process that trains there: wait for it or stop it, or choose another folder", .0.display()
-    )]
-    Busy(PathBuf),
-    /// There is no such checkpoint.
-    #[error("{} has no such checkpoint; it has {}", path.display(), list_steps(steps))]
-    NoCheckpoint {
-        /// The folder of the run.
-        path: PathBuf,
-        /// Environment steps of those that it has.
-        steps: Vec<u64>,
-    },
-    /// The operating system refused.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was tried.
-        action: &'static str,
-        /// On which file.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// A file of the run is damaged.
-    #[error("{}: {message}", path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        message: String,
-    },
-    /// The learner's file cannot be read or written.
-    #[error(transparent)]
-    Learner(#[from] FileError),
-    /// The saved experiment cannot be read.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The saved training does not fit the game.
-    #[error(transparent)]
-    Train(#[from] TrainError),
-}
-
-fn list_steps(steps: &[u64]) -> String {
-    if steps.is_empty() {
-        return "none".to_owned();
-    }
-    let steps: Vec<_> = steps.iter().map(u64::to_string).collect();
-    format!("those of the steps {}", steps.join(", "))
-}
-
-pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
-    move |source| RunError::Io { action, path: path.into(), source }
-}
+pub(super) use super::run_error::{damaged, io_error};
+pub use super::{
+    replaced_run::{check_replaceable, is_unborn},
+    run_error::RunError,
+};
 
 /// Writes a file under a temporary name, flushes it to the disk and renames it: the old content or the new, never half.
 ///
@@ -168,7 +112,7 @@ impl RunDir {
         let path = lock.folder().to_owned();
         check_replaceable(&path)?;
         let run = Self { path: path.clone(), _lock: Some(lock) };
-        let aside = Aside::put(&path)?;
+        let aside = ReplacedRun::put_aside(&path)?;
         let written = run.write_experiment(experiment).and_then(|()| {
             let text = json!(info).to_string();
             write_atomically(&path.join("run.json"), text.as_bytes())
@@ -323,86 +267,4 @@ fn read_checkpoint(
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let state = serde_json::from_str(&text).map_err(|error| damaged(&path, &error))?;
     Ok((learner, state))
-}
-
-/// What a run was before another one took its place.
-struct Aside {
-    run: PathBuf,
-    /// Beside the run; `None` if there was nothing to move.
-    folder: Option<PathBuf>,
-}
-
-impl Aside {
-    /// Moves everything but the lock aside. What makes it a run goes first, so that no half run is left by a kill.
-    fn put(run: &Path) -> Result<Self, RunError> {
-        let mut names = names_in(run)?;
-        names.retain(|name| name != LOCK_FILE);
-        names.sort_by_key(|name| (name != "run.json", name == "experiment.ron"));
-        let mut aside = Self { run: run.into(), folder: None };
-        if names.is_empty() {
-            return Ok(aside);
-        }
-        let mut name = run.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".replaced-{}", std::process::id()));
-        let folder = run.with_file_name(name);
-        fs::create_dir_all(&folder).map_err(io_error("create", &folder))?;
-        aside.folder = Some(folder.clone());
-        for name in names {
-            if let Err(error) = fs::rename(run.join(&name), folder.join(&name)) {
-                aside.put_back();
-                return Err(io_error("replace", run)(error));
-            }
-        }
-        Ok(aside)
-    }
-
-    /// Forgets it. The new run does not depend on whether this works.
-    fn remove(self) {
-        if let Some(folder) = self.folder
-            && let Err(error) = fs::remove_dir_all(&folder)
-        {
-            tracing::warn!("cannot remove the old run in {}: {error}", folder.display());
-        }
-    }
-
-    /// Brings back what can be brought back, after something worse has gone wrong.
-    fn put_back(self) {
-        let Some(folder) = self.folder else { return };
-        for name in names_in(&folder).unwrap_or_default() {
-            let _ = fs::rename(folder.join(&name), self.run.join(&name));
-        }
-        if fs::remove_dir(&folder).is_err() {
-            tracing::warn!("the old run is in {}", folder.display());
-        }
-    }
-}
-
-fn names_in(folder: &Path) -> Result<Vec<OsString>, RunError> {
-    let names = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
-    names.map_err(io_error("list", folder))
-}
-
-/// Checks that a folder holds a run, or nothing: anything else is never replaced.
-///
-/// # Errors
-///
-/// [`RunError::NotARun`].
-pub fn check_replaceable(path: &Path) -> Result<(), RunError> {
-    let is_known = path.join("run.json").is_file() || RunLock::is_known(path);
-    if (is_known && path.join("experiment.ron").is_file()) || is_unborn(path) {
-        return Ok(());
-    }
-    Err(RunError::NotARun(path.into()))
-}
-
-/// Whether a folder holds at most what is written before `run.json`.
-pub fn is_unborn(path: &Path) -> bool {
-    let first = |name: &str| {
-        name == LOCK_FILE || ["experiment.ron", "run.json.tmp"].iter().any(|known| name.starts_with(known))
-    };
-    names_in(path).is_ok_and(|names| names.iter().all(|name| name.to_str().is_some_and(first)))
-}
-
-pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {
-    RunError::Damaged { path: path.into(), message: error.to_string() }
 }
