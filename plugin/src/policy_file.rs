@@ -171,7 +171,7 @@ fn check_names(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisfit> {
             now: names.len(),
             at,
             expected: name_at(&card.observations),
-            found: name_at(&names),
+            found: name_at(names),
         });
     }
     Ok(())

@@ -89,7 +89,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 }
 
 /// The measurements of a game: their names, the game that is played, and how.
-fn cases<'a>(game: &'a dyn Game) -> Vec<(String, &'a dyn Game, Benchmark)> {
+fn cases(game: &dyn Game) -> Vec<(String, &dyn Game, Benchmark)> {
     let of = |case: Benchmark| (case.name(game), case.game.map_or(game, |other| other as &dyn Game), case);
     game.benchmarks().into_iter().map(of).collect()
 }

@@ -13,7 +13,7 @@ use playbot_lab::{
     eval::Player,
     game::Game,
     parallel::default_threads,
-    report::{ResultRow, to_text_table},
+    report::to_text_table,
     train::{
         Algorithm, Experiment, Trainer,
         run_dir::{check_replaceable, is_unborn, write_atomically},

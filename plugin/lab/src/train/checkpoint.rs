@@ -12,7 +12,6 @@ use std::{
     fs::{self, File},
     io,
     path::{Path, PathBuf},
-    str::FromStr,
 };
 
 use serde::{Deserialize, Serialize};
@@ -20,7 +19,6 @@ use serde_json::json;
 
 use super::run_dir::{RunError, damaged, io_error, write_atomically};
 pub use super::which_checkpoint::Which;
-use bevy_playbot::unknown_name::UnknownName;
 
 const PREFIX: &str = "step-";
 const SUMMARY: &str = "summary.json";

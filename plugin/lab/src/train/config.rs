@@ -1,14 +1,13 @@
 //! What an experiment is.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use playbot_learner::{ActionSpace, LearnError, PpoConfig, SacConfig, ScoreConfig, SkillConfig};
+use playbot_learner::{PpoConfig, SacConfig, ScoreConfig, SkillConfig};
 use serde::{Deserialize, Serialize, Serializer};
-use thiserror::Error;
 
 use super::checkpoint::CheckpointConfig;
 pub use super::{algorithm::Algorithm, experiment_error::ExperimentError};
-use crate::{game::Game, held_out::HeldOut, mode::ModeError, split::LevelSplit};
+use crate::split::LevelSplit;
 pub use bevy_playbot::vision::ObservationKind;
 use bevy_playbot::vision::{ImageOptions, ObservationConfig};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use playbot_learner::ActionSpace;
 
 use super::{
-    config::{Algorithm, Experiment},
+    config::Experiment,
     experiment_error::{ExperimentError, refuse, settings},
 };
 use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
@@ -186,6 +186,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::train::Algorithm;
     use crate::train::config_file::parse_experiment;
 
     fn check(changes: &str) -> Result<(), String> {

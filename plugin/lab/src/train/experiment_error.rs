@@ -1,7 +1,6 @@
 //! What can be wrong with an experiment.
 
-use bevy_playbot::unknown_name::UnknownName;
-use playbot_learner::{ActionSpace, LearnError};
+use playbot_learner::LearnError;
 use thiserror::Error;
 
 use crate::{mode::ModeError, split::LevelSplit};

@@ -11,21 +11,19 @@
 //! ```
 
 use std::{
-    ffi::OsString,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{DeviceKind, FileError};
+use playbot_learner::DeviceKind;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use thiserror::Error;
 
 use super::{
     arena_state::{ArenaState, restore_arenas, save_arenas},
     checkpoint::{self, Checkpoint, Which},
     config::{Algorithm, Experiment},
-    config_file::{ConfigError, read_experiment},
+    config_file::read_experiment,
     learner::Learner,
     metrics_log::MetricsLog,
     replaced_run::ReplacedRun,
