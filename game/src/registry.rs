@@ -1,10 +1,7 @@
 //! The games of this crate.
 
 use bevy_playbot::unknown_name::UnknownName;
-use playbot_lab::{
-    game::Game,
-    games::{Games, GamesError},
-};
+use playbot_lab::{game::Game, games::Games};
 
 use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d, sighted::Sighted};
 
@@ -24,5 +21,5 @@ pub const GAMES: [&dyn Game; 6] = [
 ///
 /// [`UnknownName`] with the valid names.
 pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
-    Games::new(&GAMES).and_then(|games| Ok(games.get(name))).unwrap_or_else(|error: GamesError| unreachable!("{error}"))
+    Games::new(&GAMES).expect("each has a name of its own").get(name)
 }
