@@ -16,7 +16,7 @@ use super::{
     steering::{input_map, steer},
     walk::{Task, Walker, observe, start_episode, walk},
 };
-use crate::antview::VIEW;
+use crate::ant::view::VIEW;
 
 /// Control steps per second.
 pub const ANT_HZ: f64 = 10.0;

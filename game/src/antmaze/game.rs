@@ -19,8 +19,8 @@ use crate::{
         game::{ANT_HZ, action_names},
         skeleton::JOINTS,
         steering::input_map,
+        view::VIEW,
     },
-    antview,
     maze::Map,
 };
 
@@ -94,7 +94,7 @@ impl Game for AntMaze {
     }
 
     fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: antview::VIEW })
+        Some(Picture { width: VIEW })
     }
 
     fn build_picture(&self, app: &mut App) {

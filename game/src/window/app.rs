@@ -76,7 +76,7 @@ impl GameWindow {
         app.world_mut().entity_mut(agent).insert((Control::Human, keys, playlist.queue()));
         app.insert_resource(seats).insert_resource(playlist);
         camera::build(&mut app, picture.width);
-        let has_ants = app.is_plugin_added::<crate::antview::AntViewPlugin>();
+        let has_ants = app.is_plugin_added::<crate::ant::view::AntViewPlugin>();
         #[cfg(feature = "view3d")]
         if has_ants {
             super::solid::build(&mut app);

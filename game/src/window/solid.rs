@@ -6,7 +6,7 @@ use bevy::{
 };
 
 use super::{camera::Zoom, seats::Seats};
-use crate::antview::{SolidAnt, SolidViewPlugin};
+use crate::ant::view::{SolidAnt, SolidViewPlugin};
 
 /// From the ant to the eye at the nearest zoom, metres: so steep that the wall behind an ant does not hide it.
 const BEHIND: Vec3 = Vec3::new(0.0, -3.2, 8.0);
