@@ -3,7 +3,7 @@
 use super::{backdrop, canvas::Canvas, scenes, sheet, sprite_text};
 
 /// The drawings of tiles and figures.
-const SPRITES: &str = include_str!("../../../../assets/coinrun/sprites.txt");
+const SPRITES: &str = include_str!("../../../assets/coinrun/sprites.txt");
 
 /// Every picture with its file name in `assets/coinrun`.
 ///

@@ -5,7 +5,8 @@ use super::{
     themes::{CRATE_SPRITES, ENEMY_SPRITES},
 };
 use crate::coinrun::{
-    level::{Mode, Spawn},
+    level::Mode,
+    spawn::Spawn,
     tile::{SIZE, Tile, TileGrid},
 };
 

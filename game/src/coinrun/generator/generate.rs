@@ -42,7 +42,7 @@ pub fn generate(mode: Mode, seed: u32) -> Level {
 mod tests {
     use super::*;
     use crate::coinrun::{
-        level::Spawn,
+        spawn::Spawn,
         tile::{SIZE, Tile},
     };
 
