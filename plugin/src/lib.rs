@@ -116,3 +116,8 @@ pub mod vision;
 
 pub use playbot_learner as learner;
 pub use plugin::PlaybotPlugin;
+
+/// What the README shows is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
