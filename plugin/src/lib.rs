@@ -106,3 +106,8 @@ pub mod unknown_name;
 pub mod vision;
 
 pub use plugin::PlaybotPlugin;
+
+/// What the README shows is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -68,3 +68,8 @@ pub use skill::{
 };
 pub use space::{Action, ActionSpace, Actions};
 pub use spec::{PolicySpec, TimeLimit};
+
+/// What the README shows is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
