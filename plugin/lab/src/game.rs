@@ -11,6 +11,7 @@ use crate::{
 use bevy_playbot::{
     action::ActionSpace,
     bot::BlindBot,
+    demo::{file::DemoHeader, recorder::demo_actions},
     input_map::InputMap,
     observation::{Observation, ObservationSpace},
     policy_file::GameCard,
@@ -157,6 +158,11 @@ pub trait Game: Send + Sync {
 
     /// Adds the view in space to a window's app, with a [`CameraFocus`](crate::space_view::CameraFocus) on agents.
     fn build_space_view(&self, _app: &mut App) {}
+
+    /// The head of a recording of the game in this mode.
+    fn demo_header(&self, mode: &str) -> DemoHeader {
+        DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()))
+    }
 
     /// What the game says of itself to policy files.
     fn card(&self) -> GameCard {

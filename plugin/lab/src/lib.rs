@@ -3,7 +3,7 @@
 //! - A [`Game`](game::Game) says how a game is built without a window, many arenas at a time.
 //! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
 //! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
-//! - [`policy_export`] makes the one file that a game ships with, for
+//! - [`pipeline`] goes the whole road with four function calls; [`policy_export`] makes the one file that a game ships with, for
 //!   [`policy_file`](bevy_playbot::policy_file) to load there.
 //!
 //! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.
@@ -18,6 +18,7 @@ pub mod held_out;
 pub mod inspect;
 pub mod mode;
 pub mod parallel;
+pub mod pipeline;
 pub mod policy_export;
 pub mod prelude;
 pub mod report;

@@ -69,7 +69,7 @@ fn a_level_is_the_same_whatever_was_played_before_it() {
 
 fn record(path: &Path, mode: &str, levels: Vec<u64>) {
     let (mut world, agents) = build_world(&AntMaze, mode, 5, 0, 1);
-    let header = DemoHeader::new("antmaze", AntMaze.version(), mode, 10.0, demo_actions(&AntMaze.actions()));
+    let header = AntMaze.demo_header(mode);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
     let bot = (Control::Bot, BlindBot::Uniform, Recording::default(), LevelQueue::list(levels));
     world.entity_mut(agents[0]).insert(bot);

@@ -35,7 +35,7 @@ pub fn experiment() -> Experiment {
 
 /// Recordings of a random walker, on levels that are not held out, with one episode that is there twice.
 pub fn record(folder: &Path) {
-    let header = DemoHeader::new("corridor", 3, "plain", 10.0, demo_actions(&ActionSpace::Discrete(3)));
+    let header = Corridor.demo_header("plain");
     for (name, seed) in [("a.demo", 5), ("b.demo", 6), ("c.demo", 6)] {
         let (mut world, agents) = build_world(&Corridor, "plain", seed, 0, 1);
         world.insert_resource(Recorder::new(DemoWriter::create(folder.join(name), header.clone()).expect("fresh")));

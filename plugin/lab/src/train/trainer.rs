@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Instant};
 
 use bevy::prelude::World;
-use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel};
+use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel, SkillSource};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -276,8 +276,13 @@ impl Trainer {
     }
 
     /// Where the policy's skills come from, if it has any.
+    pub fn skill_source(&self) -> Option<SkillSource> {
+        self.learner.skills()
+    }
+
+    /// The prior that draws its skills.
     pub fn skill_prior(&self) -> Option<SkillPrior> {
-        self.learner.skills().as_ref().map(SkillPrior::from)
+        self.skill_source().as_ref().map(SkillPrior::from)
     }
 }
 
