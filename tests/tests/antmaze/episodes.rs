@@ -1,6 +1,5 @@
 //! What is seen and paid, and what ends an episode.
 
-use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 use playbot_games::antmaze::{AntMaze, components::MazeAnt, geometry::distance};
 

@@ -2,7 +2,7 @@
 
 use bevy_playbot::{
     game::build_seeing_world,
-    learner::{DeviceKind, ObsKind, Observations, Policy, PolicySpec, PpoLearner},
+    learner::{DeviceKind, ObsKind, Observations, PolicySpec, PpoLearner},
     prelude::*,
     train::{Experiment, Trainer, collect::Collector, trainer::TrainError},
     vision::{ImageOptions, ObservationKind, Sight, VisionError},

@@ -1,9 +1,6 @@
 //! Recordings are replayed before eyes.
 
-use bevy_playbot::{
-    prelude::*,
-    vision::{ImageOptions, ObservationKind, Sight},
-};
+use bevy_playbot::vision::{ImageOptions, ObservationKind, Sight};
 use playbot_tests::PaintedCorridor;
 
 use crate::corridor::{demonstrations, experiment, record};

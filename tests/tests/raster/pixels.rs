@@ -1,8 +1,7 @@
 //! Colours, tiles and sizes.
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::TileLayer};
-use playbot_tests::scene::pixel;
+use bevy_playbot::vision::TileLayer;
 
 use crate::eye::{BLUE, GREEN, RED, WHITE, add, frame, looking, text};
 

@@ -1,8 +1,7 @@
 //! Sprites lie where Bevy puts them.
 
 use bevy::{prelude::*, sprite::Anchor};
-use bevy_playbot::{prelude::*, vision::Frame};
-use playbot_tests::scene::image;
+use bevy_playbot::vision::Frame;
 
 use crate::eye::{BLUE, GREEN, RED, WHITE, add, fault, four, looking, text};
 
