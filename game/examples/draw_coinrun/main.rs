@@ -9,7 +9,7 @@ mod art;
 
 use std::{error::Error, fs::File, io::BufWriter, path::Path};
 
-use art::Canvas;
+use art::canvas::Canvas;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/coinrun");

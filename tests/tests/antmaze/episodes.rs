@@ -1,6 +1,5 @@
 //! What is seen and paid, and what ends an episode.
 
-use bevy::prelude::*;
 use playbot_games::antmaze::{AntMaze, components::MazeAnt, geometry::distance};
 use playbot_lab::prelude::*;
 

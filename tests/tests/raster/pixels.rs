@@ -2,8 +2,6 @@
 
 use bevy::prelude::*;
 use bevy_playbot::vision::TileLayer;
-use playbot_lab::prelude::*;
-use playbot_tests::scene::pixel;
 
 use crate::eye::{BLUE, GREEN, RED, WHITE, add, frame, looking, text};
 

@@ -2,8 +2,6 @@
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::Frame;
-use playbot_lab::prelude::*;
-use playbot_tests::scene::image;
 
 use crate::eye::{BLUE, GREEN, RED, WHITE, add, fault, four, looking, text};
 

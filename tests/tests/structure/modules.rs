@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
+    slice,
 };
 
 use crate::{
@@ -46,7 +47,7 @@ impl Modules {
     fn add(&mut self, file: &Path, folder: &Path, path: ModulePath, mut items_here: Vec<Item>) {
         items_here.retain(|item| !item.is_for_tests());
         for item in items_here.iter().filter(|item| item.keyword == "mod") {
-            let child = [path.as_slice(), &[item.name.clone()]].concat();
+            let child = [path.as_slice(), slice::from_ref(&item.name)].concat();
             let inside = folder.join(&item.name);
             match item.inline_module() {
                 Some(tokens) => self.add(file, &inside, child, items(tokens)),

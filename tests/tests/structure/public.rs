@@ -1,6 +1,6 @@
 //! The items that a user of a crate can name.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, slice};
 
 use crate::{
     items::{Item, Visibility},
@@ -39,7 +39,7 @@ impl Public {
             match item.keyword.as_str() {
                 "macro_rules" if is_exported => drop(self.items.insert(format!("{}!", item.name))),
                 _ if item.visibility != Visibility::Public => {}
-                "mod" => self.look_through(modules, &[path.as_slice(), &[item.name.clone()]].concat()),
+                "mod" => self.look_through(modules, &[path.as_slice(), slice::from_ref(&item.name)].concat()),
                 "use" => self.look_at_use(modules, path, item),
                 kind if KINDS.contains(&kind) => drop(self.items.insert(shown(path, &item.name))),
                 _ => {}

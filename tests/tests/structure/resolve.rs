@@ -65,10 +65,10 @@ impl Modules {
                 at = below;
                 continue;
             }
-            if !self.defines(&at, name) {
-                if let Some(found) = self.through_globs(&at, &path[index..], depth) {
-                    return Some(found);
-                }
+            if !self.defines(&at, name)
+                && let Some(found) = self.through_globs(&at, &path[index..], depth)
+            {
+                return Some(found);
             }
             return Some(Target::Item(at, name.clone()));
         }

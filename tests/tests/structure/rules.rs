@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Component, Path, PathBuf},
+    slice,
 };
 
 use crate::{
@@ -42,7 +43,7 @@ fn describe_circles(wanted: impl Fn(&str, &[String]) -> bool) -> Vec<String> {
                 let depth = folder.len();
                 let names = circle.iter().map(|need| need.from[depth].as_str());
                 let way = names.chain([circle[0].from[depth].as_str()]).collect::<Vec<_>>().join(" -> ");
-                let place = [&[package.name.clone()], folder].concat().join("::");
+                let place = [slice::from_ref(&package.name), folder].concat().join("::");
                 faults.push(format!("{place}: {way}"));
                 for need in circle {
                     let file = shown(&workspace(), &need.file);

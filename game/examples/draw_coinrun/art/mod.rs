@@ -1,11 +1,10 @@
 //! All pictures of CoinRun, made anew from their sources.
 
 mod backdrop;
-mod canvas;
+pub mod canvas;
 mod pictures;
 mod scenes;
 mod sheet;
 mod sprite_text;
 
-pub use canvas::Canvas;
 pub use pictures::pictures;
