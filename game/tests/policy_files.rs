@@ -4,7 +4,7 @@ use std::{path::Path, process::Command};
 
 use bevy_playbot::{
     game::build_world,
-    learner::{ActionSpace, DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner},
+    learner::{ActionSpace, DeviceKind, FileError, Learner, PolicySpec, PpoConfig, PpoLearner},
     policy_file::{PolicyFile, PolicyMisfit, check_policy, export_policy, install_policy, policy_file},
     prelude::*,
     vision::Sight,

@@ -12,7 +12,8 @@ use bevy_playbot::{
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
     game::{build_seeing_world, build_world},
     learner::{
-        DeviceKind, ObsKind, Observations, Policy, PolicyFile, PolicySpec, PpoLearner, SkillModel, SkillTrainer,
+        DeviceKind, Learner as _, ObsKind, Observations, Policy, PolicyFile, PolicySpec, PpoLearner, SkillModel,
+        SkillTrainer,
     },
     policy_file::{PolicyMisfit, check_policy, export_policy, policy_file, policy_sight},
     prelude::*,
