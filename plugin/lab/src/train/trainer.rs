@@ -223,7 +223,7 @@ impl Trainer {
         let rollout = Rollout::join(rollouts)?;
         let collect_s = start.elapsed().as_secs_f64();
         let initial_kl = self.initial_kl(&rollout)?;
-        let learner = self.learner.update(&rollout)?;
+        let learner = self.learner.learn(&rollout)?;
         self.progress.note(&finished);
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();

@@ -5,8 +5,8 @@ use crate::score::model;
 use crate::skill::{config, corridor_demos};
 use crate::toy::OBS;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, PolicyCard, PolicyFile, PpoLearner, ScoreConfig,
-    SkillModel, SkillTrainer,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, Learner, PolicyCard, PolicyFile, PpoLearner,
+    ScoreConfig, SkillModel, SkillTrainer,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde_json::{Value, json};
