@@ -27,7 +27,7 @@ pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
 /// game behaves as it does in a window.
 pub fn headless_app() -> App {
     let mut app = App::new();
-    app.add_plugins((TimePlugin, PlaybotPlugin));
+    app.add_plugins((TimePlugin, PlaybotPlugin::default()));
     set_tick_rate(&mut app, 60.0);
     app
 }

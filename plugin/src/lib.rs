@@ -97,6 +97,7 @@ pub mod keyboard;
 pub mod level;
 pub mod mode;
 pub mod observation;
+pub mod placement;
 pub mod plugin;
 pub mod policy;
 pub mod policy_file;

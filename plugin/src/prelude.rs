@@ -15,6 +15,7 @@ pub use crate::{
     input_map::{InputMap, KeyAxis},
     level::{LevelQueue, LevelSource},
     observation::{Observation, ObservationSpace, VectorSensor},
+    placement::TickPlacement,
     plugin::PlaybotPlugin,
     policy::{ActionDraw, ActivePolicy, PlaybotSeed},
     reward::Reward,

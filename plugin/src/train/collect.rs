@@ -14,6 +14,7 @@ use crate::{
     headless::tick_world,
     level::LevelQueue,
     observation::Observation,
+    placement::TickSchedules,
     policy::{ActionDraw, ActivePolicy, AgentStreams, Decision},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior, draw_skills},
@@ -67,7 +68,8 @@ impl Collector {
         if let Some(prior) = prior {
             world.insert_resource(prior);
         }
-        world.schedule_scope(FixedPostUpdate, |_, schedule| {
+        let judge = world.resource::<TickSchedules>().judge;
+        world.schedule_scope(judge, |_, schedule| {
             schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
         });
         for (&agent, index) in agents.iter().zip(first..) {
