@@ -2,9 +2,11 @@
 
 use bevy::{input::InputSystems, prelude::*};
 
-use crate::{action::Action, bot, control::Control, episode::Episode, input_map::InputMap, systems::PlaybotSystems};
+use crate::{
+    action::Action, bot, control::Control, episode::Episode, key_bindings::KeyBindings, systems::PlaybotSystems,
+};
 
-/// Turns keys into the actions of agents under [`Control::Human`] that have an [`InputMap`].
+/// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`].
 ///
 /// Ticks and frames have their own rates. A key counts in a tick if it is held then, or was pressed at any time since
 /// the tick before, so that a short tap is never lost between two ticks. Needs Bevy's `InputPlugin`.
@@ -38,7 +40,7 @@ fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
 fn decide(
     keys: Res<ButtonInput<KeyCode>>,
     mut tapped: ResMut<TappedKeys>,
-    mut agents: Query<(&Control, &InputMap, &Episode, &mut Action)>,
+    mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action)>,
 ) {
     for (control, map, episode, mut action) in &mut agents {
         if *control == Control::Human && episode.is_running() {

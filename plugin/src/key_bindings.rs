@@ -31,13 +31,13 @@ impl KeyAxis {
 /// Works on agents under [`Control::Human`](crate::control::Control::Human) in an app with
 /// [`KeyboardPlugin`](crate::keyboard::KeyboardPlugin).
 #[derive(Component, Clone, Debug)]
-pub struct InputMap {
+pub struct KeyBindings {
     axes: Vec<KeyAxis>,
     action: fn(&[i8]) -> ActionValue,
     help: &'static str,
 }
 
-impl InputMap {
+impl KeyBindings {
     /// A map over these axes. `action` gets one value per axis; `help` tells a person which keys there are.
     pub fn new(axes: impl Into<Vec<KeyAxis>>, action: fn(&[i8]) -> ActionValue, help: &'static str) -> Self {
         Self { axes: axes.into(), action, help }
@@ -59,12 +59,12 @@ impl InputMap {
 mod tests {
     use super::*;
 
-    fn map() -> InputMap {
+    fn map() -> KeyBindings {
         let axes = [
             KeyAxis::new([KeyCode::KeyA, KeyCode::ArrowLeft], [KeyCode::KeyD]),
             KeyAxis::new([KeyCode::KeyS], [KeyCode::KeyW]),
         ];
-        InputMap::new(axes, |values| ActionValue::Continuous(values.iter().map(|&value| value.into()).collect()), "")
+        KeyBindings::new(axes, |values| ActionValue::Continuous(values.iter().map(|&value| value.into()).collect()), "")
     }
 
     #[test]
