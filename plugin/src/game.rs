@@ -7,7 +7,7 @@ use crate::{
     action::ActionSpace,
     bot::BlindBot,
     floor_plan::FloorPlan,
-    input_map::InputMap,
+    key_bindings::KeyBindings,
     mode::ModeError,
     observation::ObservationSpace,
     vision::{Picture, Sight, VisionError},
@@ -60,7 +60,7 @@ pub trait Game: Send + Sync {
     }
 
     /// The keys with which a person plays; `None` if nobody can.
-    fn input_map(&self) -> Option<InputMap> {
+    fn key_bindings(&self) -> Option<KeyBindings> {
         None
     }
 

@@ -7,12 +7,12 @@ use crate::{
     bot,
     control::Control,
     episode::Episode,
-    input_map::InputMap,
+    key_bindings::KeyBindings,
     placement::{TickPlacement, TickSchedules, is_tick},
     systems::PlaybotSystems,
 };
 
-/// Turns keys into the actions of agents under [`Control::Human`] that have an [`InputMap`]. To be added after
+/// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`]. To be added after
 /// [`PlaybotPlugin`](crate::plugin::PlaybotPlugin).
 ///
 /// Ticks and frames have their own rates. A key counts in a tick if it is held then, or was pressed at any time since
@@ -53,7 +53,7 @@ fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
 fn decide(
     keys: Res<ButtonInput<KeyCode>>,
     mut tapped: ResMut<TappedKeys>,
-    mut agents: Query<(&Control, &InputMap, &Episode, &mut Action)>,
+    mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action)>,
 ) {
     for (control, map, episode, mut action) in &mut agents {
         if *control == Control::Human && episode.is_running() {

@@ -92,7 +92,7 @@ pub mod floor_plan;
 pub mod game;
 pub mod headless;
 pub mod held_out;
-pub mod input_map;
+pub mod key_bindings;
 pub mod keyboard;
 pub mod level;
 pub mod mode;

@@ -12,7 +12,7 @@ pub use crate::{
     episode::{Episode, EpisodeCount, EpisodeEnd, EpisodeEnded, StartEpisode},
     game::Game,
     headless::{PlaybotAppExt, headless_app},
-    input_map::{InputMap, KeyAxis},
+    key_bindings::{KeyAxis, KeyBindings},
     level::{LevelQueue, LevelSource},
     observation::{Observation, ObservationSpace, VectorSensor},
     placement::TickPlacement,

@@ -18,7 +18,7 @@ use crate::{
     ant::{
         game::{ANT_HZ, action_names},
         skeleton::JOINTS,
-        steering::input_map,
+        steering::key_bindings,
     },
     antview,
     maze::Map,
@@ -80,8 +80,8 @@ impl Game for AntMaze {
         action_names()
     }
 
-    fn input_map(&self) -> Option<InputMap> {
-        Some(input_map())
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        Some(key_bindings())
     }
 
     fn observation(&self) -> ObservationSpace {

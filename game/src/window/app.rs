@@ -60,7 +60,7 @@ impl GameWindow {
     /// No display, nothing that can draw, or a game without keys or a picture.
     pub fn open(setup: WindowSetup) -> Result<Self, WindowError> {
         let WindowSetup { game, playlist, partner, sight, seed, stop } = setup;
-        let keys = game.input_map().ok_or(WindowError::NoKeys(game.name()))?;
+        let keys = game.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         sight.check(game)?;
         let mut app = bevy_app(game.name())?;
