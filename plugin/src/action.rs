@@ -34,6 +34,11 @@ impl Action {
     }
 }
 
+/// Whether nothing can be done in this space.
+pub fn has_no_actions(space: &ActionSpace) -> bool {
+    matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
+}
+
 /// Why an action does not belong to its space, or `None` if it does.
 pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     match (action, space) {

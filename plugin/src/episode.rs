@@ -26,6 +26,11 @@ pub enum EpisodeEnd {
 }
 
 impl EpisodeEnd {
+    /// The game is over, and won.
+    pub const WON: Self = Self::Terminated { success: true };
+    /// The game is over, and lost.
+    pub const LOST: Self = Self::Terminated { success: false };
+
     /// Whether the game is over because the level's aim was reached.
     pub fn is_success(self) -> bool {
         matches!(self, Self::Terminated { success: true })

@@ -1,15 +1,22 @@
 //! What the plugin needs to know of a game in order to build it headless, many arenas at a time.
 
-use bevy::prelude::*;
+use bevy::{app::PluginGroupBuilder, prelude::*};
 use thiserror::Error;
 
 use crate::{
-    action::ActionSpace,
+    action::{ActionSpace, has_no_actions},
+    agent::AgentLimit,
     bot::BlindBot,
+    demo::{file::DemoHeader, recorder},
+    fault::Faults,
     floor_plan::FloorPlan,
+    headless,
+    headless_plugins::HeadlessPlugins,
     key_bindings::KeyBindings,
     mode::ModeError,
     observation::ObservationSpace,
+    panics::{EpisodeTrace, PanicReports},
+    placement::TickPlacement,
     vision::{Picture, Sight, VisionError},
 };
 
@@ -48,8 +55,33 @@ pub trait Game: Send + Sync {
         None
     }
 
-    /// Fixed ticks per second of game time.
+    /// Ticks per second of game time.
     fn tick_hz(&self) -> f64;
+
+    /// What a tick is made of. Under [`TickPlacement::Frame`] the game is built into a World with
+    /// [`HeadlessPlugins`], as [`headless_plugins`](Self::headless_plugins) has them; else into one with time and nothing
+    /// more.
+    fn placement(&self) -> TickPlacement {
+        TickPlacement::Fixed
+    }
+
+    /// Bevy's plugins for a headless World under [`TickPlacement::Frame`]: the usual ones, unless the game leaves some
+    /// out.
+    fn headless_plugins(&self, usual: HeadlessPlugins) -> PluginGroupBuilder {
+        usual.build()
+    }
+
+    /// Most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any
+    /// number. Whoever plays many arenas at a time builds more Worlds instead; one agent more is a fault.
+    fn arenas_per_world(&self) -> Option<u32> {
+        None
+    }
+
+    /// What is wrong with the game, so that it cannot be played at all.
+    fn problem(&self) -> Option<String> {
+        has_no_actions(&self.actions())
+            .then(|| format!("the game `{}` has no actions: say what an agent can do", self.name()))
+    }
 
     /// Actions of every agent.
     fn actions(&self) -> ActionSpace;
@@ -70,6 +102,11 @@ pub trait Game: Send + Sync {
     /// How the game is drawn for agents that see pictures; `None` if it cannot be drawn.
     fn picture(&self) -> Option<Picture> {
         None
+    }
+
+    /// Whether agents can see it through a camera of its own, without a [`picture`](Self::picture).
+    fn has_camera(&self) -> bool {
+        false
     }
 
     /// Adds what is drawn to an app, after [`build`](Self::build): sprites, tiles and transforms for everything that the
@@ -173,11 +210,26 @@ pub fn build_seeing_world(
     first: u32,
     count: u32,
 ) -> Result<(World, Vec<Entity>), VisionError> {
-    let mut app = crate::headless::headless_app();
-    crate::headless::set_tick_rate(&mut app, game.tick_hz());
+    sight.check(game)?;
+    let mut app = match game.placement() {
+        TickPlacement::Fixed => {
+            let mut app = headless::headless_app();
+            headless::set_tick_rate(&mut app, game.tick_hz());
+            app
+        }
+        TickPlacement::Frame => {
+            headless::headless_frame_app(game.headless_plugins(sight.headless_plugins()), game.tick_hz())
+        }
+    };
     furnish_app(game, &mut app, mode, sight, seed)?;
-    let mut world = crate::headless::into_world(app);
+    let header =
+        DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), recorder::demo_actions(&game.actions()));
+    PanicReports::new(header, std::env::temp_dir()).add_to(&mut app);
+    let mut world = headless::into_world(app);
     let agents = spawn_agents(game, &mut world, sight, first, count);
+    for &agent in &agents {
+        world.entity_mut(agent).insert(EpisodeTrace::default());
+    }
     Ok((world, agents))
 }
 
@@ -189,6 +241,12 @@ pub fn build_seeing_world(
 /// The pictures cannot be made: see [`VisionError`].
 pub fn furnish_app(game: &dyn Game, app: &mut App, mode: &str, sight: &Sight, seed: u64) -> Result<(), VisionError> {
     app.insert_resource(crate::policy::PlaybotSeed(seed));
+    if let Some(most) = game.arenas_per_world() {
+        app.insert_resource(AgentLimit { game: game.name(), most });
+    }
+    if let (Some(problem), Some(mut faults)) = (game.problem(), app.world_mut().get_resource_mut::<Faults>()) {
+        faults.report(problem);
+    }
     game.build(app, mode);
     sight.build(game, app)
 }

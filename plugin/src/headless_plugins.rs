@@ -6,6 +6,18 @@ use bevy::{
     window::{ExitCondition, WindowPlugin, WindowResolution},
 };
 
+/// The app has no screen, so that nothing needs to be drawn but what agents ask for.
+#[derive(Resource, Clone, Copy, Debug)]
+pub(crate) struct NoScreen;
+
+struct NoScreenPlugin;
+
+impl Plugin for NoScreenPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(NoScreen);
+    }
+}
+
 /// Bevy's `DefaultPlugins`, as this program is built with them, for a World that nobody looks at: input, assets, states,
 /// text, meshes and materials are there, and a window of 1280 by 720 that exists for the game only. There is no event
 /// loop, and the renderer has nothing to draw on.
@@ -40,7 +52,7 @@ impl PluginGroup for HeadlessPlugins {
                 close_when_requested: false,
                 ..default()
             });
-        without_screen(plugins, self.draws)
+        without_screen(plugins, self.draws).add(NoScreenPlugin)
     }
 }
 

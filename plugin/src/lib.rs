@@ -80,6 +80,7 @@
 
 pub mod action;
 pub mod agent;
+pub mod arrangement;
 pub mod bot;
 #[cfg(feature = "camera")]
 pub mod camera;
@@ -89,14 +90,18 @@ pub mod episode;
 pub mod eval;
 pub mod fault;
 pub mod floor_plan;
+pub mod foreign;
 pub mod game;
 pub mod headless;
+pub mod headless_plugins;
 pub mod held_out;
 pub mod key_bindings;
 pub mod keyboard;
+mod known_plugins;
 pub mod level;
 pub mod mode;
 pub mod observation;
+pub mod panics;
 pub mod placement;
 pub mod plugin;
 pub mod policy;
@@ -110,6 +115,7 @@ pub mod skill_prior;
 pub mod split;
 pub mod stage_clock;
 pub mod state_hash;
+pub mod system_errors;
 pub mod systems;
 pub mod test_app;
 pub mod train;

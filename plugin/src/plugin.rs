@@ -78,7 +78,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
         schedule,
         (
-            (policy::seed_streams, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
+            (policy::seed_streams, agent::check_agents, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
                 .chain()
                 .in_set(PlaybotSystems::Begin),
             (run_observe_schedule, observation::check_observations, observation::check_images)

@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use crate::{
     action::ActionSpace,
+    arrangement::at_most,
     fault::Fault,
     game::Game,
     policy::{ActionDraw, ActivePolicy},
@@ -19,7 +20,7 @@ use crate::{
 };
 
 /// Arenas and ticks of the short play from which a file's examples are taken.
-const EXAMPLE_ARENAS: u32 = 4;
+const EXAMPLE_ARENAS: usize = 4;
 const EXAMPLE_TICKS: usize = 32;
 /// Every so many of its rows becomes an example.
 const EXAMPLE_STRIDE: usize = 9;
@@ -136,7 +137,7 @@ pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisf
     let sight = policy_sight(file)?;
     if !sight.is_image() {
         check_names(game, file)?;
-    } else if game.picture().is_none() {
+    } else if game.picture().is_none() && !game.has_camera() {
         return Err(PolicyMisfit::Vision { sight, error: VisionError::NoPicture { game: game.name() } });
     }
     if file.policy.action_space() != game.actions() {
@@ -238,8 +239,10 @@ pub fn export_policy(
 ) -> Result<(), ExportError> {
     let prior = file.skills.as_ref().map(SkillPrior::from);
     let latent = file.policy.latent();
-    let mut collector = Collector::new(game, levels, &policy_sight(file)?, seed, 0, EXAMPLE_ARENAS, prior)?;
-    let (rollout, _) = collector.collect(&file.policy, latent, EXAMPLE_TICKS)?;
+    let arenas = at_most(game, EXAMPLE_ARENAS);
+    let ticks = EXAMPLE_TICKS * EXAMPLE_ARENAS / arenas;
+    let mut collector = Collector::new(game, levels, &policy_sight(file)?, seed, 0, arenas as u32, prior)?;
+    let (rollout, _) = collector.collect(&file.policy, latent, ticks)?;
     let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
     let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
     let n = rows.len();

@@ -44,15 +44,7 @@ fn keep(error: BevyError, context: ErrorContext) {
     if error.severity() != Severity::Panic {
         return match_severity(error, context);
     }
-    let in_words = format!("{} `{}`", context.kind(), context.name());
-    let failure = match error.downcast_ref::<SystemParamValidationError>() {
-        Some(invalid) => Failure::Missing {
-            context: in_words,
-            param: format!("{}{}", invalid.param.shortname(), invalid.field),
-            message: invalid.message.to_string(),
-        },
-        None => Failure::Other(format!("{in_words} failed: {error}").trim_end().to_owned()),
-    };
+    let failure = Failure::new(format!("{} `{}`", context.kind(), context.name()), &error);
     FIRST.with_borrow_mut(|first| {
         first.get_or_insert(failure);
     });
@@ -60,12 +52,36 @@ fn keep(error: BevyError, context: ErrorContext) {
 
 /// The first failure since the last call, in words.
 pub(crate) fn take(world: &World) -> Option<String> {
-    let first = FIRST.with_borrow_mut(Option::take)?;
-    Some(match first {
-        Failure::Missing { context, param, message } if !param.contains(NAMELESS) => in_words(&context, &param, &message),
-        Failure::Missing { message, .. } => nameless(world, &message),
-        Failure::Other(words) => words,
-    })
+    FIRST.with_borrow_mut(Option::take).map(|failure| failure.in_words(world))
+}
+
+/// Why a system (or whatever `context` names) could not run, with the name of what is missing and of the plugin that
+/// brings it.
+pub fn explain(world: &World, context: &str, error: &BevyError) -> String {
+    Failure::new(context.to_owned(), error).in_words(world)
+}
+
+impl Failure {
+    fn new(context: String, error: &BevyError) -> Self {
+        match error.downcast_ref::<SystemParamValidationError>() {
+            Some(invalid) => Self::Missing {
+                context,
+                param: format!("{}{}", invalid.param.shortname(), invalid.field),
+                message: invalid.message.to_string(),
+            },
+            None => Self::Other(format!("{context} failed: {error}").trim_end().to_owned()),
+        }
+    }
+
+    fn in_words(self, world: &World) -> String {
+        match self {
+            Self::Missing { context, param, message } if !param.contains(NAMELESS) => {
+                in_words(&context, &param, &message)
+            }
+            Self::Missing { context, message, .. } => nameless(world, &context, &message),
+            Self::Other(words) => words,
+        }
+    }
 }
 
 /// A resource is missing, and Bevy knows the names.
@@ -87,7 +103,8 @@ fn in_words(context: &str, param: &str, message: &str) -> String {
 }
 
 /// A resource is missing, and nobody knows its name.
-fn nameless(world: &World, message: &str) -> String {
+fn nameless(world: &World, context: &str, message: &str) -> String {
+    let who = if context.contains(NAMELESS) { "a system" } else { context };
     let missing = missing_by_type(world);
     let which = if missing.is_empty() {
         "none of Bevy's usual ones, so probably one of the game's own".to_owned()
@@ -95,7 +112,7 @@ fn nameless(world: &World, message: &str) -> String {
         format!("these are asked for and not there: {}", missing.join(", "))
     };
     format!(
-        "a system cannot run, since something that it needs does not exist ({message}); {which}; build with Bevy's \
+        "{who} cannot run, since something that it needs does not exist ({message}); {which}; build with Bevy's \
          feature `debug` to see the names of system and resource"
     )
 }

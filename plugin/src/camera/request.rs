@@ -2,7 +2,7 @@
 
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
-use super::{CameraError, CameraSensor, CameraSource};
+use super::{CameraError, CameraSensor, CameraSource, SensorCamera};
 use crate::{
     agent::{Agent, AgentOrder},
     control::Control,
@@ -70,6 +70,12 @@ pub(super) fn requests(world: &mut World) -> Asked {
             CameraSource::Following { target, width } => {
                 check_target(world, target, width).map(|()| asked.following.push((request, target, width)))
             }
+            CameraSource::OfGame => match own_camera(world) {
+                Some(camera) => {
+                    check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
+                }
+                None => Err(CameraError::NoOwnCamera),
+            },
             CameraSource::Camera(camera) => {
                 check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
             }
@@ -80,6 +86,13 @@ pub(super) fn requests(world: &mut World) -> Asked {
         report(world, [request].into_iter(), error);
     }
     asked
+}
+
+/// The game's own camera: of the active ones, the one that draws first.
+fn own_camera(world: &mut World) -> Option<Entity> {
+    let mut cameras = world.query_filtered::<(Entity, &Camera), Without<SensorCamera>>();
+    let active = cameras.iter(world).filter(|(_, camera)| camera.is_active);
+    active.min_by_key(|(entity, camera)| (camera.order, *entity)).map(|(entity, _)| entity)
 }
 
 fn check_size(options: &ImageOptions, limit: u32) -> Result<(), CameraError> {

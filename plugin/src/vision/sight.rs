@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{ImageOptions, VisionError};
 use crate::{
     game::{Game, UnknownName},
+    headless_plugins::HeadlessPlugins,
     observation::VectorSensor,
     raster::RasterSensor,
 };
@@ -102,6 +103,20 @@ impl Sight {
         }
     }
 
+    /// Bevy's plugins for a headless World whose agents see so.
+    pub(crate) fn headless_plugins(&self) -> HeadlessPlugins {
+        match self.kind {
+            #[cfg(feature = "camera")]
+            ObservationKind::Camera => HeadlessPlugins::drawing(),
+            _ => HeadlessPlugins::default(),
+        }
+    }
+
+    /// Whether it is a game's own camera that they see through.
+    fn is_own_camera(&self, game: &dyn Game) -> bool {
+        self.kind == ObservationKind::Camera && game.has_camera()
+    }
+
     /// Checks the sizes, that the game can be drawn, and that this build has the sensor.
     ///
     /// # Errors
@@ -112,7 +127,7 @@ impl Sight {
             return Ok(());
         }
         self.image.check()?;
-        if game.picture().is_none() {
+        if game.picture().is_none() && !self.is_own_camera(game) {
             return Err(VisionError::NoPicture { game: game.name() });
         }
         if self.kind == ObservationKind::Camera && !cfg!(feature = "camera") {
@@ -136,14 +151,22 @@ impl Sight {
             #[cfg(not(feature = "camera"))]
             ObservationKind::Camera => return Err(VisionError::NoCamera),
         };
-        game.build_picture(app);
+        if !self.is_own_camera(game) {
+            game.build_picture(app);
+        }
         Ok(())
     }
 
     /// Gives an agent the sensor. One that sees pictures needs no vector, which costs time to fill.
     pub(crate) fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity) {
-        let Some(picture) = game.picture() else { return };
         let mut entity = world.entity_mut(agent);
+        #[cfg(feature = "camera")]
+        if self.is_own_camera(game) {
+            entity.insert(crate::camera::CameraSensor::of_game(self.image));
+            entity.remove::<VectorSensor>();
+            return;
+        }
+        let Some(picture) = game.picture() else { return };
         match self.kind {
             ObservationKind::Vector => return,
             ObservationKind::Raster => entity.insert(RasterSensor::following(agent, picture.width, self.image)),
