@@ -112,6 +112,7 @@ pub mod state_hash;
 pub mod systems;
 pub mod test_app;
 pub mod train;
+pub mod virtual_input;
 pub mod vision;
 
 pub use playbot_learner as learner;

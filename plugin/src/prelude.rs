@@ -22,4 +22,5 @@ pub use crate::{
     split::LevelSplit,
     state_hash::StateHash,
     systems::{ObserveSchedule, PlaybotSystems},
+    virtual_input::{VirtualInput, VirtualInputPlugin},
 };
