@@ -119,6 +119,7 @@ pub mod system_errors;
 pub mod systems;
 pub mod test_app;
 pub mod train;
+pub mod virtual_input;
 pub mod vision;
 
 pub use playbot_learner as learner;

@@ -23,4 +23,5 @@ pub use crate::{
     split::LevelSplit,
     state_hash::StateHash,
     systems::{ObserveSchedule, PlaybotSystems},
+    virtual_input::{VirtualInput, VirtualInputPlugin},
 };
