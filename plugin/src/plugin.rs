@@ -7,7 +7,7 @@ use crate::{
     fault::Faults,
     headless, observation,
     placement::{self, FrameGate, TickPlacement, TickSchedules},
-    policy, reward, skill_prior, stage_clock,
+    policy, reward, skill_prior,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -52,7 +52,6 @@ impl Plugin for PlaybotPlugin {
         }
         add_decision_systems(app, schedules.decide);
         add_outcome_systems(app, schedules.judge);
-        stage_clock::add_readings(app);
     }
 }
 

@@ -1,16 +1,16 @@
 //! What is wrong with a foreign game is said, with the game's own names.
 
 use bevy::prelude::*;
-use bevy_playbot::{
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{
     demo::verify::verify_file,
     eval::{EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
-    game::build_world,
-    learner::DeviceKind,
     prelude::*,
     train::{Trainer, config_file::parse_experiment},
-    vision::Sight,
+    worlds::build_world,
 };
+use playbot_learner::DeviceKind;
 use playbot_tests::foreign::catch::{Paddle, Score, catch_game, game};
 
 /// Plays until something is wrong, for at most this many ticks.
@@ -23,7 +23,7 @@ fn fault(game: &ForeignGame, ticks: u64) -> String {
 
 fn plan() -> EvalPlan {
     let split = "default:0..3".parse().expect("a split");
-    EvalPlan { split, sight: Sight::default(), episodes_per_level: 1, seed: 1, arenas: 2, worlds: 1, threads: 1 }
+    EvalPlan { split, sight: ObservationConfig::default(), episodes_per_level: 1, seed: 1, arenas: 2, worlds: 1, threads: 1 }
 }
 
 #[test]

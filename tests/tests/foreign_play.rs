@@ -5,16 +5,16 @@ use std::path::Path;
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
-        dataset::Demonstrations,
         file::{DemoHeader, DemoWriter},
         recorder::demo_actions,
-        verify::verify_file,
     },
+    headless::Tick,
+    vision::ObservationConfig,
+};
+use playbot_lab::{
+    demo::{dataset::Demonstrations, verify::verify_file},
     eval::{EvalPlan, Player, evaluate, summarize},
     foreign::ForeignGame,
-    game::build_world,
-    headless::Tick,
-    learner::DeviceKind,
     prelude::*,
     train::{
         Algorithm, Experiment, Trainer,
@@ -22,8 +22,9 @@ use bevy_playbot::{
         config_file::parse_experiment,
         run_dir::{RunDir, RunInfo},
     },
-    vision::Sight,
+    worlds::build_world,
 };
+use playbot_learner::DeviceKind;
 use playbot_tests::foreign::{
     catch::{Orchard, catch_game},
     rooms::{PlayedFrames, Stage, rooms_game},
@@ -44,7 +45,7 @@ fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>, noise: f64) {
 fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32, f64)> {
     let split: LevelSplit = "default:0..7".parse().expect("a split");
     let plan =
-        EvalPlan { split, sight: Sight::default(), episodes_per_level: 1, seed: 1, arenas: 4, worlds: 2, threads };
+        EvalPlan { split, sight: ObservationConfig::default(), episodes_per_level: 1, seed: 1, arenas: 4, worlds: 2, threads };
     let results = evaluate(game, &player, &plan, |_| {}).expect("can be played");
     assert_eq!(results.len(), 8);
     let summary = summarize("player", &plan.split, &results);
@@ -72,7 +73,7 @@ fn recordings_replay_and_are_learned_from() {
     record(&catch_game(), &path, (0..9).chain(0..3).collect(), 0.3);
     let report = verify_file(&catch_game(), &path, |_| {}).expect("readable");
     assert_eq!((report.episodes, &report.divergences), (12, &Vec::new()));
-    let demos = Demonstrations::read(&catch_game(), &Sight::default(), &path, None).expect("readable");
+    let demos = Demonstrations::read(&catch_game(), &ObservationConfig::default(), &path, None).expect("readable");
     let steps = demos.steps();
     let dataset = demos.dataset(&catch_game(), 2, |_| {}).expect("replays");
     assert!(steps > 1000 && dataset.steps() as u64 == steps);

@@ -1,7 +1,7 @@
 //! Catch what falls: a game in `Update`, spawned in `Startup`, with a global score.
 
 use bevy::prelude::*;
-use bevy_playbot::{
+use playbot_lab::{
     foreign::{ForeignGame, LevelSeed, Restart},
     prelude::*,
 };

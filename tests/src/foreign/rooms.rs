@@ -1,7 +1,7 @@
 //! Three rooms: a game of states, whose level takes a few frames to load, with physics in `FixedUpdate` at its own rate.
 
 use bevy::prelude::*;
-use bevy_playbot::{
+use playbot_lab::{
     foreign::{ForeignGame, LevelSeed, Restart},
     prelude::*,
 };
