@@ -56,6 +56,8 @@ pub(super) fn requests(world: &mut World) -> Asked {
     let limit =
         world.get_resource::<RenderDevice>().map_or(u32::MAX, |device| device.limits().max_texture_dimension_2d);
     let mut sensors = world.query::<((&Agent, &Control, &Episode), (&CameraSensor, &ImageSensor))>();
+    let mut cameras = world.query_filtered::<(Entity, &'static Camera), Without<SensorCamera>>();
+    cameras.update_archetypes(world);
     let mut asked = Asked::default();
     let mut refused = Vec::new();
     for &entity in world.resource::<AgentOrder>().entities() {
@@ -70,7 +72,7 @@ pub(super) fn requests(world: &mut World) -> Asked {
             CameraSource::Following { target, width } => {
                 check_target(world, target, width).map(|()| asked.following.push((request, target, width)))
             }
-            CameraSource::OfGame => match own_camera(world) {
+            CameraSource::OfGame => match own_camera(world, &cameras) {
                 Some(camera) => {
                     check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
                 }
@@ -89,9 +91,11 @@ pub(super) fn requests(world: &mut World) -> Asked {
 }
 
 /// The game's own camera: of the active ones, the one that draws first.
-fn own_camera(world: &mut World) -> Option<Entity> {
-    let mut cameras = world.query_filtered::<(Entity, &Camera), Without<SensorCamera>>();
-    let active = cameras.iter(world).filter(|(_, camera)| camera.is_active);
+fn own_camera(
+    world: &World,
+    cameras: &QueryState<(Entity, &'static Camera), Without<SensorCamera>>,
+) -> Option<Entity> {
+    let active = cameras.iter_manual(world).filter(|(_, camera)| camera.is_active);
     active.min_by_key(|(entity, camera)| (camera.order, *entity)).map(|(entity, _)| entity)
 }
 
