@@ -87,8 +87,8 @@ impl<G: GiveEyes> Game for Sighted<G> {
         self.0.action_names()
     }
 
-    fn input_map(&self) -> Option<InputMap> {
-        self.0.input_map()
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        self.0.key_bindings()
     }
 
     fn observation(&self) -> ObservationSpace {

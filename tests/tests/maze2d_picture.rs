@@ -75,7 +75,7 @@ fn walls_floor_ball_and_goal_are_where_they_are() {
 
 #[test]
 fn the_ball_goes_where_the_keys_push_it() {
-    let keys = GAME.input_map().expect("people can play");
+    let keys = GAME.key_bindings().expect("people can play");
     // From a cell of the medium map that is open to this side.
     for (key, way, cell) in [
         (KeyCode::ArrowUp, Vec2::new(0.0, -1.0), (3, 4)),

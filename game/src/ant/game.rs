@@ -11,7 +11,7 @@ use super::{
     picture::AntPicturePlugin,
     sense::{joint_names, names},
     skeleton::{ACTUATED, JOINTS},
-    steering::{input_map, steer},
+    steering::{key_bindings, steer},
     walk::{Task, Walker, observe, start_episode, walk},
 };
 use crate::ant::view::VIEW;
@@ -56,8 +56,8 @@ impl Game for Ant {
         action_names()
     }
 
-    fn input_map(&self) -> Option<InputMap> {
-        Some(input_map())
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        Some(key_bindings())
     }
 
     fn observation(&self) -> ObservationSpace {

@@ -19,7 +19,7 @@ use crate::{
     ant::{
         game::{ANT_HZ, action_names},
         skeleton::JOINTS,
-        steering::input_map,
+        steering::key_bindings,
         view::VIEW,
     },
     maze::{
@@ -84,8 +84,8 @@ impl Game for AntMaze {
         action_names()
     }
 
-    fn input_map(&self) -> Option<InputMap> {
-        Some(input_map())
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        Some(key_bindings())
     }
 
     fn observation(&self) -> ObservationSpace {

@@ -79,12 +79,12 @@ impl Game for CoinRun {
         names.map(str::to_owned).into_iter().chain(unused).collect()
     }
 
-    fn input_map(&self) -> Option<InputMap> {
+    fn key_bindings(&self) -> Option<KeyBindings> {
         let sideways = KeyAxis::new([KeyCode::ArrowLeft, KeyCode::KeyA], [KeyCode::ArrowRight, KeyCode::KeyD]);
         let upwards =
             KeyAxis::new([KeyCode::ArrowDown, KeyCode::KeyS], [KeyCode::ArrowUp, KeyCode::KeyW, KeyCode::Space]);
         let help = "arrow keys or A, D and S run and drop, Up, W or Space jumps";
-        Some(InputMap::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
+        Some(KeyBindings::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
     }
 
     fn observation(&self) -> ObservationSpace {

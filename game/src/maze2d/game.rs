@@ -96,12 +96,12 @@ impl Game for Maze2d {
         vec!["push x (down the rows)".to_owned(), "push y (along the columns)".to_owned()]
     }
 
-    fn input_map(&self) -> Option<InputMap> {
+    fn key_bindings(&self) -> Option<KeyBindings> {
         // The first row of the map is at the top of the picture.
         let rows = KeyAxis::new([KeyCode::ArrowUp, KeyCode::KeyW], [KeyCode::ArrowDown, KeyCode::KeyS]);
         let columns = KeyAxis::new([KeyCode::ArrowLeft, KeyCode::KeyA], [KeyCode::ArrowRight, KeyCode::KeyD]);
         let push = |at: &[i8]| ActionValue::Continuous(at.iter().map(|&axis| axis.into()).collect());
-        Some(InputMap::new([rows, columns], push, "arrow keys or W, A, S and D push the ball"))
+        Some(KeyBindings::new([rows, columns], push, "arrow keys or W, A, S and D push the ball"))
     }
 
     fn observation(&self) -> ObservationSpace {

@@ -123,7 +123,7 @@ fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
     }
     let name = game.name();
     let mut advice = "train a policy without demonstrations (`playbot train --algorithm ppo`)".to_owned();
-    if game.input_map().is_some() {
+    if game.key_bindings().is_some() {
         advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
     }
     Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))

@@ -8,10 +8,12 @@
 //!
 //! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.
 
+pub mod arrangement;
 pub mod benchmark;
 pub mod demo;
 pub mod eval;
 pub mod floor_plan;
+pub mod foreign;
 pub mod game;
 pub mod games;
 pub mod held_out;

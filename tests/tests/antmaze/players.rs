@@ -41,7 +41,7 @@ fn keyboard_with(game: &dyn Game, mode: &str) -> (App, Entity) {
     game.build(&mut app, mode);
     app.init_resource::<ButtonInput<KeyCode>>();
     let agent = game.spawn_agent(app.world_mut(), 0);
-    let keys = game.input_map().expect("has keys");
+    let keys = game.key_bindings().expect("has keys");
     let still = Action(keys.action(|_| false));
     app.world_mut().entity_mut(agent).insert((Control::Human, still, keys, LevelQueue::Always(2)));
     (app, agent)

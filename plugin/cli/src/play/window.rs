@@ -76,7 +76,7 @@ fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
 }
 
 fn announce(game: &dyn Game, args: &Args) {
-    if let Some(keys) = game.input_map() {
+    if let Some(keys) = game.key_bindings() {
         tell!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
     }
     if args.partner.is_named() {

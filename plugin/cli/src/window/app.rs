@@ -60,11 +60,11 @@ impl GameWindow {
     /// No display, nothing that can draw, or a game without keys or a picture.
     pub fn open(setup: WindowSetup) -> Result<Self, WindowError> {
         let WindowSetup { game, playlist, partner, sight, seed, stop } = setup;
-        let keys = game.input_map().ok_or(WindowError::NoKeys(game.name()))?;
+        let keys = game.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         sight.check(game)?;
         let mut app = bevy_app(game.name())?;
-        app.add_plugins((PlaybotPlugin, KeyboardPlugin, TileLayerPlugin));
+        app.add_plugins((PlaybotPlugin::default(), KeyboardPlugin, TileLayerPlugin));
         set_fixed_step(&mut app, game.tick_hz());
         add_game(game, &mut app, playlist.mode(), &sight, seed)?;
         if !sight.is_image() {

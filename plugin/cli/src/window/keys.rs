@@ -1,4 +1,4 @@
-//! The keys that are the window's own: the game's are in its [`InputMap`](bevy_playbot::input_map::InputMap).
+//! The keys that are the window's own: the game's are in its [`KeyBindings`](bevy_playbot::key_bindings::KeyBindings).
 
 use bevy::{input::InputSystems, prelude::*};
 use bevy_playbot::{demo::recorder::flush_unfinished, fault::Faults};

@@ -15,6 +15,7 @@ use super::{
     learner::{Learner, LearnerMetrics},
     metrics_log::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
 };
+use crate::arrangement::Arrangement;
 use crate::game::Game;
 use crate::parallel::on_threads;
 use crate::sensors::GameSensors;
@@ -195,10 +196,12 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let share = experiment.arenas / experiment.worlds;
+        let arrangement = Arrangement::new(game, experiment.arenas, experiment.worlds);
+        let share = arrangement.arenas;
         let (levels, sight, seed) = (&experiment.train, experiment.sight(), experiment.seed);
-        let collectors: Result<_, _> = (0..experiment.worlds)
-            .map(|world| Collector::new(game, levels, &sight, seed, world * share, share, prior.clone()))
+        let collectors: Result<_, _> = arrangement
+            .first_agents()
+            .map(|first| Collector::new(game, levels, &sight, seed, first, share, prior.clone()))
             .collect();
         let (experiment, collectors) = (experiment.clone(), collectors?);
         Ok(Self { experiment, threads, learner, collectors, progress: Progress::default() })
@@ -288,6 +291,9 @@ impl Trainer {
 
 /// Whether the experiment can be run on this game.
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
+    if let Some(problem) = game.problem() {
+        return Err(Fault(problem).into());
+    }
     experiment.check()?;
     experiment.check_levels(game)?;
     experiment.sight().check(game)?;
