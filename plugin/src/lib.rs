@@ -85,6 +85,7 @@ pub mod bot;
 pub mod camera;
 pub mod control;
 pub mod demo;
+pub mod doctor;
 pub mod episode;
 pub mod eval;
 pub mod fault;

@@ -1,5 +1,6 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
+pub mod faulty;
 pub mod memory;
 mod painted;
 pub mod scene;

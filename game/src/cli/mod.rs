@@ -7,6 +7,7 @@ mod tell;
 mod bench;
 mod config;
 mod demo;
+mod doctor;
 mod error;
 mod eval;
 mod experiment;
@@ -60,6 +61,7 @@ Examples:
   playbot record coinrun --levels easy:0..9 --out my.demo
   playbot play coinrun --seed 7 --record my.demo   play it yourself
   playbot demo verify demos/coinrun
+  playbot doctor coinrun                           is the game the same every time?
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
@@ -82,6 +84,8 @@ enum Verb {
     Play(play::Args),
     /// Look at, check and repair recordings.
     Demo(demo::Args),
+    /// Check that a game plays the same when it is given the same actions, and find what differs.
+    Doctor(doctor::Args),
     /// Learn the skill model from recordings.
     LearnSkills(learn_skills::Args),
     /// Train a policy.
@@ -145,6 +149,7 @@ fn run(verb: Verb) -> Result<Outcome, CliError> {
         Verb::Record(args) => record::run(args),
         Verb::Play(args) => play::run(args),
         Verb::Demo(args) => demo::run(args),
+        Verb::Doctor(args) => doctor::run(args),
         Verb::LearnSkills(args) => learn_skills::run(args),
         Verb::Train(args) => train::run(args),
         Verb::Study(args) => study::run(args),
