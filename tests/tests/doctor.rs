@@ -24,7 +24,13 @@ fn finding(fault: Fault) -> (Finding, DoctorReport) {
 }
 
 /// The only finding, which must be a difference of this kind of thing in this comparison.
-fn named(fault: Fault, comparison: Comparison, kind: DifferenceKind, name: &str, field: &str) -> (Finding, DoctorReport) {
+fn named(
+    fault: Fault,
+    comparison: Comparison,
+    kind: DifferenceKind,
+    name: &str,
+    field: &str,
+) -> (Finding, DoctorReport) {
     let (finding, report) = finding(fault);
     let difference = finding.difference.clone().expect("a difference");
     assert_eq!((finding.kind, finding.comparison), (FindingKind::Differs, Some(comparison)), "{}", finding.what);
@@ -64,7 +70,8 @@ fn what_reflection_sees_and_what_it_does_not_see_is_said() {
 
 #[test]
 fn unseeded_randomness_is_found_at_its_source() {
-    let (finding, report) = named(Fault::UnseededRandomness, Comparison::Repeat, DifferenceKind::Resource, "::Wind", ".force");
+    let (finding, report) =
+        named(Fault::UnseededRandomness, Comparison::Repeat, DifferenceKind::Resource, "::Wind", ".force");
     assert!(finding.causes.iter().any(|cause| cause.kind == CauseKind::Randomness));
     assert_eq!(report.safety.recording.safe, Some(false));
     let skipped = report.of(Comparison::Restart).and_then(|restart| restart.skipped.clone());

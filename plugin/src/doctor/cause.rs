@@ -33,7 +33,9 @@ impl CauseKind {
             Self::WallClock => "the clock on the wall: Time<Real>, Instant or SystemTime",
             Self::ThreadState => "a static, a thread_local! or a task on another thread",
             Self::SharedByArenas => "a resource, static or query that all arenas of a World share",
-            Self::SurvivesRestart => "state that survives a restart: a resource, a Local or an entity that is not reset",
+            Self::SurvivesRestart => {
+                "state that survives a restart: a resource, a Local or an entity that is not reset"
+            }
             Self::Loading => "assets that are still loading when the game begins",
         }
     }
@@ -65,7 +67,9 @@ impl CauseKind {
                  state of the simulation in a Local; what is meant to last, such as a high score, can be left out with \
                  --ignore"
             }
-            Self::Loading => "wait for the files before an episode starts, with a `ready` that says when they are there",
+            Self::Loading => {
+                "wait for the files before an episode starts, with a `ready` that says when they are there"
+            }
         }
     }
 }

@@ -11,10 +11,10 @@ use bevy::{
 };
 
 use super::{
-    arenas::{owners, share_of},
-    census::{GroupKey, Groups, types_of},
-    game_copy::GameCopy,
+    census::types_of,
     field::{FieldComparison, FieldDifference},
+    game_copy::GameCopy,
+    pairs::Pairs,
     report::{Comparison, Difference, DifferenceKind},
     scope,
     types::{KnownType, TypeBook},
@@ -37,13 +37,6 @@ pub(super) struct Found {
     pub unmatched: usize,
 }
 
-/// Entities of one kind, pair by pair.
-struct Pairs {
-    key: GroupKey,
-    left: Vec<Entity>,
-    right: Vec<Entity>,
-}
-
 /// In which group an entity is, and at which place.
 type Places = EntityHashMap<(usize, usize)>;
 
@@ -55,14 +48,21 @@ impl Comparer<'_> {
         let pairs = self.pair_up(left, right, tick, &mut found);
         let places = |side: fn(&Pairs) -> &Vec<Entity>| -> Places {
             let numbered = pairs.iter().enumerate();
-            let placed = numbered.flat_map(|(group, pairs)| side(pairs).iter().enumerate().map(move |(at, e)| (*e, (group, at))));
+            let placed = numbered
+                .flat_map(|(group, pairs)| side(pairs).iter().enumerate().map(move |(at, e)| (*e, (group, at))));
             placed.collect()
         };
         let (left_places, right_places) = (places(|pairs| &pairs.left), places(|pairs| &pairs.right));
         let loose = self.is_loose();
         let same_entity = |a: Entity, b: Entity| match (left_places.get(&a), right_places.get(&b)) {
             // A list of entities is in the order of their spawning, which need not be that of a first episode.
-            (Some(a), Some(b)) => if loose { a.0 == b.0 } else { a == b },
+            (Some(a), Some(b)) => {
+                if loose {
+                    a.0 == b.0
+                } else {
+                    a == b
+                }
+            }
             // Of an entity that is no part of the game nothing is known.
             _ => true,
         };
@@ -91,71 +91,6 @@ impl Comparer<'_> {
         known.is_compared()
             && scope::is_compared_in(self.comparison, path)
             && !self.ignored.iter().any(|part| path.contains(part.as_str()))
-    }
-
-    /// Finds the partners of all entities; kinds of which there are more on one side are reported and left out.
-    fn pair_up(&self, left: &GameCopy, right: &GameCopy, tick: u32, found: &mut Found) -> Vec<Pairs> {
-        let lefts = left.census.groups(&left.world, self.book);
-        let mut rights = right.census.groups(&right.world, self.book);
-        if self.comparison == Comparison::Arenas {
-            return self.pair_with_share(left, right, lefts, &rights, found);
-        }
-        let mut pairs = Vec::new();
-        for (key, left) in lefts {
-            let right = rights.remove(&key).unwrap_or_default();
-            if left.len() == right.len() {
-                pairs.push(Pairs { key, left, right });
-            } else {
-                found.differences.extend(self.of_counts(&key, left.len(), right.len(), tick));
-            }
-        }
-        let only_right = rights.iter().filter_map(|(key, right)| self.of_counts(key, 0, right.len(), tick));
-        found.differences.extend(only_right);
-        pairs
-    }
-
-    fn pair_with_share(&self, left: &GameCopy, right: &GameCopy, lefts: Groups, rights: &Groups, found: &mut Found) -> Vec<Pairs> {
-        let owners = owners(self.book, right, rights.values().flatten().copied());
-        let number = left.number(0);
-        let mut pairs = Vec::new();
-        for (key, left) in lefts {
-            let all = rights.get(&key).map_or(&[][..], Vec::as_slice);
-            match share_of(&owners, number, left.len(), all) {
-                Some(right) => pairs.push(Pairs { key, left, right }),
-                None => found.unmatched += left.len(),
-            }
-        }
-        pairs
-    }
-
-    fn of_counts(&self, key: &GroupKey, left: usize, right: usize, tick: u32) -> Option<Difference> {
-        let ignored = |id: &TypeId| {
-            let path = self.book.get(*id).and_then(|known| known.path.as_deref()).unwrap_or_default();
-            self.ignored.iter().any(|part| path.contains(part.as_str()))
-        };
-        (!key.types.iter().any(ignored)).then(|| Difference {
-            tick,
-            kind: DifferenceKind::Entities,
-            name: self.describe_kind(key),
-            entity: None,
-            field: String::new(),
-            left: left.to_string(),
-            right: right.to_string(),
-        })
-    }
-
-    /// `"Paddle" [Velocity, Collider]`.
-    fn describe_kind(&self, key: &GroupKey) -> String {
-        let types = key.types.iter().filter_map(|id| self.book.get(*id)?.short_name());
-        let types: Vec<_> = types.collect();
-        let is_nameless = types.is_empty();
-        let types = format!("[{}]", types.join(", "));
-        match (&key.agent, &key.name) {
-            (Some(number), _) => format!("agent {number}"),
-            (None, Some(name)) => format!("\"{name}\" {types}"),
-            (None, None) if is_nameless => "entities without components of the game that have a name".to_owned(),
-            (None, None) => types,
-        }
     }
 
     fn compare_resources(
@@ -192,7 +127,8 @@ impl Comparer<'_> {
     }
 
     fn resources(&self, copy: &GameCopy) -> BTreeMap<TypeId, Entity> {
-        let typed = |(id, entity): (ComponentId, Entity)| Some((copy.world.components().get_info(id)?.type_id()?, entity));
+        let typed =
+            |(id, entity): (ComponentId, Entity)| Some((copy.world.components().get_info(id)?.type_id()?, entity));
         copy.world.resource_entities().iter().filter_map(typed).collect()
     }
 
@@ -232,12 +168,19 @@ impl Comparer<'_> {
                 differences.push(Difference { tick, kind, name, entity: Some(entity), field: path, left, right });
             }
         }
-        let in_another_order = self.is_loose() && !differences.is_empty() && self.is_reordered(left, right, group, same_entity);
+        let in_another_order =
+            self.is_loose() && !differences.is_empty() && self.is_reordered(left, right, group, same_entity);
         if in_another_order { Vec::new() } else { differences }
     }
 
     /// Whether every entity on the left has an equal one on the right, whatever the order.
-    fn is_reordered(&mut self, left: &GameCopy, right: &GameCopy, group: &Pairs, same_entity: &dyn Fn(Entity, Entity) -> bool) -> bool {
+    fn is_reordered(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        group: &Pairs,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> bool {
         let mut free = group.right.clone();
         group.left.iter().all(|&a| {
             let equal = free.iter().position(|&b| self.components(left, a, right, b, same_entity).is_empty());
@@ -267,15 +210,6 @@ impl Comparer<'_> {
             }
         }
         differences
-    }
-
-    /// `entity 3v0, number 2 of 5 [Brick]`.
-    fn describe(&self, group: &Pairs, place: usize, entity: Entity) -> String {
-        let kind = self.describe_kind(&group.key);
-        match group.left.len() {
-            1 => kind,
-            count => format!("{kind}, number {} of {count} in the order of spawning (entity {entity})", place + 1),
-        }
     }
 }
 

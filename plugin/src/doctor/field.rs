@@ -62,10 +62,12 @@ impl FieldComparison<'_> {
                 let found = self.first(a.field_at(at)?, b.field_at(at)?)?;
                 Some(found.inside(format!(".{}", a.name_at(at).unwrap_or("?"))))
             }),
-            (ReflectRef::TupleStruct(a), ReflectRef::TupleStruct(b)) => (0..a.field_len())
-                .find_map(|at| Some(self.first(a.field(at)?, b.field(at)?)?.inside(format!(".{at}")))),
-            (ReflectRef::Tuple(a), ReflectRef::Tuple(b)) => (0..a.field_len())
-                .find_map(|at| Some(self.first(a.field(at)?, b.field(at)?)?.inside(format!(".{at}")))),
+            (ReflectRef::TupleStruct(a), ReflectRef::TupleStruct(b)) => {
+                (0..a.field_len()).find_map(|at| Some(self.first(a.field(at)?, b.field(at)?)?.inside(format!(".{at}"))))
+            }
+            (ReflectRef::Tuple(a), ReflectRef::Tuple(b)) => {
+                (0..a.field_len()).find_map(|at| Some(self.first(a.field(at)?, b.field(at)?)?.inside(format!(".{at}"))))
+            }
             (ReflectRef::Array(a), ReflectRef::Array(b)) => {
                 (0..a.len()).find_map(|at| Some(self.first(a.get(at)?, b.get(at)?)?.inside(format!("[{at}]"))))
             }
@@ -91,8 +93,8 @@ impl FieldComparison<'_> {
 
     fn lists(&mut self, left: &dyn List, right: &dyn List) -> Option<FieldDifference> {
         let shared = left.len().min(right.len());
-        let element = (0..shared)
-            .find_map(|at| Some(self.first(left.get(at)?, right.get(at)?)?.inside(format!("[{at}]"))));
+        let element =
+            (0..shared).find_map(|at| Some(self.first(left.get(at)?, right.get(at)?)?.inside(format!("[{at}]"))));
         element.or_else(|| self.lengths(left.len(), right.len()))
     }
 
@@ -103,9 +105,7 @@ impl FieldComparison<'_> {
             .filter_map(|(key, value)| {
                 let difference = match right.get(key) {
                     Some(other) => self.first(value, other)?,
-                    None => {
-                        FieldDifference { path: String::new(), left: show(value), right: "nothing".to_owned() }
-                    }
+                    None => FieldDifference { path: String::new(), left: show(value), right: "nothing".to_owned() },
                 };
                 Some(difference.inside(format!("[{}]", show(key))))
             })
@@ -168,8 +168,12 @@ mod tests {
     fn first(left: &Bag, right: &Bag, right_may_hold_more: bool) -> Option<FieldDifference> {
         let mut incomparable = BTreeSet::new();
         let same_entity = |a: Entity, b: Entity| a == b;
-        let mut comparison =
-            FieldComparison { same_entity: &same_entity, handles: true, right_may_hold_more, incomparable: &mut incomparable };
+        let mut comparison = FieldComparison {
+            same_entity: &same_entity,
+            handles: true,
+            right_may_hold_more,
+            incomparable: &mut incomparable,
+        };
         comparison.first(left, right)
     }
 

@@ -85,7 +85,10 @@ fn of_observation(seen: &ObservationReport) -> Vec<Finding> {
         findings.push(plain(FindingKind::LengthChanges, what, None));
     }
     if seen.is_blind() {
-        let what = format!("none of the {} observed values changed in {} ticks: the agent sees nothing", seen.values, seen.ticks);
+        let what = format!(
+            "none of the {} observed values changed in {} ticks: the agent sees nothing",
+            seen.values, seen.ticks
+        );
         findings.push(plain(FindingKind::Blind, what, None));
     }
     findings

@@ -15,6 +15,7 @@ mod field;
 mod finding;
 mod game_copy;
 mod observed;
+mod pairs;
 mod report;
 mod safety;
 mod scope;

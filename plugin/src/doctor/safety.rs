@@ -68,7 +68,8 @@ fn verdict(comparisons: &[ComparisonReport], needed: &[Comparison]) -> Verdict {
     let mut of_needed = comparisons.iter().filter(|report| needed.contains(&report.comparison));
     if let Some(bad) = of_needed.clone().find(|report| report.same() == Some(false)) {
         let why = format!("differs {}", bad.comparison.describe());
-        let why = if bad.fault.is_some() && bad.difference().is_none() { "the game has a fault".to_owned() } else { why };
+        let why =
+            if bad.fault.is_some() && bad.difference().is_none() { "the game has a fault".to_owned() } else { why };
         return Verdict { safe: Some(false), why };
     }
     match of_needed.find_map(|report| report.skipped.clone()) {

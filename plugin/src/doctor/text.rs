@@ -75,7 +75,9 @@ impl DoctorReport {
         write!(f, "Observation: {} values", seen.values)?;
         match seen.constant.len() {
             0 => writeln!(f, ", all of which changed in {} ticks", seen.ticks),
-            count => writeln!(f, ", {count} of which never changed in {} ticks: {}", seen.ticks, listed(&seen.constant)),
+            count => {
+                writeln!(f, ", {count} of which never changed in {} ticks: {}", seen.ticks, listed(&seen.constant))
+            }
         }
     }
 }
@@ -103,7 +105,8 @@ fn write_types(f: &mut Formatter<'_>, types: &TypesReport) -> fmt::Result {
     writeln!(f, "State: {} types of components and resources were compared field by field", types.compared.len())?;
     let hidden = types.not_reflected.len() + types.unnamed;
     if hidden > 0 {
-        let names = if types.not_reflected.is_empty() { String::new() } else { format!(": {}", listed(&types.not_reflected)) };
+        let names =
+            if types.not_reflected.is_empty() { String::new() } else { format!(": {}", listed(&types.not_reflected)) };
         writeln!(
             f,
             "  {hidden} types of the game are not reflected{names}; a difference in them shows only later, in observation, \

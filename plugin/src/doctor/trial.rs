@@ -118,7 +118,8 @@ fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
 type OutcomeDifference = (DifferenceKind, String, String, String, String);
 
 fn outcomes(a: &Outcome, b: &Outcome, names: &[String]) -> Option<OutcomeDifference> {
-    let differs = |kind, name: &str, left: String, right: String| Some((kind, name.to_owned(), String::new(), left, right));
+    let differs =
+        |kind, name: &str, left: String, right: String| Some((kind, name.to_owned(), String::new(), left, right));
     let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
     if let Some(at) = a.observation.iter().zip(&b.observation).position(|(a, b)| !same(a, b)) {
         let name = names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
