@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use bevy::{
     prelude::Entity,
-    reflect::{DynamicTypePath, PartialReflect, ReflectRef, enums::Enum, list::List, map::Map, set::Set},
+    reflect::{PartialReflect, ReflectRef, enums::Enum, list::List, map::Map, set::Set},
 };
 
 use super::values::{plain_equal, show};

@@ -10,7 +10,6 @@ use super::{
     compare::{Comparer, Found},
     game_copy::GameCopy,
     report::{Comparison, Difference, DifferenceKind},
-    types::KnownType,
 };
 
 /// Entities of one kind, pair by pair.

@@ -80,7 +80,8 @@ impl Trial {
     }
 
     fn tick(&mut self) {
-        let (here, threaded) = self.copies.split_at_mut(self.copies.len() - self.on_threads);
+        let here = self.copies.len() - self.on_threads;
+        let (here, threaded) = self.copies.split_at_mut(here);
         here.iter_mut().for_each(GameCopy::tick);
         on_threads(threaded, self.on_threads, GameCopy::tick);
     }
