@@ -11,6 +11,7 @@
 pub mod arrangement;
 pub mod benchmark;
 pub mod demo;
+pub mod doctor;
 pub mod eval;
 pub mod floor_plan;
 pub mod foreign;
