@@ -132,12 +132,7 @@ fn draw_level(level: u64) -> Vec<Column> {
     columns
 }
 
-fn clear_level(
-    mut commands: Commands,
-    old: Query<Entity, With<InLevel>>,
-    mut map: ResMut<Map>,
-    mut run: ResMut<Run>,
-) {
+fn clear_level(mut commands: Commands, old: Query<Entity, With<InLevel>>, mut map: ResMut<Map>, mut run: ResMut<Run>) {
     old.iter().for_each(|entity| commands.entity(entity).despawn());
     *map = Map::default();
     *run = Run { gems: 0, time: TIME_LIMIT };

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use KeyCode::{ArrowLeft, ArrowRight, Space};
 use bevy::prelude::*;
-use game::{Hero, Level, Map, Screen, Run};
+use game::{Hero, Level, Map, Run, Screen};
 use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
 
 fn main() -> ExitCode {
@@ -20,9 +20,8 @@ fn main() -> ExitCode {
         .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>| level.0 = seed.0)
         .ready(in_state(Screen::Playing))
         .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
-            let next = map.columns[(hero.0.translation.x + 0.8) as usize];
-            let same = !next.spikes && f32::from(next.ground) == hero.0.translation.y.floor();
-            2 + u32::from(!same || hero.1.velocity.y > 0.0)
+            let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
+            2 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
         });
     playbot_cli::main(&[&gem_hop])
 }
