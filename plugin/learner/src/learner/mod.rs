@@ -2,8 +2,8 @@
 
 mod base;
 mod checkpoint;
-mod learner;
+mod learner_trait;
 
 pub use base::LearnerBase;
 pub(crate) use checkpoint::Checkpoint;
-pub use learner::{Learner, LearnerMetrics};
+pub use learner_trait::{Learner, LearnerMetrics};

@@ -92,10 +92,10 @@ pub fn window_places(size: usize, kernel: usize, stride: usize, padding: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use burn::tensor::TensorData;
     use crate::DeviceKind;
     use crate::nn::{host, vector};
     use crate::rng::Streams;
+    use burn::tensor::TensorData;
 
     #[test]
     fn a_convolution_by_hand() {

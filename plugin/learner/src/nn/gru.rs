@@ -209,8 +209,7 @@ mod tests {
         };
         let input = cube(STEPS * BATCH, 3 * hidden).autodiff().require_grad();
         let initial = cube(BATCH, hidden).autodiff().require_grad();
-        let probe =
-            matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
+        let probe = matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
         layer = tracked(&layer);
         let GruLayer { weight_hh, bias_ih, bias_hh, .. } = layer.layers[0].clone();
         let output = scan(input.clone(), weight_hh, bias_ih, bias_hh, initial.clone());

@@ -2,8 +2,8 @@
 
 mod card;
 mod examples;
+mod file;
 mod header;
-mod policy_file;
 
 pub use card::PolicyCard;
-pub use policy_file::PolicyFile;
+pub use file::PolicyFile;

@@ -4,7 +4,7 @@ use super::Rollout;
 use crate::{LearnError, PolicySpec};
 
 impl Rollout {
-    /// `Ok` if all lengths fit T and B, and [`EndStates::cut_rows`] ascend and are rows of this rollout.
+    /// `Ok` if all lengths fit T and B, and [`EndStates::cut_rows`](super::EndStates::cut_rows) ascend and are rows of this rollout.
     ///
     /// # Errors
     /// [`LearnError::Shape`] names the first length that does not; [`LearnError::Config`] names a row.

@@ -4,9 +4,9 @@ mod bootstrap;
 mod check;
 mod ends;
 mod join;
-mod rollout;
+mod steps;
 #[cfg(test)]
 mod tests;
 
 pub use ends::EndStates;
-pub use rollout::{Rollout, RolloutStep};
+pub use steps::{Rollout, RolloutStep};

@@ -120,6 +120,15 @@ fn a_file_of_a_newer_version_or_another_kind_says_so() {
 }
 
 #[test]
+fn an_entry_that_this_version_does_not_know_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (path, load, _) in files(folder.path()) {
+        let error = after(&path, load, |c| c.description = c.description.replacen('{', r#"{"colour":"red","#, 1));
+        assert!(error.to_string().contains("unknown field `colour`"), "{error}");
+    }
+}
+
+#[test]
 fn a_skill_model_from_before_there_were_images_is_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("skill");

@@ -3,8 +3,8 @@
 use playbot_learner::nn::CnnKind;
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
 use playbot_learner::{
-    ActionInput, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, ObsKind,
-    SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, WindowRule,
+    ActionInput, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, ObsKind, SacConfig,
+    SacLearner, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, WindowRule,
 };
 use std::ops::ControlFlow;
 use std::path::Path;

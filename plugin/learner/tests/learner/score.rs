@@ -43,7 +43,7 @@ fn the_first_policy_is_the_decoder_exactly() {
     }
 }
 
-/// After one update with a given weight of the penalty: the unweighted divergence of the last update's rows.
+/// The unweighted divergence in the last of five updates with a given weight of the penalty.
 fn divergence(model: &SkillModel, kl_coef: f64) -> f32 {
     let score = ScoreConfig { kl_coef, ..ScoreConfig::default() };
     let mut learner = learner(corridor::config(), score, model);
@@ -53,8 +53,9 @@ fn divergence(model: &SkillModel, kl_coef: f64) -> f32 {
         let rollout = driver.rollout(&learner, 32);
         let metrics = learner.update(&rollout).expect("finite");
         last = metrics.decoder_kl.expect("penalised");
-        let alpha = metrics.confidence.expect("penalised");
-        assert!((0.0..=1.0).contains(&alpha), "a probability, not {alpha}");
+        // The mean probability of a draw is Σ p², at least 1/3 for three choices; players waver, so it is not 1.
+        let confidence = metrics.confidence.expect("penalised");
+        assert!((0.32..0.95).contains(&confidence), "{confidence}");
     }
     let (z, obs) = inputs(16);
     assert!(learner.initial_kl(&z, (&obs).into(), 16).expect("updated") > Some(0.0));

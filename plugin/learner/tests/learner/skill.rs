@@ -3,8 +3,8 @@
 use crate::toy::{Corridor, OBS, SPACE};
 use playbot_learner::rng::{Streams, normal, unit};
 use playbot_learner::{
-    Action, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, SkillConfig, SkillDraw,
-    SkillMetrics, SkillModel, SkillTrainer,
+    Action, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, SkillConfig, SkillDraw, SkillMetrics,
+    SkillModel, SkillTrainer,
 };
 use std::ops::ControlFlow;
 

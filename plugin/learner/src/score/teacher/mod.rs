@@ -2,9 +2,9 @@
 
 mod batch;
 mod checkpoint;
+mod frozen;
 mod initial_kl;
-mod teacher;
 
 pub use batch::TeacherBatch;
 pub(crate) use batch::TeacherOutput;
-pub(crate) use teacher::Teacher;
+pub(crate) use frozen::Teacher;
