@@ -34,6 +34,11 @@ impl Action {
     }
 }
 
+/// Whether nothing can be done in this space.
+pub fn has_no_actions(space: &ActionSpace) -> bool {
+    matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
+}
+
 /// Why an action does not belong to its space, or `None` if it does.
 pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     match (action, space) {
@@ -54,7 +59,7 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
 
 /// Reports actions that do not belong to their agent's space, with agent and tick, and stops those agents: a game need
 /// not be able to bear what its agents cannot do.
-pub(crate) fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
+pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
     for (agent, action, episode, mut control) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;

@@ -31,7 +31,7 @@
 //!
 //! ```
 //! use bevy::prelude::*;
-//! use bevy_playbot::prelude::*;
+//! use crate::prelude::*;
 //!
 //! #[derive(Component, Default)]
 //! struct Position(i32);
@@ -86,33 +86,29 @@ pub mod camera;
 pub mod control;
 pub mod demo;
 pub mod episode;
-pub mod eval;
 pub mod fault;
-pub mod floor_plan;
-pub mod game;
 pub mod headless;
-pub mod held_out;
-pub mod input_map;
+pub mod headless_plugins;
+pub mod key_bindings;
 pub mod keyboard;
+mod known_plugins;
 pub mod level;
-pub mod mode;
 pub mod observation;
+pub mod panics;
+pub mod placement;
 pub mod plugin;
 pub mod policy;
 pub mod policy_file;
 pub mod prelude;
 pub mod raster;
-pub mod report;
 pub mod reward;
-pub mod runs;
 pub mod skill_prior;
-pub mod split;
-pub mod stage_clock;
 pub mod state_hash;
+pub mod system_errors;
 pub mod systems;
 pub mod test_app;
-pub mod train;
+pub mod unknown_name;
+pub mod virtual_input;
 pub mod vision;
 
-pub use playbot_learner as learner;
 pub use plugin::PlaybotPlugin;

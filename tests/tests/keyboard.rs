@@ -11,8 +11,8 @@ use bevy::{
 use bevy_playbot::{
     headless::{Tick, set_fixed_step},
     keyboard::KeyboardPlugin,
-    prelude::*,
 };
+use playbot_lab::prelude::*;
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 
 /// Actions of the corridor.
@@ -27,7 +27,7 @@ fn corridor(frames: u32) -> (App, Entity) {
     let keys = KeyAxis::new([KeyCode::ArrowLeft], [KeyCode::ArrowRight]);
     let action = |at: &[i8]| ActionValue::Discrete([0, STAY, 1][(at[0] + 1) as usize]);
     let agent = spawn_walker(app.world_mut(), 0);
-    app.world_mut().entity_mut(agent).insert((Control::Human, InputMap::new([keys], action, "arrow keys")));
+    app.world_mut().entity_mut(agent).insert((Control::Human, KeyBindings::new([keys], action, "arrow keys")));
     // The first frame only starts the clock.
     app.update();
     (app, agent)

@@ -1,7 +1,8 @@
 //! People: keys say which way, and the walker walks.
 
 use bevy::prelude::*;
-use bevy_playbot::{agent::AgentOrder, fault::Faults, prelude::*};
+use bevy_playbot::{agent::AgentOrder, fault::Faults};
+use playbot_lab::prelude::*;
 
 use super::{
     pilot::{Pilot, PilotInput},
@@ -18,10 +19,10 @@ const UP: Keys = [KeyCode::ArrowUp, KeyCode::KeyW];
 
 /// What the keyboard does. No person can turn eight hinges at once, so an action cannot come from the keys alone: the
 /// keys of this map do nothing, and [`steer`] writes the action.
-pub fn input_map() -> InputMap {
+pub fn key_bindings() -> KeyBindings {
     let help =
         "arrow keys or W, A, S and D tell the ant's walker where to go; without a key the ant lets go of its legs";
-    InputMap::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; JOINTS]), help)
+    KeyBindings::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; JOINTS]), help)
 }
 
 /// Something that holds an agent's ant.
@@ -35,7 +36,7 @@ pub trait HoldsAnt: Component {
 pub fn steer<C: HoldsAnt>(
     keys: Res<ButtonInput<KeyCode>>,
     order: Res<AgentOrder>,
-    mut ants: Query<(&Control, &Episode, &C, &mut Action), With<InputMap>>,
+    mut ants: Query<(&Control, &Episode, &C, &mut Action), With<KeyBindings>>,
     mut faults: ResMut<Faults>,
     mut input: Local<PilotInput>,
 ) {

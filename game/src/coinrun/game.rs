@@ -3,7 +3,13 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{floor_plan::FloorPlan, prelude::*, vision::Picture};
+use bevy_playbot::vision::{ObservationKind, Picture};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView},
+};
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
@@ -12,7 +18,7 @@ use super::{
     picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
     rules::ACTIONS,
-    view,
+    show_level, view,
 };
 
 /// CoinRun under its name `coinrun`.
@@ -73,12 +79,12 @@ impl Game for CoinRun {
         names.map(str::to_owned).into_iter().chain(unused).collect()
     }
 
-    fn input_map(&self) -> Option<InputMap> {
+    fn key_bindings(&self) -> Option<KeyBindings> {
         let sideways = KeyAxis::new([KeyCode::ArrowLeft, KeyCode::KeyA], [KeyCode::ArrowRight, KeyCode::KeyD]);
         let upwards =
             KeyAxis::new([KeyCode::ArrowDown, KeyCode::KeyS], [KeyCode::ArrowUp, KeyCode::KeyW, KeyCode::Space]);
         let help = "arrow keys or A, D and S run and drop, Up, W or Space jumps";
-        Some(InputMap::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
+        Some(KeyBindings::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -121,5 +127,36 @@ impl Game for CoinRun {
 
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+
+    fn experiment(&self) -> Option<(&'static str, &'static str)> {
+        Some(("assets/experiments/coinrun.ron", include_str!("../../../assets/experiments/coinrun.ron")))
+    }
+
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        let mut all = vec![
+            Benchmark::simulate("vector", "hard"),
+            Benchmark::simulate("physics", "hard").of(&CoinRun { physics: true }),
+            Benchmark::simulate("raster", "hard").seeing(ObservationKind::Raster),
+            Benchmark::train("vector", "hard"),
+            Benchmark::train("raster", "hard").seeing(ObservationKind::Raster),
+        ];
+        if cfg!(feature = "camera") {
+            all.push(Benchmark::simulate("camera", "hard").seeing(ObservationKind::Camera));
+        }
+        all
+    }
+
+    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        show_level::show(self, request)
+    }
+
+    fn trace_columns(&self) -> Vec<String> {
+        ["x", "y", "vx", "vy"].map(str::to_owned).to_vec()
+    }
+
+    fn trace_row(&self, world: &World, agent: Entity) -> Vec<f32> {
+        let body = world.get::<PlayerBody>(agent).map(|body| body.0).unwrap_or_default();
+        vec![body.x, body.y, body.vx, body.vy]
     }
 }

@@ -76,7 +76,7 @@ pub fn demo_actions(space: &ActionSpace) -> DemoActions {
     }
 }
 
-fn decider(control: Control) -> Decider {
+pub(crate) fn decider(control: Control) -> Decider {
     match control {
         Control::Human => Decider::Human,
         Control::Bot => Decider::Bot,
@@ -86,7 +86,7 @@ fn decider(control: Control) -> Decider {
     }
 }
 
-fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
+pub(crate) fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
     match (actions, action) {
         (EpisodeActions::Discrete(list), ActionValue::Discrete(index)) => list.push(*index),
         (EpisodeActions::Continuous { values, .. }, ActionValue::Continuous(row)) => values.extend_from_slice(row),
@@ -96,7 +96,8 @@ fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
 }
 
 /// Appends this tick to each recorded agent's episode; an ended episode goes to disk.
-pub(crate) fn record_ticks(
+#[doc(hidden)]
+pub fn record_ticks(
     recorder: Option<ResMut<Recorder>>,
     order: Res<AgentOrder>,
     mut agents: Query<(&Agent, &Control, &Action, &Reward, &StateHash, &Observation, &Episode, &mut Recording)>,

@@ -6,6 +6,7 @@ include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
 use std::process::ExitCode;
 
+use bevy_playbot::prelude::EpisodeEnd;
 use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
 
 fn main() -> ExitCode {
@@ -13,8 +14,7 @@ fn main() -> ExitCode {
         .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])
         .observe(["x", "y", "vx", "vy", "paddle"], see)
         .reward_delta(|score: Res<Score>| **score as f32)
-        .won(|bricks: Query<&Brick>| bricks.is_empty())
-        .lost(|ball: Single<&Transform, With<Ball>>| ball.translation.y < -250.0)
+        .end(|ball: Single<&Transform, With<Ball>>| (ball.translation.y < -250.0).then_some(EpisodeEnd::LOST))
         .time_limit(3840)
         .restart(Restart::Startup)
         .level(aim)

@@ -1,0 +1,141 @@
+//! What can be held down.
+
+use std::{fmt, str::FromStr};
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::names::{unit_names, unit_variant};
+use crate::unknown_name::nearest;
+
+/// A key, a mouse button or a gamepad button.
+///
+/// In text, keys have Bevy's names (`ArrowLeft`, `KeyW`, `Space`), and the others say where they are: `MouseLeft`,
+/// `GamepadSouth`.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_playbot::virtual_input::VirtualButton;
+///
+/// assert_eq!("ArrowLeft".parse(), Ok(VirtualButton::Key(KeyCode::ArrowLeft)));
+/// assert_eq!(VirtualButton::from(MouseButton::Left).to_string(), "MouseLeft");
+/// let error = "ArowLeft".parse::<VirtualButton>().expect_err("no such key");
+/// assert!(error.to_string().contains("did you mean `ArrowLeft`?"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Reflect)]
+#[serde(try_from = "String", into = "String")]
+pub enum VirtualButton {
+    /// A key of the keyboard, by its place.
+    Key(KeyCode),
+    /// A button of the mouse.
+    Mouse(MouseButton),
+    /// A button of the agent's own gamepad.
+    Gamepad(GamepadButton),
+}
+
+/// The text names no key or button.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[error(
+    "unknown key or button `{name}`{}; keys have Bevy's names, such as `ArrowLeft`, `KeyW` or `Space`, and others say \
+     where they are: `MouseLeft`, `GamepadSouth`",
+    .near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+)]
+pub struct UnknownInput {
+    /// The name that was given.
+    pub name: String,
+    /// The valid name nearest to it.
+    pub near: Option<String>,
+}
+
+const MOUSE: &str = "Mouse";
+const GAMEPAD: &str = "Gamepad";
+
+impl fmt::Display for VirtualButton {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Key(key) => write!(f, "{key:?}"),
+            Self::Mouse(button) => write!(f, "{MOUSE}{button:?}"),
+            Self::Gamepad(button) => write!(f, "{GAMEPAD}{button:?}"),
+        }
+    }
+}
+
+impl FromStr for VirtualButton {
+    type Err = UnknownInput;
+
+    fn from_str(name: &str) -> Result<Self, UnknownInput> {
+        let mouse = || unit_variant(name.strip_prefix(MOUSE)?).map(Self::Mouse);
+        let gamepad = || unit_variant(name.strip_prefix(GAMEPAD)?).map(Self::Gamepad);
+        let found = unit_variant(name).map(Self::Key).or_else(mouse).or_else(gamepad);
+        found.ok_or_else(|| {
+            let all = all_names();
+            let all: Vec<&str> = all.iter().map(String::as_str).collect();
+            UnknownInput { name: name.to_owned(), near: nearest(name, &all).map(str::to_owned) }
+        })
+    }
+}
+
+/// Names of all keys and buttons.
+fn all_names() -> Vec<String> {
+    let with = |place: &'static str, names: Vec<&'static str>| names.into_iter().map(move |n| format!("{place}{n}"));
+    with("", unit_names::<KeyCode>())
+        .chain(with(MOUSE, unit_names::<MouseButton>()))
+        .chain(with(GAMEPAD, unit_names::<GamepadButton>()))
+        .collect()
+}
+
+impl From<KeyCode> for VirtualButton {
+    fn from(key: KeyCode) -> Self {
+        Self::Key(key)
+    }
+}
+
+impl From<MouseButton> for VirtualButton {
+    fn from(button: MouseButton) -> Self {
+        Self::Mouse(button)
+    }
+}
+
+impl From<GamepadButton> for VirtualButton {
+    fn from(button: GamepadButton) -> Self {
+        Self::Gamepad(button)
+    }
+}
+
+impl TryFrom<String> for VirtualButton {
+    type Error = UnknownInput;
+
+    fn try_from(name: String) -> Result<Self, UnknownInput> {
+        name.parse()
+    }
+}
+
+impl From<VirtualButton> for String {
+    fn from(button: VirtualButton) -> Self {
+        button.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_reads_back() {
+        for name in all_names() {
+            assert_eq!(name.parse::<VirtualButton>().expect("a button").to_string(), name);
+        }
+    }
+
+    #[test]
+    fn a_name_that_does_not_exist_is_told_the_nearest_one() {
+        for (wrong, near) in [("arrowleft", "ArrowLeft"), ("Keyw", "KeyW"), ("MouseLeff", "MouseLeft")] {
+            let error = wrong.parse::<VirtualButton>().expect_err("no such name");
+            assert_eq!(error.near.as_deref(), Some(near), "{error}");
+        }
+        assert_eq!("§".parse::<VirtualButton>().expect_err("no such name").near, None);
+        let error = ron::from_str::<VirtualButton>("\"GamepadSauth\"").expect_err("no such name").to_string();
+        assert!(error.contains("did you mean `GamepadSouth`?"), "{error}");
+    }
+}

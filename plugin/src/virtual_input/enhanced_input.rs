@@ -1,0 +1,172 @@
+//! Actions of `bevy_enhanced_input`, driven without any key.
+//!
+//! A [`VirtualInput`](super::VirtualInput) drives them through their bindings, and needs none of this. Use it where actions
+//! have no bindings that a bot can press, or where conditions such as `Hold` are not to be played out.
+
+use std::{marker::PhantomData, sync::Arc};
+
+use bevy::prelude::*;
+use bevy_enhanced_input::prelude::{
+    Action as InputActionOf, ActionMock, ActionValue as InputValue, EnhancedInputSystems, InputAction, MockSpan,
+    TriggerState,
+};
+
+use super::{claims::is_virtual, plugin::InputRoute};
+use crate::{
+    action::{Action, ActionValue},
+    agent::Agent,
+    control::Control,
+    episode::{Episode, EpisodeEnded, StartEpisode},
+    fault::Faults,
+    systems::PlaybotSystems,
+};
+
+/// On an agent: what its action means for the input action `A` of the game.
+///
+/// The input action is the entity that [`on_entity`](Self::on_entity) names, or else the only one in the World. A value of
+/// zero, or `false`, does not fire. People keep their bindings: under `Human` and `Idle` nothing is touched.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_enhanced_input::prelude::*;
+/// use bevy_playbot::virtual_input::enhanced_input::EnhancedAction;
+///
+/// #[derive(InputAction)]
+/// #[action_output(Vec2)]
+/// struct Walk;
+///
+/// // Actions 0 to 2: stand, left, right.
+/// let walk = EnhancedAction::<Walk>::per_action([Vec2::ZERO, Vec2::NEG_X, Vec2::X]);
+/// # let _ = walk;
+/// ```
+#[derive(Component)]
+pub struct EnhancedAction<A: InputAction> {
+    value: Arc<dyn Fn(&ActionValue) -> InputValue + Send + Sync>,
+    target: Option<Entity>,
+    is_mocked: bool,
+    marker: PhantomData<fn() -> A>,
+}
+
+impl<A: InputAction> EnhancedAction<A> {
+    /// Any rule from the agent's action to the value of the input action.
+    pub fn new<V: Into<InputValue>>(value: impl Fn(&ActionValue) -> V + Send + Sync + 'static) -> Self {
+        let value = Arc::new(move |action: &ActionValue| value(action).into());
+        Self { value, target: None, is_mocked: false, marker: PhantomData }
+    }
+
+    /// One value for each discrete action.
+    ///
+    /// The first one stands in for actions that have none; there must be one value at least, or nothing ever fires.
+    pub fn per_action<V: Into<InputValue>>(values: impl IntoIterator<Item = V>) -> Self {
+        let values: Vec<InputValue> = values.into_iter().map(Into::into).collect();
+        Self::new(move |action| {
+            let index = match action {
+                ActionValue::Discrete(index) => *index as usize,
+                ActionValue::Continuous(_) => 0,
+            };
+            values.get(index).or(values.first()).copied().unwrap_or(InputValue::Bool(false))
+        })
+    }
+
+    /// Names the entity of the input action.
+    pub fn on_entity(mut self, entity: Entity) -> Self {
+        self.target = Some(entity);
+        self
+    }
+}
+
+/// Drives the input action `A` of agents with an [`EnhancedAction`], in ticks that are frames or fixed, as the route says.
+///
+/// The game's context has to be evaluated in the same schedule as the tick: `PreUpdate` for frames, which is the default,
+/// and `add_input_context_to::<FixedPreUpdate, _>()` for fixed ticks.
+#[derive(Clone, Copy, Debug)]
+pub struct EnhancedActionPlugin<A> {
+    /// As that of [`VirtualInputPlugin`](super::VirtualInputPlugin).
+    pub route: InputRoute,
+    marker: PhantomData<fn() -> A>,
+}
+
+impl<A> EnhancedActionPlugin<A> {
+    /// The plugin for this route.
+    pub fn new(route: InputRoute) -> Self {
+        Self { route, marker: PhantomData }
+    }
+}
+
+impl<A> Default for EnhancedActionPlugin<A> {
+    fn default() -> Self {
+        Self::new(InputRoute::default())
+    }
+}
+
+impl<A: InputAction> Plugin for EnhancedActionPlugin<A> {
+    fn build(&self, app: &mut App) {
+        let system = drive::<A>.in_set(PlaybotSystems::Act).before(EnhancedInputSystems::Update);
+        match self.route {
+            InputRoute::Messages => app.add_systems(PreUpdate, system),
+            InputRoute::Direct => app.add_systems(FixedPreUpdate, system),
+        };
+        app.add_observer(|event: On<StartEpisode>, agents: Agents<A>, mocks: Mocks<A>| {
+            let_go(event.entity, agents, mocks);
+        })
+        .add_observer(|event: On<EpisodeEnded>, agents: Agents<A>, mocks: Mocks<A>| {
+            let_go(event.entity, agents, mocks);
+        });
+    }
+}
+
+type Agents<'w, 's, A> = Query<
+    'w,
+    's,
+    (&'static Agent, &'static Action, &'static Control, &'static Episode, &'static mut EnhancedAction<A>),
+>;
+type Mocks<'w, 's, A> =
+    Query<'w, 's, (Entity, &'static mut ActionMock, &'static mut TriggerState), With<InputActionOf<A>>>;
+
+/// The entity of the input action that an agent drives.
+fn action_of<A: InputAction>(target: Option<Entity>, mocks: &Mocks<A>) -> Option<Entity> {
+    match target {
+        Some(entity) => Some(entity).filter(|entity| mocks.contains(*entity)),
+        None => mocks.single().ok().map(|(entity, ..)| entity),
+    }
+}
+
+fn drive<A: InputAction>(mut agents: Agents<A>, mut mocks: Mocks<A>, mut faults: ResMut<Faults>) {
+    for (agent, action, control, episode, mut driven) in &mut agents {
+        let is_played = is_virtual(*control) && episode.is_running();
+        if !is_played && !driven.is_mocked {
+            continue;
+        }
+        let found = action_of(driven.target, &mocks);
+        let Some((_, mut mock, _)) = found.and_then(|entity| mocks.get_mut(entity).ok()) else {
+            faults.report(format!(
+                "agent {}: there is not exactly one `Action<{}>` in the World: name its entity with \
+                 `EnhancedAction::on_entity`",
+                agent.index,
+                ShortName::of::<A>()
+            ));
+            continue;
+        };
+        driven.is_mocked = is_played;
+        if !is_played {
+            mock.enabled = false;
+            continue;
+        }
+        let value = (driven.value)(&action.0);
+        let state = if value.as_bool() { TriggerState::Fired } else { TriggerState::None };
+        *mock = ActionMock::new(state, value, MockSpan::Manual);
+    }
+}
+
+/// An episode begins with nothing fired, whatever came before it.
+fn let_go<A: InputAction>(agent: Entity, mut agents: Agents<A>, mut mocks: Mocks<A>) {
+    let Ok((.., mut driven)) = agents.get_mut(agent) else { return };
+    if !std::mem::take(&mut driven.is_mocked) {
+        return;
+    }
+    let found = action_of(driven.target, &mocks);
+    if let Some((_, mut mock, mut state)) = found.and_then(|entity| mocks.get_mut(entity).ok()) {
+        mock.enabled = false;
+        *state = TriggerState::None;
+    }
+}

@@ -1,0 +1,145 @@
+//! Bevy's own state of keys, mouse and gamepads.
+
+use std::hash::Hash;
+
+use bevy::{
+    ecs::system::SystemParam,
+    input::{
+        keyboard::Key,
+        mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll},
+    },
+    prelude::*,
+};
+
+use super::{axis::VirtualAxis, button::VirtualButton, logical_key::logical_key};
+
+/// A gamepad's trigger counts as pressed above the first value, and as released below the second: Bevy's own defaults.
+const TRIGGER: (f32, f32) = (0.75, 0.65);
+
+/// A button on its device: which gamepad, if it is a gamepad's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
+pub(super) struct Line {
+    pub button: VirtualButton,
+    pub pad: Option<Entity>,
+}
+
+/// What is done to a button.
+#[derive(Clone, Copy)]
+pub(super) enum Touch {
+    Press,
+    Release,
+    /// Up, as if it had never been pressed.
+    Reset,
+    /// Neither just pressed nor just released.
+    Settle,
+    /// Just pressed, just released, or both, whatever it is now.
+    Flag {
+        pressed: bool,
+        released: bool,
+    },
+}
+
+/// What games read.
+#[derive(SystemParam)]
+pub(super) struct InputState<'w, 's> {
+    keys: ResMut<'w, ButtonInput<KeyCode>>,
+    logical: ResMut<'w, ButtonInput<Key>>,
+    mouse: ResMut<'w, ButtonInput<MouseButton>>,
+    pub motion: ResMut<'w, AccumulatedMouseMotion>,
+    pub scroll: ResMut<'w, AccumulatedMouseScroll>,
+    pads: Query<'w, 's, &'static mut Gamepad>,
+}
+
+impl InputState<'_, '_> {
+    /// Whether the game sees it down.
+    pub fn is_down(&self, line: Line) -> bool {
+        match line.button {
+            VirtualButton::Key(key) => self.keys.pressed(key),
+            VirtualButton::Mouse(button) => self.mouse.pressed(button),
+            VirtualButton::Gamepad(button) => {
+                line.pad.and_then(|pad| self.pads.get(pad).ok()).is_some_and(|pad| pad.pressed(button))
+            }
+        }
+    }
+
+    /// Whether this entity is a gamepad that is connected.
+    pub fn is_connected(&self, pad: Entity) -> bool {
+        self.pads.contains(pad)
+    }
+
+    pub fn touch(&mut self, line: Line, touch: Touch) {
+        match line.button {
+            VirtualButton::Key(key) => {
+                apply(&mut self.keys, key, touch);
+                apply(&mut self.logical, logical_key(key).0, touch);
+            }
+            VirtualButton::Mouse(button) => apply(&mut self.mouse, button, touch),
+            VirtualButton::Gamepad(button) => {
+                let Some(mut pad) = line.pad.and_then(|pad| self.pads.get_mut(pad).ok()) else { return };
+                apply(pad.digital_mut(), button, touch);
+                match touch {
+                    Touch::Press => {
+                        pad.analog_mut().set(button, 1.0);
+                    }
+                    Touch::Release | Touch::Reset => {
+                        pad.analog_mut().set(button, 0.0);
+                    }
+                    Touch::Settle | Touch::Flag { .. } => {}
+                }
+            }
+        }
+    }
+
+    /// Sets a stick or trigger of a gamepad. Returns the trigger as a button if that went down or up.
+    pub fn set_axis(&mut self, pad: Entity, axis: VirtualAxis, value: f32) -> Option<(Line, bool)> {
+        let mut gamepad = self.pads.get_mut(pad).ok()?;
+        match axis {
+            VirtualAxis::Stick(axis) => {
+                gamepad.analog_mut().set(axis, value);
+            }
+            VirtualAxis::Trigger(button) => {
+                gamepad.analog_mut().set(button, value);
+                let was_down = gamepad.pressed(button);
+                let line = Line { button: VirtualButton::Gamepad(button), pad: Some(pad) };
+                if !was_down && value >= TRIGGER.0 {
+                    gamepad.digital_mut().press(button);
+                    return Some((line, true));
+                }
+                if was_down && value <= TRIGGER.1 {
+                    gamepad.digital_mut().release(button);
+                    return Some((line, false));
+                }
+            }
+            _ => {}
+        }
+        None
+    }
+}
+
+fn apply<T: Clone + Eq + Hash + Send + Sync + 'static>(input: &mut ButtonInput<T>, button: T, touch: Touch) {
+    match touch {
+        Touch::Press => input.press(button),
+        Touch::Release => input.release(button),
+        Touch::Reset => input.reset(button),
+        Touch::Settle => {
+            input.clear_just_pressed(button.clone());
+            input.clear_just_released(button);
+        }
+        Touch::Flag { pressed, released } => {
+            // There is no other way to set the two marks than by moving the button there and back.
+            if input.pressed(button.clone()) {
+                input.release(button.clone());
+                input.press(button.clone());
+            } else {
+                input.press(button.clone());
+                input.release(button.clone());
+            }
+            if !pressed {
+                input.clear_just_pressed(button.clone());
+            }
+            if !released {
+                input.clear_just_released(button);
+            }
+        }
+    }
+}

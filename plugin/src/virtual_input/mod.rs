@@ -1,0 +1,66 @@
+//! Virtual input: an agent's action presses keys, mouse buttons and gamepads, through Bevy's own input.
+//!
+//! A game that reads `ButtonInput<KeyCode>`, mouse, gamepad or an input manager needs no change to be played by a bot. Its
+//! agent carries a [`VirtualInput`]: what is held down while each action lasts. In
+//! [`PlaybotSystems::Act`](crate::systems::PlaybotSystems::Act) the plugin presses what the action of this tick newly
+//! wants, goes on holding what it still wants, and lets go of the rest, as a person would.
+//!
+//! - It plays for [`Control::Policy`](crate::control::Control::Policy), [`Bot`](crate::control::Control::Bot) and
+//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is let go.
+//! - Everything is let go at the end of an episode and at the start of the next, so that an episode begins with nothing
+//!   held, whatever came before it, and replays the same alone.
+//! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has a
+//!   gamepad of its own.
+//! - The route is a setting: see [`InputRoute`].
+//! - With the features `leafwing-input-manager` and `bevy_enhanced_input`, actions of these input managers can also be
+//!   driven without any key. Keys drive them without these features.
+//!
+//! ```
+//! use bevy::{input::InputPlugin, prelude::*};
+//! use bevy_playbot::{prelude::*, virtual_input::{VirtualInput, VirtualInputPlugin}};
+//!
+//! /// A game that knows nothing of agents.
+//! fn walk(keys: Res<ButtonInput<KeyCode>>, mut player: Single<&mut Transform, With<Agent>>) {
+//!     if keys.pressed(KeyCode::ArrowRight) {
+//!         player.translation.x += 1.0;
+//!     }
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_plugins((InputPlugin, VirtualInputPlugin::default())).add_systems(FixedUpdate, walk);
+//! let input = VirtualInput::keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]]);
+//! let bot = BlindBot::Constant(ActionValue::Discrete(2));
+//! let agent = (Agent::new(0, input.space()), input, Control::Bot, bot, Transform::default());
+//! let agent = app.world_mut().spawn(agent).id();
+//! app.ticks(3).expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Transform>(agent).expect("spawned with it").translation.x, 3.0);
+//! ```
+
+mod act;
+mod action_axis;
+mod axis;
+mod button;
+mod claims;
+mod component;
+mod devices;
+mod direct;
+#[cfg(feature = "bevy_enhanced_input")]
+pub mod enhanced_input;
+mod gamepad;
+mod held;
+mod input_state;
+#[cfg(feature = "leafwing-input-manager")]
+pub mod leafwing;
+mod logical_key;
+mod messages;
+mod names;
+mod plugin;
+
+pub use action_axis::ActionAxis;
+pub use axis::VirtualAxis;
+pub use button::{UnknownInput, VirtualButton};
+pub use component::VirtualInput;
+pub use devices::VirtualDevices;
+pub use gamepad::VirtualGamepad;
+pub use held::HeldInput;
+pub use plugin::{InputRoute, VirtualInputPlugin};
