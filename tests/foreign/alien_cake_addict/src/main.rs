@@ -7,8 +7,10 @@ include!(concat!(env!("OUT_DIR"), "/game.rs"));
 use std::process::ExitCode;
 
 use KeyCode::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp};
-use bevy_playbot::prelude::EpisodeEnd;
-use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
 
 fn main() -> ExitCode {
     // The game's own way to the same board every time.

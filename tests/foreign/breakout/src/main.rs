@@ -6,8 +6,10 @@ include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
 use std::process::ExitCode;
 
-use bevy_playbot::prelude::EpisodeEnd;
-use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
 
 fn main() -> ExitCode {
     let breakout = ForeignGame::new("breakout", 1, game)
