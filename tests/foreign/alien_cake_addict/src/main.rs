@@ -7,7 +7,10 @@ include!(concat!(env!("OUT_DIR"), "/game.rs"));
 use std::process::ExitCode;
 
 use KeyCode::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp};
-use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
 
 fn main() -> ExitCode {
     // The game's own way to the same board every time.
@@ -20,7 +23,7 @@ fn main() -> ExitCode {
             [at.i, at.j, cake.i, cake.j, usize::from(cake.entity.is_some())].map(|it| it as f32 / 10.0)
         })
         .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
-        .lost(in_state(GameState::GameOver))
+        .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
         .time_limit(1200)
         .restart(Restart::state(GameState::Playing))
         .level(refresh)

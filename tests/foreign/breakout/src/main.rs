@@ -6,15 +6,17 @@ include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
 use std::process::ExitCode;
 
-use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
 
 fn main() -> ExitCode {
     let breakout = ForeignGame::new("breakout", 1, game)
         .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])
         .observe(["x", "y", "vx", "vy", "paddle"], see)
         .reward_delta(|score: Res<Score>| **score as f32)
-        .won(|bricks: Query<&Brick>| bricks.is_empty())
-        .lost(|ball: Single<&Transform, With<Ball>>| ball.translation.y < -250.0)
+        .end(|ball: Single<&Transform, With<Ball>>| (ball.translation.y < -250.0).then_some(EpisodeEnd::LOST))
         .time_limit(3840)
         .restart(Restart::Startup)
         .level(aim)

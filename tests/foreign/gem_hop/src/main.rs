@@ -4,18 +4,23 @@ mod game;
 
 use std::process::ExitCode;
 
+use EpisodeEnd::Terminated;
 use KeyCode::{ArrowLeft, ArrowRight, Space};
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Run, Screen};
-use playbot_lab::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
 
 fn main() -> ExitCode {
     let gem_hop = ForeignGame::new("gem_hop", 1, game::game)
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe((0..29).map(|index| index.to_string()), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
-        .won(in_state(Screen::Won))
-        .lost(in_state(Screen::Lost))
+        .end(|screen: Res<State<Screen>>| {
+            matches!(**screen, Screen::Won | Screen::Lost).then(|| Terminated { success: *screen == Screen::Won })
+        })
         .restart(Restart::state(Screen::Loading))
         .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>| level.0 = seed.0)
         .ready(in_state(Screen::Playing))
