@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use crate::{
     action, agent, bot, demo, episode,
     fault::Faults,
-    headless, observation, policy, reward, skill_prior, stage_clock,
+    headless, observation, policy, reward, skill_prior,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -32,7 +32,6 @@ impl Plugin for PlaybotPlugin {
             );
         add_decision_systems(app);
         add_outcome_systems(app);
-        stage_clock::add_readings(app);
     }
 }
 

@@ -10,7 +10,6 @@ pub use crate::{
         replay::Replay,
     },
     episode::{Episode, EpisodeCount, EpisodeEnd, EpisodeEnded, StartEpisode},
-    game::Game,
     headless::{PlaybotAppExt, headless_app},
     input_map::{InputMap, KeyAxis},
     level::{LevelQueue, LevelSource},
@@ -19,7 +18,6 @@ pub use crate::{
     policy::{ActionDraw, ActivePolicy, PlaybotSeed},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior},
-    split::LevelSplit,
     state_hash::StateHash,
     systems::{ObserveSchedule, PlaybotSystems},
 };

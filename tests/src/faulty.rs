@@ -8,7 +8,7 @@ use std::{
 };
 
 use bevy::{prelude::*, time::Real};
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 /// What is wrong with a copy of the game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

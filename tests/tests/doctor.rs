@@ -1,10 +1,10 @@
 //! The doctor finds each planted fault and names it, and finds nothing in healthy games.
 
-use bevy_playbot::{
+use playbot_games::registry;
+use playbot_lab::{
     doctor::{CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, examine},
     game::Game,
 };
-use playbot_games::registry;
 use playbot_tests::{Corridor, faulty::Fault};
 
 fn examined(game: &dyn Game, ticks: u32, ignored: &[&str]) -> DoctorReport {
