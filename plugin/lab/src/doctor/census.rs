@@ -10,7 +10,6 @@ use bevy_playbot::agent::Agent;
 
 use super::types::TypeBook;
 
-
 /// What entities of two Worlds must have in common to be the same one: its name, and the game's own components. Those of the
 /// engine come and go with the loading of files.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
