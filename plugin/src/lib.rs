@@ -85,7 +85,6 @@ pub mod bot;
 pub mod camera;
 pub mod control;
 pub mod demo;
-
 pub mod episode;
 pub mod fault;
 pub mod headless;

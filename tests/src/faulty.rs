@@ -19,7 +19,7 @@ pub enum Fault {
     UnseededRandomness,
     /// What a gardener [`Smells`] depends on the order of a `HashMap`.
     HashOrder,
-    /// The [`Sun`] moves by `Time<Real>`.
+    /// The [`Sun`] moves at the pace of `Time<Real>`.
     WallClock,
     /// All gardeners count into one [`Score`].
     SharedScore,
@@ -81,11 +81,11 @@ pub struct Herbs {
     strengths: HashMap<u64, u32>,
 }
 
-/// Where the sun stands.
+/// How fast the sun moves.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct Sun {
-    angle: f32,
+    pace: f32,
 }
 
 /// Plants watered, by whomever.
@@ -100,7 +100,7 @@ pub struct Soil {
     wet: f32,
 }
 
-/// Plants watered since the game began.
+/// Ticks since the game began.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct Record(u32);
@@ -145,13 +145,15 @@ fn weather(
     mut wind: ResMut<Wind>,
     mut sun: ResMut<Sun>,
     mut soil: ResMut<Soil>,
+    mut record: ResMut<Record>,
     mut tick: Local<u32>,
 ) {
     *tick += 1;
     match planted.0 {
         Fault::UnseededRandomness => wind.force = (random() >> 40) as f32,
-        Fault::WallClock => sun.angle += real.delta_secs(),
+        Fault::WallClock => sun.pace = real.delta_secs(),
         Fault::Survivor => soil.wet *= 0.99,
+        Fault::LastingRecord => record.0 += 1,
         Fault::Panic => assert!(*tick <= 5, "the garden burns"),
         _ => {}
     }
@@ -165,7 +167,6 @@ struct Garden<'w> {
     soil: Res<'w, Soil>,
     herbs: Res<'w, Herbs>,
     score: ResMut<'w, Score>,
-    record: ResMut<'w, Record>,
 }
 
 fn work(
@@ -192,7 +193,7 @@ fn work(
         gardener.x = gardener.x.clamp(0.0, 4.0);
         for (mut plant, mut transform) in plants.iter_mut().filter(|(plant, _)| plant.gardener == entity) {
             let near = (plant.place - gardener.x).abs() < 0.5;
-            plant.height += garden.soil.wet + garden.sun.angle + garden.wind.force;
+            plant.height += garden.soil.wet + garden.sun.pace + garden.wind.force;
             transform.scale.y = plant.height;
             gardener.earned += u32::from(near);
         }
@@ -203,7 +204,6 @@ fn work(
         if planted == Fault::Hidden {
             secret.0 = (random() >> 40) as f32;
         }
-        garden.record.0 += u32::from(planted == Fault::LastingRecord);
         let earned = if planted == Fault::SharedScore {
             garden.score.0 += 1;
             garden.score.0

@@ -1,7 +1,10 @@
 //! The doctor finds each planted fault and names it, and finds nothing in healthy games.
 
-use playbot_lab::{doctor::{CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, examine}, game::Game};
 use playbot_games::registry;
+use playbot_lab::{
+    doctor::{CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, examine},
+    game::Game,
+};
 use playbot_tests::{Corridor, faulty::Fault};
 
 fn examined(game: &dyn Game, ticks: u32, ignored: &[&str]) -> DoctorReport {
@@ -54,7 +57,7 @@ fn a_healthy_game_has_no_findings() {
 
 #[test]
 fn what_reflection_sees_and_what_it_does_not_see_is_said() {
-    let report = examined(&Fault::None, 5, &[]);
+    let report = examined(&Fault::None, 30, &[]);
     let compared = |name: &str| report.types.compared.iter().any(|path| path.ends_with(name));
     for name in ["::Gardener", "::Plant", "::Soil", "::Transform"] {
         assert!(compared(name), "{name} is missing in {:?}", report.types.compared);
@@ -85,7 +88,7 @@ fn iteration_over_a_hash_map_is_found_and_the_map_is_named() {
 
 #[test]
 fn a_reader_of_the_wall_clock_is_found_although_no_clock_runs_without_a_window() {
-    let (finding, report) = named(Fault::WallClock, Comparison::Clock, DifferenceKind::Resource, "::Sun", ".angle");
+    let (finding, report) = named(Fault::WallClock, Comparison::Clock, DifferenceKind::Resource, "::Sun", ".pace");
     assert_eq!(likeliest(&finding), CauseKind::WallClock);
     assert_eq!(report.of(Comparison::Repeat).and_then(|repeat| repeat.same()), Some(true));
     assert_eq!((report.safety.window.safe, report.safety.recording.safe), (Some(false), Some(true)));

@@ -2,13 +2,18 @@
 
 use std::time::Instant;
 
-use playbot_lab::{doctor::{DoctorOptions, examine}, game::Game, worlds::build_world, prelude::*};
+use playbot_lab::games::Games;
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    doctor::{DoctorOptions, examine},
+    game::Game,
+    worlds::build_world,
+};
 
 use super::{
     error::{CliError, Outcome, print_line},
     number::at_least_one,
 };
-use playbot_lab::games::Games;
 
 /// Checks whether a game plays the same when it is given the same actions, which recording, replay, resume and training in
 /// many arenas rest on, and names what differs first, when, and what to do.

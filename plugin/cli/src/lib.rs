@@ -65,6 +65,7 @@ Examples:
   playbot record coinrun --levels easy:0..9 --out my.demo
   playbot play coinrun --seed 7 --record my.demo   play it yourself
   playbot demo verify demos/coinrun
+  playbot doctor coinrun                           is the game the same every time?
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
@@ -87,7 +88,7 @@ enum Verb {
     Play(play::Args),
     /// Look at, check and repair recordings.
     Demo(demo::Args),
-    /// Check that a game plays the same when it is given the same actions, and name what does not.
+    /// Check that a game plays the same when it is given the same actions, and find what differs.
     Doctor(doctor::Args),
     /// Learn the skill model from recordings.
     LearnSkills(learn_skills::Args),

@@ -6,9 +6,9 @@ use bevy::{
     ecs::{entity::EntityHashMap, observer::Observer, resource::IsResource, system::SystemIdMarker},
     prelude::*,
 };
+use bevy_playbot::agent::Agent;
 
 use super::types::TypeBook;
-use bevy_playbot::agent::Agent;
 
 /// What entities of two Worlds must have in common to be the same one: its name, and the game's own components. Those of the
 /// engine come and go with the loading of files.

@@ -7,16 +7,22 @@ use std::{
 };
 
 use bevy::prelude::*;
-use playbot_learner::Streams;
-use rand_chacha::ChaCha8Rng;
+use bevy_playbot::{
+    action::{Action, ActionSpace},
+    agent::Agent,
+    bot::uniform,
+    control::Control,
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    headless::{headless_app, into_world, tick_world},
+    level::LevelQueue,
+    observation::{Observation, VectorSensor},
+    policy::AgentStreams,
+    reward::Reward,
+    state_hash::StateHash,
+};
 
 use super::census::{Census, types_of};
-use bevy_playbot::{action::{Action, ActionSpace}, agent::Agent, bot::uniform, control::Control, episode::{Episode, EpisodeEnd, EpisodeEnded}, headless::{headless_app, into_world, tick_world}, level::LevelQueue, observation::{Observation, VectorSensor}, reward::Reward, state_hash::StateHash};
 use crate::{game::Game, worlds::build_world};
-
-/// Names of the streams of random actions.
-pub(super) const PLAY: &str = "doctor";
-pub(super) const PRELUDE: &str = "doctor-prelude";
 
 /// Ends of episodes in this tick.
 #[derive(Resource, Default)]
@@ -41,7 +47,8 @@ pub(super) struct GameCopy {
     pub fault: Option<String>,
     first: u32,
     space: ActionSpace,
-    scripts: Vec<ChaCha8Rng>,
+    scripts: Vec<AgentStreams>,
+    in_prelude: bool,
 }
 
 /// What is played.
@@ -61,16 +68,9 @@ impl GameCopy {
             // Replay without a recording: nobody else decides, and virtual input acts.
             world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(plan.seed)));
         }
+        let scripts = (first..first + count).map(|number| AgentStreams::new(plan.seed, number)).collect();
         let (census, fault, space) = (Census::default(), None, game.actions());
-        let mut copy = Self { world, agents, census, fault, first, space, scripts: Vec::new() };
-        copy.follow(PLAY, plan.seed);
-        copy
-    }
-
-    /// Starts the named stream of actions from its beginning.
-    pub fn follow(&mut self, stream: &str, seed: u64) {
-        let numbers = self.first..self.first + self.agents.len() as u32;
-        self.scripts = numbers.map(|number| Streams::new(seed).stream(stream, u64::from(number))).collect();
+        Self { world, agents, census, fault, first, space, scripts, in_prelude: false }
     }
 
     /// Number of an agent.
@@ -84,7 +84,8 @@ impl GameCopy {
             return;
         }
         for (&agent, script) in self.agents.iter().zip(&mut self.scripts) {
-            self.world.entity_mut(agent).insert(Action(uniform(&self.space, script)));
+            let draws = if self.in_prelude { &mut script.skill } else { &mut script.action };
+            self.world.entity_mut(agent).insert(Action(uniform(&self.space, draws)));
         }
         self.world.resource_mut::<Ends>().0.clear();
         let world = &mut self.world;
@@ -98,8 +99,8 @@ impl GameCopy {
     }
 
     /// Plays another episode first, with other actions, to its end or for at most `limit` ticks.
-    pub fn play_prelude(&mut self, seed: u64, limit: u32) {
-        self.follow(PRELUDE, seed);
+    pub fn play_prelude(&mut self, limit: u32) {
+        self.in_prelude = true;
         for _ in 0..limit {
             self.tick();
             let ended = |agent: &Entity| self.world.get::<Episode>(*agent).is_some_and(|episode| !episode.is_running());
@@ -112,7 +113,7 @@ impl GameCopy {
                 episode.abandon();
             }
         }
-        self.follow(PLAY, seed);
+        self.in_prelude = false;
     }
 
     /// What the tick brought an agent.

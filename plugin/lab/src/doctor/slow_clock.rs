@@ -37,8 +37,9 @@ fn slow(mut real: ResMut<Time<Real>>, before: Res<Before>, mut frame: Local<u32>
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bevy_playbot::headless::{headless_app, into_world, tick_world};
+
+    use super::*;
 
     #[test]
     fn only_the_wall_clock_is_slower() {

@@ -35,7 +35,7 @@ impl Trial {
         };
         match comparison {
             Comparison::Clock => slow_down(&mut copies[1].world),
-            Comparison::Restart => copies[1].play_prelude(plan.seed, ticks),
+            Comparison::Restart => copies[1].play_prelude(ticks),
             _ => {}
         }
         let on_threads = if comparison == Comparison::Threads { 2 } else { 0 };
