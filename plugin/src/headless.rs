@@ -14,7 +14,8 @@ use crate::{
 };
 
 /// Number of fixed ticks since the World began.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
 pub struct Tick(pub u64);
 
 pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
@@ -70,6 +71,7 @@ pub fn into_world(mut app: App) -> World {
 /// The first breach of contract of the game in this tick: see [`Faults`].
 pub fn tick_world(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
+    world.resource_mut::<Faults>().set_caller(true);
     // The first run of the main schedule only starts the clock.
     for _ in 0..2 {
         world.run_schedule(Main);
@@ -78,7 +80,9 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
             break;
         }
     }
-    world.resource_mut::<Faults>().take()
+    let mut faults = world.resource_mut::<Faults>();
+    faults.set_caller(false);
+    faults.take()
 }
 
 /// Ticking an app by hand.
