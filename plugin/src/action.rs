@@ -7,7 +7,9 @@ use crate::{agent::Agent, control::Control, episode::Episode, fault::Faults};
 
 /// The action of this tick, written in [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide) by whoever
 /// holds the [`Control`] and read by the game in `FixedUpdate`.
-#[derive(Component, Clone, Debug, PartialEq)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub struct Action(pub ActionValue);
 
 impl Default for Action {
@@ -32,6 +34,11 @@ impl Action {
             ActionValue::Continuous(values) => Some(values),
         }
     }
+}
+
+/// Gives every agent an action.
+pub(crate) fn plugin(app: &mut App) {
+    app.register_required_components::<Agent, Action>().register_type::<Action>();
 }
 
 /// Why an action does not belong to its space, or `None` if it does.

@@ -30,7 +30,9 @@ impl KeyAxis {
 ///
 /// Works on agents under [`Control::Human`](crate::control::Control::Human) in an app with
 /// [`KeyboardPlugin`](crate::keyboard::KeyboardPlugin).
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct KeyBindings {
     axes: Vec<KeyAxis>,
     action: fn(&[i8]) -> ActionValue,

@@ -4,8 +4,8 @@ use bevy::prelude::*;
 
 use crate::{
     action, agent, bot, demo, episode,
-    fault::Faults,
-    headless, observation, policy, reward, skill_prior, stage_clock,
+    fault::{FaultSystems, Faults, announce_faults},
+    headless, observation, policy, reflect, reward, skill_prior, stage_clock, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -20,8 +20,10 @@ impl Plugin for PlaybotPlugin {
         app.init_resource::<agent::AgentOrder>()
             .init_resource::<Faults>()
             .init_resource::<headless::Tick>()
-            .init_resource::<policy::PlaybotSeed>()
+            .add_plugins((action::plugin, episode::plugin, observation::plugin))
+            .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin, reflect::plugin))
             .init_schedule(ObserveSchedule)
+            .add_systems(Last, announce_faults.in_set(FaultSystems).after(PlaybotSystems::Reset))
             .configure_sets(
                 FixedPreUpdate,
                 (PlaybotSystems::Begin, PlaybotSystems::Observe, PlaybotSystems::Decide, PlaybotSystems::Act).chain(),
@@ -41,7 +43,13 @@ fn add_decision_systems(app: &mut App) {
     app.add_systems(FixedFirst, headless::count_tick).add_systems(
         FixedPreUpdate,
         (
-            (policy::seed_streams, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
+            (
+                streams::seed_streams,
+                agent::order_agents,
+                reward::clear_rewards,
+                episode::begin_episodes,
+                skill_prior::end_skills,
+            )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
             (run_observe_schedule, observation::check_observations, observation::check_images)

@@ -16,6 +16,7 @@ pub use crate::{
     level::{LevelQueue, LevelSource},
     observation::{Observation, ObservationSpace, VectorSensor},
     plugin::PlaybotPlugin,
+    plugins::PlaybotPlugins,
     policy::{ActionDraw, ActivePolicy, PlaybotSeed},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior},

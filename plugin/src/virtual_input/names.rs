@@ -2,7 +2,10 @@
 
 use bevy::{
     prelude::*,
-    reflect::{DynamicEnum, DynamicVariant, FromReflect, TypeInfo, Typed, VariantInfo},
+    reflect::{
+        FromReflect, TypeInfo, Typed,
+        enums::{DynamicEnum, DynamicVariant, VariantInfo},
+    },
 };
 
 /// Names of the variants of an enum that hold nothing.
