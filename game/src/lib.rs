@@ -1,4 +1,4 @@
-//! The games of `bevy_playbot` and its command line.
+//! The games that come with `bevy_playbot`: CoinRun, mazes and ants.
 //!
 //! - [`ant`]: the quadruped, and the open floor on which it learns to walk.
 //! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
@@ -7,18 +7,13 @@
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
 //! - [`antview`]: what ants look like.
 //! - [`sighted`]: the mazes for agents that see walls and goal.
-//! - [`registry`]: games by name.
-//! - [`cli`]: the program `playbot`.
-//! - `window`, with the feature of that name: a person plays.
+//! - [`registry`]: all of them, for the program `playbot`.
 
 pub mod ant;
 pub mod antmaze;
 pub mod antview;
-pub mod cli;
 pub mod coinrun;
 pub mod maze;
 pub mod maze2d;
 pub mod registry;
 pub mod sighted;
-#[cfg(feature = "window")]
-pub mod window;

@@ -1,11 +1,19 @@
-//! Games by name.
+//! The games of this crate.
 
-use bevy_playbot::game::{Game, UnknownName};
+use bevy_playbot::unknown_name::UnknownName;
+use playbot_lab::{game::Game, games::Games};
 
 use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d, sighted::Sighted};
 
-/// The games, by name.
-pub const GAMES: [&str; 6] = ["coinrun", "maze2d", "maze2d-sighted", "ant", "antmaze", "antmaze-sighted"];
+/// All games, CoinRun first.
+pub const GAMES: [&dyn Game; 6] = [
+    &CoinRun { physics: false },
+    &Maze2d { physics: false },
+    &Sighted(Maze2d { physics: false }),
+    &Ant,
+    &AntMaze,
+    &Sighted(AntMaze),
+];
 
 /// The game with this name.
 ///
@@ -13,13 +21,5 @@ pub const GAMES: [&str; 6] = ["coinrun", "maze2d", "maze2d-sighted", "ant", "ant
 ///
 /// [`UnknownName`] with the valid names.
 pub fn game(name: &str) -> Result<&'static dyn Game, UnknownName> {
-    match name {
-        "coinrun" => Ok(&CoinRun { physics: false }),
-        "maze2d" => Ok(&Maze2d { physics: false }),
-        "maze2d-sighted" => Ok(&Sighted(Maze2d { physics: false })),
-        "ant" => Ok(&Ant),
-        "antmaze" => Ok(&AntMaze),
-        "antmaze-sighted" => Ok(&Sighted(AntMaze)),
-        _ => Err(UnknownName::new("game", name, &GAMES)),
-    }
+    Games::new(&GAMES).expect("each has a name of its own").get(name)
 }

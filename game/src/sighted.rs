@@ -5,7 +5,14 @@
 //! that nobody has seen it leaves nothing but wandering about.
 
 use bevy::prelude::*;
-use bevy_playbot::{floor_plan::FloorPlan, mode::ModeError, prelude::*, vision::Picture};
+use bevy_playbot::vision::Picture;
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView},
+    mode::ModeError,
+};
 
 /// The eight ways that eyes look, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
 /// a turn to the left. North is up in the game's own picture.
@@ -127,6 +134,23 @@ impl<G: GiveEyes> Game for Sighted<G> {
 
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         self.0.arm_demonstrator(world, agent, noise);
+    }
+
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        // Measured beside the game that sees less.
+        Vec::new()
+    }
+
+    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        self.0.show_level(request)
+    }
+
+    fn has_space_view(&self) -> bool {
+        self.0.has_space_view()
+    }
+
+    fn build_space_view(&self, app: &mut App) {
+        self.0.build_space_view(app);
     }
 }
 

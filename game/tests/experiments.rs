@@ -5,12 +5,12 @@ use std::{
     process::Command,
 };
 
-use bevy_playbot::{
+use playbot_games::registry;
+use playbot_lab::{
     held_out::HeldOut,
     split::LevelSplit,
     train::{Experiment, config_file::read_experiment, study::study_runs},
 };
-use playbot_games::registry;
 use serde_json::Value;
 
 fn folder() -> PathBuf {

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use bevy_playbot::learner::{Streams, rng::unit};
 use playbot_games::maze2d::{
     Demonstrator, Maze2dLevel, Maze2dMode,
     sim::{BallSim, is_at_goal, reward},
 };
+use playbot_learner::{Streams, rng::unit};
 
 /// What came of one episode.
 struct Outcome {

@@ -5,7 +5,7 @@ use std::{
     process::{Command, Output},
 };
 
-use bevy_playbot::train::config_file::read_experiment;
+use playbot_lab::train::config_file::read_experiment;
 use serde_json::Value;
 
 const EXPERIMENT: &str = r#"(

@@ -2,14 +2,18 @@
 
 use std::{path::Path, process::Command};
 
+use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
-    game::build_world,
-    learner::{ActionSpace, DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner},
-    policy_file::{PolicyFile, PolicyMisfit, check_policy, export_policy, install_policy, policy_file},
-    prelude::*,
-    vision::Sight,
+    policy_file::{PolicyFile, PolicyMisfit, install_policy},
+    vision::ObservationConfig,
 };
 use playbot_games::coinrun::CoinRun;
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    policy_export::{export_policy, policy_file},
+    worlds::build_world,
+};
+use playbot_learner::{ActionSpace, DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner};
 use serde_json::Value;
 
 fn learner(obs_dim: usize) -> PpoLearner {
@@ -22,7 +26,7 @@ fn learner(obs_dim: usize) -> PpoLearner {
 fn exported(folder: &Path) -> std::path::PathBuf {
     let game = CoinRun::default();
     let about = ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
-    let file = policy_file(&game, &Sight::default(), learner(563).policy(), None, about);
+    let file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about);
     let path = folder.join("bot.policy");
     export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, &path).expect("writable");
     path
@@ -49,7 +53,7 @@ fn a_policy_file_plays_in_a_game() {
     for device in DeviceKind::ALL {
         let file = PolicyFile::load(&path, device).expect("sound");
         let game = CoinRun::default();
-        assert_eq!(check_policy(&game, &file), Ok(()));
+        assert_eq!(check_policy(&game.card(), &file), Ok(()));
         let (mut world, agents) = build_world(&game, "hard", 1, 0, 1);
         install_policy(&mut world, &file, ActionDraw::Sample);
         world.entity_mut(agents[0]).insert((Control::Policy, LevelQueue::Always(0)));
@@ -113,20 +117,20 @@ fn torn_and_foreign_files_are_explained() {
 fn a_policy_of_another_game_names_the_difference() {
     let game = CoinRun::default();
     let about = || ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
-    let mut file = policy_file(&game, &Sight::default(), learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about());
     file.card.observations[7] = "heat".to_owned();
-    let error = check_policy(&game, &file).expect_err("another observation");
+    let error = check_policy(&game.card(), &file).expect_err("another observation");
     assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
     file.card.observations.pop();
-    assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
-    let mut file = policy_file(&game, &Sight::default(), learner(563).policy(), None, about());
+    assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
+    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about());
     file.card.actions.swap(1, 7);
-    let error = check_policy(&game, &file).expect_err("other actions");
+    let error = check_policy(&game.card(), &file).expect_err("other actions");
     assert!(matches!(&error, PolicyMisfit::ActionName { at: 1, expected, .. } if expected == "right"), "{error}");
     file.card.game_version = 9;
-    assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Version { made_for: 9, now: 1, .. })));
+    assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Version { made_for: 9, now: 1, .. })));
     file.card.game = "chess".to_owned();
-    assert!(matches!(check_policy(&game, &file), Err(PolicyMisfit::Game { .. })));
+    assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Game { .. })));
 }
 
 #[test]

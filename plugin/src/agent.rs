@@ -3,13 +3,7 @@
 use bevy::prelude::*;
 use playbot_learner::ActionSpace;
 
-use crate::{
-    control::Control,
-    fault::Faults,
-    level::LevelQueue,
-    reward::Reward,
-    state_hash::StateHash,
-};
+use crate::{control::Control, fault::Faults, level::LevelQueue, reward::Reward, state_hash::StateHash};
 
 /// An entity that acts in the game.
 ///

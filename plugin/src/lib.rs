@@ -31,7 +31,7 @@
 //!
 //! ```
 //! use bevy::prelude::*;
-//! use bevy_playbot::prelude::*;
+//! use crate::prelude::*;
 //!
 //! #[derive(Component, Default)]
 //! struct Position(i32);
@@ -86,16 +86,11 @@ pub mod camera;
 pub mod control;
 pub mod demo;
 pub mod episode;
-pub mod eval;
 pub mod fault;
-pub mod floor_plan;
-pub mod game;
 pub mod headless;
-pub mod held_out;
 pub mod key_bindings;
 pub mod keyboard;
 pub mod level;
-pub mod mode;
 pub mod observation;
 pub mod plugin;
 pub mod plugins;
@@ -104,21 +99,16 @@ pub mod policy_file;
 pub mod prelude;
 pub mod raster;
 mod reflect;
-pub mod report;
 pub mod reward;
-pub mod runs;
 pub mod skill_prior;
-pub mod split;
-pub mod stage_clock;
 pub mod state_hash;
 pub mod streams;
 pub mod systems;
 pub mod takeover;
 pub mod test_app;
-pub mod train;
+pub mod unknown_name;
 pub mod virtual_input;
 pub mod vision;
 
-pub use playbot_learner as learner;
 pub use plugin::PlaybotPlugin;
 pub use plugins::PlaybotPlugins;

@@ -79,7 +79,7 @@ impl Observation {
     }
 
     /// Adds the vector, or the picture, to a batch of its kind.
-    pub(crate) fn push_to(&self, batch: &mut Observations) {
+    pub fn push_to(&self, batch: &mut Observations) {
         match batch {
             Observations::Vector(values) => values.extend_from_slice(&self.vector),
             Observations::Image(pixels) => pixels.extend_from_slice(&self.image),

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use crate::{
     action, agent, bot, demo, episode,
     fault::{FaultSystems, Faults, announce_faults},
-    headless, observation, policy, reflect, reward, skill_prior, stage_clock, streams,
+    headless, observation, policy, reflect, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -34,7 +34,6 @@ impl Plugin for PlaybotPlugin {
             );
         add_decision_systems(app);
         add_outcome_systems(app);
-        stage_clock::add_readings(app);
     }
 }
 

@@ -1,28 +1,32 @@
 //! Policies that a game ships with: checked against the game, and put to work.
 
-use std::path::Path;
-
 use bevy::prelude::*;
-use playbot_learner::{FileError, Observations, Policy};
 pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};
 use thiserror::Error;
 
 use crate::{
     action::ActionSpace,
-    fault::Fault,
-    game::Game,
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,
-    split::LevelSplit,
-    train::collect::Collector,
-    vision::{Sight, UnknownSight, VisionError},
+    vision::{ObservationConfig, UnknownObservation, VisionError},
 };
 
-/// Arenas and ticks of the short play from which a file's examples are taken.
-const EXAMPLE_ARENAS: u32 = 4;
-const EXAMPLE_TICKS: usize = 32;
-/// Every so many of its rows becomes an example.
-const EXAMPLE_STRIDE: usize = 9;
+/// What a game says of itself: a policy that was made for another game, or another state of this one, does not fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GameCard {
+    /// Name of the game.
+    pub name: &'static str,
+    /// Version of its rules.
+    pub version: u32,
+    /// Names of the observation's values.
+    pub observations: Vec<String>,
+    /// Actions of every agent.
+    pub actions: ActionSpace,
+    /// Names of the discrete choices, or of the dimensions of continuous actions; may be empty.
+    pub action_names: Vec<String>,
+    /// Whether it can be drawn, for policies that read pictures.
+    pub has_picture: bool,
+}
 
 /// A policy file does not fit the game.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -58,12 +62,12 @@ pub enum PolicyMisfit {
     },
     /// The file does not say what its policy sees.
     #[error(transparent)]
-    Sight(#[from] UnknownSight),
+    ObservationConfig(#[from] UnknownObservation),
     /// The policy reads pictures, and the game cannot be drawn.
     #[error("the policy reads {sight}, but {error}")]
     Vision {
         /// What the policy reads.
-        sight: Sight,
+        sight: ObservationConfig,
         /// Why the game cannot show it.
         error: VisionError,
     },
@@ -115,45 +119,45 @@ pub enum PolicyMisfit {
 /// # Errors
 ///
 /// The file does not say so.
-pub fn policy_sight(file: &PolicyFile) -> Result<Sight, UnknownSight> {
-    Sight::from_card(file.card.picture.as_ref(), &file.policy.observation())
+pub fn policy_observation(file: &PolicyFile) -> Result<ObservationConfig, UnknownObservation> {
+    ObservationConfig::from_card(file.card.picture.as_ref(), &file.policy.observation())
 }
 
 /// Checks that a policy was made for this game, these rules, this observation and these actions. Pictures must be
-/// possible; whether this program has the sensor is for [`Sight::check`] to say.
+/// possible; whether this program has the sensor is for the sensor to say.
 ///
 /// # Errors
 ///
 /// [`PolicyMisfit`] with the first difference.
-pub fn check_policy(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisfit> {
-    let (card, name) = (&file.card, game.name().to_owned());
+pub fn check_policy(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+    let (card, name) = (&file.card, game.name.to_owned());
     if card.game != name {
         return Err(PolicyMisfit::Game { made_for: card.game.clone(), game: name });
     }
-    if card.game_version != game.version() {
-        return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version() });
+    if card.game_version != game.version {
+        return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version });
     }
-    let sight = policy_sight(file)?;
+    let sight = policy_observation(file)?;
     if !sight.is_image() {
         check_names(game, file)?;
-    } else if game.picture().is_none() {
-        return Err(PolicyMisfit::Vision { sight, error: VisionError::NoPicture { game: game.name() } });
+    } else if !game.has_picture {
+        return Err(PolicyMisfit::Vision { sight, error: VisionError::NoPicture { game: game.name } });
     }
-    if file.policy.action_space() != game.actions() {
-        return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions() });
+    if file.policy.action_space() != game.actions {
+        return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions });
     }
-    let (theirs, ours) = (&card.actions, game.action_names());
-    match theirs.iter().zip(ours).enumerate().find(|(_, (theirs, ours))| *theirs != ours) {
+    let (theirs, ours) = (&card.actions, &game.action_names);
+    match theirs.iter().zip(ours).enumerate().find(|(_, (theirs, ours))| theirs != ours) {
         Some((at, (expected, found))) => {
-            Err(PolicyMisfit::ActionName { game: name, at, expected: expected.clone(), found })
+            Err(PolicyMisfit::ActionName { game: name, at, expected: expected.clone(), found: found.clone() })
         }
         None => Ok(()),
     }
 }
 
 /// Compares the names of the values that the policy reads with those of the game.
-fn check_names(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisfit> {
-    let (card, names) = (&file.card, game.observation().names);
+fn check_names(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+    let (card, names) = (&file.card, &game.observations);
     let reads = file.policy.obs_dim();
     if reads != card.observations.len() {
         return Err(PolicyMisfit::Card { reads, named: card.observations.len() });
@@ -162,12 +166,12 @@ fn check_names(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisfit> {
     if let Some(at) = (0..longest).find(|&at| names.get(at) != card.observations.get(at)) {
         let name_at = |names: &[String]| names.get(at).cloned().unwrap_or_default();
         return Err(PolicyMisfit::Observation {
-            game: game.name().to_owned(),
+            game: game.name.to_owned(),
             made_for: card.observations.len(),
             now: names.len(),
             at,
             expected: name_at(&card.observations),
-            found: name_at(&names),
+            found: name_at(names),
         });
     }
     Ok(())
@@ -175,7 +179,7 @@ fn check_names(game: &dyn Game, file: &PolicyFile) -> Result<(), PolicyMisfit> {
 
 /// Lets a policy, with its skills, drive every agent of this World that is under
 /// [`Control::Policy`](crate::control::Control::Policy). An agent of a policy that reads pictures carries the sensor that
-/// [`policy_sight`] names.
+/// [`policy_observation`] names.
 pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
     world.insert_resource(ActivePolicy { policy: file.policy.clone(), draw });
     match &file.skills {
@@ -184,68 +188,4 @@ pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
             world.remove_resource::<SkillPrior>();
         }
     }
-}
-
-/// A policy could not be exported.
-#[derive(Debug, Error)]
-pub enum ExportError {
-    /// The game broke its contract while the examples were played.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-    /// The file does not say what its policy sees.
-    #[error(transparent)]
-    Sight(#[from] UnknownSight),
-    /// The pictures cannot be made.
-    #[error(transparent)]
-    Vision(#[from] VisionError),
-    /// The file could not be written.
-    #[error(transparent)]
-    File(#[from] FileError),
-}
-
-/// A policy for this game that sees it so, with the card filled in from both.
-pub fn policy_file(
-    game: &dyn Game,
-    sight: &Sight,
-    policy: Policy,
-    skills: Option<SkillSource>,
-    (algorithm, training, code): (String, String, String),
-) -> PolicyFile {
-    let card = PolicyCard {
-        game: game.name().to_owned(),
-        game_version: game.version(),
-        observations: if sight.is_image() { Vec::new() } else { game.observation().names },
-        picture: sight.card(),
-        actions: game.action_names(),
-        algorithm,
-        training,
-        code,
-    };
-    PolicyFile { card, policy, skills }
-}
-
-/// Writes a policy file. Its examples come from a short play on `levels`.
-///
-/// # Errors
-///
-/// [`ExportError`].
-pub fn export_policy(
-    game: &dyn Game,
-    file: &PolicyFile,
-    levels: &LevelSplit,
-    seed: u64,
-    path: &Path,
-) -> Result<(), ExportError> {
-    let prior = file.skills.as_ref().map(SkillPrior::from);
-    let latent = file.policy.latent();
-    let mut collector = Collector::new(game, levels, &policy_sight(file)?, seed, 0, EXAMPLE_ARENAS, prior)?;
-    let (rollout, _) = collector.collect(&file.policy, latent, EXAMPLE_TICKS)?;
-    let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
-    let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
-    let n = rows.len();
-    for row in rows {
-        obs.push(rollout.obs.row(row, rollout.obs_kind.numbers())).map_err(|error| Fault(error.to_string()))?;
-        z.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
-    }
-    Ok(file.save(path, &obs, &z, n)?)
 }

@@ -61,7 +61,7 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
 }
 
 /// Draws for the agents whose skill has run out, in one batch.
-pub(crate) fn draw_skills(
+pub fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,
     mut agents: Query<(&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams)>,

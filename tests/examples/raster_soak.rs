@@ -3,20 +3,18 @@
 //!
 //! `raster_soak [ticks] [agents]`
 
-use bevy_playbot::{
-    game::build_seeing_world,
-    prelude::*,
-    vision::{ObservationKind, Sight},
-};
+use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_games::coinrun::CoinRun;
+use playbot_lab::prelude::*;
+use playbot_lab::worlds::build_observing_world;
 use playbot_tests::soak::soak;
 
 fn main() {
     let mut arguments = std::env::args().skip(1).map(|word| word.parse::<u64>().expect("a number"));
     let (ticks, agents) = (arguments.next().unwrap_or(20_000), arguments.next().unwrap_or(64));
-    let sight = Sight { kind: ObservationKind::Raster, ..Sight::default() };
-    let (mut world, agents) =
-        build_seeing_world(&CoinRun::default(), "hard", &sight, 0, 0, agents as u32).expect("a raster needs nothing");
+    let sight = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
+    let (mut world, agents) = build_observing_world(&CoinRun::default(), "hard", &sight, 0, 0, agents as u32)
+        .expect("a raster needs nothing");
     for &agent in &agents {
         let levels = LevelQueue::Uniform { first: 0, last: 9999 };
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, levels));

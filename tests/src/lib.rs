@@ -8,7 +8,7 @@ pub mod soak;
 pub use painted::PaintedCorridor;
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 /// A corridor of 7 cells. The agent starts in the middle, action 1 goes right, action 0 left, action 2 stays. The right
 /// end wins 1 point, the left end loses, and after 20 ticks time is up. Even levels start one cell further right.

@@ -6,10 +6,8 @@ use bevy::{
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
-use bevy_playbot::{
-    prelude::*,
-    vision::{Picture, Stage, VisionSystems},
-};
+use bevy_playbot::vision::{Picture, Stage, VisionSystems};
+use playbot_lab::prelude::*;
 
 use crate::{Cell, Corridor};
 

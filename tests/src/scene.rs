@@ -4,9 +4,9 @@ use bevy::{asset::RenderAssetUsages, image::ImageSampler, prelude::*, render::re
 use bevy_playbot::{
     camera::{CameraSensor, CameraSensorPlugin},
     headless::into_world,
-    prelude::*,
     vision::{Frame, ImageOptions, ImageSensor, Stage, TileLayer},
 };
+use playbot_lab::prelude::*;
 
 /// An image of `width` columns from its pixels, top row first.
 pub fn image(width: u32, pixels: &[[u8; 4]]) -> Image {

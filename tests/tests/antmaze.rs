@@ -7,16 +7,10 @@ use bevy_playbot::{
     demo::{
         file::{DemoHeader, DemoReader, DemoWriter},
         recorder::demo_actions,
-        verify::verify_file,
     },
-    eval::{EvalPlan, Player, evaluate, summarize},
-    game::{build_seeing_world, build_world},
-    learner::{DeviceKind, PolicyFile},
     policy::ActionDraw,
-    prelude::*,
     test_app::PlaybotTestExt,
-    train::worlds::on_threads,
-    vision::{ObservationKind, Sight},
+    vision::{ObservationConfig, ObservationKind},
 };
 use playbot_games::{
     ant::{Ant, walk::Walker},
@@ -27,6 +21,14 @@ use playbot_games::{
         geometry::distance,
     },
 };
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    demo::verify::verify_file,
+    eval::{EvalPlan, Player, evaluate, summarize},
+    parallel::on_threads,
+    worlds::{build_observing_world, build_world},
+};
+use playbot_learner::{DeviceKind, PolicyFile};
 
 fn level(mode: &str, seed: u64) -> AntMazeLevel {
     generate(&mode.parse().expect("a mode"), seed).expect("a level")
@@ -316,8 +318,8 @@ fn demonstrations_follow_the_noise_that_is_asked_for() {
 
 #[test]
 fn pictures_show_floor_walls_ant_and_goal() {
-    let sight = Sight { kind: ObservationKind::Raster, ..Sight::default() };
-    let (mut world, agents) = build_seeing_world(&AntMaze, "umaze", &sight, 0, 0, 1).expect("can be drawn");
+    let sight = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
+    let (mut world, agents) = build_observing_world(&AntMaze, "umaze", &sight, 0, 0, 1).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0; 8]));
     world.entity_mut(agents[0]).insert((Control::Human, still, LevelQueue::Always(0)));
     world.tick().expect("sound");
@@ -371,7 +373,7 @@ fn the_demonstrator_walks_to_the_goal() {
     for (levels, least) in [("umaze:0..31", 0.9), ("medium:0..31", 0.8), ("random+goals=random:0..31", 0.8)] {
         let plan = EvalPlan {
             split: levels.parse().expect("a split"),
-            sight: Sight::default(),
+            sight: ObservationConfig::default(),
             episodes_per_level: 1,
             seed: 1,
             arenas: 32,
@@ -386,8 +388,8 @@ fn the_demonstrator_walks_to_the_goal() {
 
 #[test]
 fn the_open_floor_is_drawn_around_its_ant() {
-    let sight = Sight { kind: ObservationKind::Raster, ..Sight::default() };
-    let (mut world, agents) = build_seeing_world(&Ant, "goal", &sight, 0, 0, 2).expect("can be drawn");
+    let sight = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
+    let (mut world, agents) = build_observing_world(&Ant, "goal", &sight, 0, 0, 2).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0; 8]));
     for &agent in &agents {
         world.entity_mut(agent).insert((Control::Human, still.clone(), LevelQueue::Always(0)));
@@ -407,7 +409,7 @@ fn the_shipped_walker_reaches_goals_in_all_directions() {
     let policy = PolicyFile::load(&file, DeviceKind::default()).expect("shipped").policy;
     let plan = EvalPlan {
         split: "goal:0..127".parse().expect("a split"),
-        sight: Sight::default(),
+        sight: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 64,

@@ -1,7 +1,8 @@
 //! A camera sensor shows known sprites and tiles at known pixels, in every size.
 
 use bevy::{prelude::*, sprite::Anchor};
-use bevy_playbot::{prelude::*, vision::TileLayer};
+use bevy_playbot::vision::TileLayer;
+use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
 
 const RED: [u8; 4] = [200, 10, 30, 255];

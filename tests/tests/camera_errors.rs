@@ -3,9 +3,9 @@
 use bevy::prelude::*;
 use bevy_playbot::{
     camera::CameraSensorPlugin,
-    prelude::*,
     vision::{BlankEpisodes, TileLayer, VisionError},
 };
+use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
 
 /// Set for a copy of this program that finds no adapter.

@@ -1,10 +1,8 @@
 //! Memory stays flat while levels and agents come and go. Alone in its program, whose memory is what is measured.
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    prelude::*,
-    vision::{Stage, TileLayer},
-};
+use bevy_playbot::vision::{Stage, TileLayer};
+use playbot_lab::prelude::*;
 use playbot_tests::{
     memory::resident_kib,
     scene::{camera_world, drift, image, pixel, spawn_eye, spawn_large_scene},

@@ -4,7 +4,8 @@ use bevy::{
     camera::{ImageRenderTarget, RenderTarget, ScalingMode},
     prelude::*,
 };
-use bevy_playbot::{camera::CameraSensor, prelude::*, vision::ImageOptions};
+use bevy_playbot::{camera::CameraSensor, vision::ImageOptions};
+use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
 
 fn agent(world: &mut World, index: u32, camera: Entity, size: [u32; 2]) -> Entity {

@@ -4,9 +4,9 @@ use bevy::prelude::*;
 use bevy_playbot::{
     camera::{CameraSensor, ReadbackDelay},
     headless::Tick,
-    prelude::*,
     vision::{Frame, ImageOptions, Stage, TileLayer, VisionSystems},
 };
+use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, draw, image, pixel, player, spawn_eye};
 
 /// The one that walks, and where it stood when agents looked.

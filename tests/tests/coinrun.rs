@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_playbot::{game::build_world, prelude::*};
 use bevy_rapier2d::prelude::*;
 use playbot_games::coinrun::{
     Body, CoinRun, Mode, Outcome, Sim,
     components::{ArenaBody, Crate, InArena, LastOutcome, PlayerBody, PlaysIn, Saw},
     generate,
 };
+use playbot_lab::prelude::*;
+use playbot_lab::worlds::build_world;
 
 /// Random numbers without a crate: a linear congruential generator is plenty for choosing buttons.
 struct Buttons(u64);

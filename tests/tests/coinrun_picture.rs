@@ -6,9 +6,7 @@ use bevy::{
     sprite::Anchor,
 };
 use bevy_playbot::{
-    game::build_world,
     headless::into_world,
-    prelude::*,
     test_app::PlaybotTestExt,
     vision::{PaintedVelocity, Stage, TileLayer},
 };
@@ -18,6 +16,8 @@ use playbot_games::coinrun::{
     generate,
     picture::{Art, Pose},
 };
+use playbot_lab::prelude::*;
+use playbot_lab::worlds::build_world;
 
 const RIGHT: u32 = 7;
 const NOTHING: u32 = 4;

@@ -1,10 +1,8 @@
 //! Episodes: start, end, counting, and who decides.
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    prelude::*,
-    test_app::{PlaybotTestExt, test_app},
-};
+use bevy_playbot::test_app::{PlaybotTestExt, test_app};
+use playbot_lab::prelude::*;
 use playbot_tests::{Cell, PoisonAt, corridor_plugin, spawn_walker};
 
 #[derive(Resource, Default)]

@@ -11,8 +11,8 @@ use bevy::{
 use bevy_playbot::{
     headless::{Tick, set_fixed_step},
     keyboard::KeyboardPlugin,
-    prelude::*,
 };
+use playbot_lab::prelude::*;
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 
 /// Actions of the corridor.

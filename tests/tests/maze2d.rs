@@ -8,14 +8,9 @@ use bevy_playbot::{
     demo::{
         file::{DemoEnd, DemoHeader, DemoReader, DemoWriter},
         recorder::demo_actions,
-        verify::verify_file,
     },
-    eval::{EvalPlan, Player, evaluate, summarize},
-    game::build_world,
-    prelude::*,
     test_app::{PlaybotTestExt, test_app},
-    train::worlds::on_threads,
-    vision::Sight,
+    vision::ObservationConfig,
 };
 use bevy_rapier2d::rapier::prelude::{QueryFilter, Ray, Vector};
 use playbot_games::maze2d::{
@@ -25,6 +20,13 @@ use playbot_games::maze2d::{
     game::spawn_agent,
     physics::MazePhysics,
     sim::{BallSim, hash_state, reward},
+};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    demo::verify::verify_file,
+    eval::{EvalPlan, Player, evaluate, summarize},
+    parallel::on_threads,
+    worlds::build_world,
 };
 
 const GAME: Maze2d = Maze2d { physics: false };
@@ -112,10 +114,17 @@ fn a_hundred_thousand_steps_are_the_same_on_one_and_on_two_threads() {
 }
 
 /// The ends of the first `episodes` episodes of the demonstrator.
-fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<bevy_playbot::eval::EpisodeResult> {
+fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<playbot_lab::eval::EpisodeResult> {
     let split = LevelSplit { mode: text.to_owned(), first: 0, last: levels - 1 };
-    let plan =
-        EvalPlan { split, sight: Sight::default(), episodes_per_level: 1, seed: 1, arenas: 8, worlds: 2, threads: 2 };
+    let plan = EvalPlan {
+        split,
+        sight: ObservationConfig::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 8,
+        worlds: 2,
+        threads: 2,
+    };
     evaluate(&GAME, player, &plan, |_| {}).expect("sound")
 }
 

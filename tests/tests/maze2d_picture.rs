@@ -4,12 +4,10 @@ use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
     prelude::*,
 };
-use bevy_playbot::{
-    game::build_seeing_world,
-    prelude::*,
-    vision::{ImageOptions, ObservationKind, Sight},
-};
+use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
 use playbot_games::maze2d::{Maze2d, Maze2dLevel, Maze2dMode, components::MazeBall};
+use playbot_lab::prelude::*;
+use playbot_lab::worlds::build_observing_world;
 
 const GAME: Maze2d = Maze2d { physics: false };
 const SIDE: usize = 64;
@@ -20,8 +18,8 @@ const GOAL: [u8; 3] = [0xf5, 0xb7, 0x00];
 
 /// A World whose agent sees pictures and pushes as the test says.
 fn seeing(mode: &str, level: u64) -> (World, Entity) {
-    let sight = Sight { kind: ObservationKind::Raster, image: ImageOptions::default() };
-    let (mut world, agents) = build_seeing_world(&GAME, mode, &sight, 0, 0, 2).expect("can be drawn");
+    let sight = ObservationConfig { kind: ObservationKind::Raster, image: ImageOptions::default() };
+    let (mut world, agents) = build_observing_world(&GAME, mode, &sight, 0, 0, 2).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0, 0.0]));
     for (agent, level) in agents.iter().zip([level, level + 1]) {
         world.entity_mut(*agent).insert((Control::Human, LevelQueue::Always(level), still.clone()));
@@ -108,7 +106,7 @@ fn drawing_changes_nothing_in_the_game_and_has_one_order() {
     GAME.build(&mut app, "medium");
     GAME.build_picture(&mut app);
     let drawn = GAME.spawn_agent(app.world_mut(), 0);
-    let (mut plain, agents) = bevy_playbot::game::build_world(&GAME, "medium", 0, 0, 1);
+    let (mut plain, agents) = playbot_lab::worlds::build_world(&GAME, "medium", 0, 0, 1);
     for (world, agent) in [(app.world_mut(), drawn), (&mut plain, agents[0])] {
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Uniform { first: 0, last: 9 }));
         world.ticks(700).expect("sound");

@@ -4,19 +4,21 @@ use std::path::Path;
 
 use bevy_playbot::{
     demo::{
-        dataset::Demonstrations,
         file::{DemoHeader, DemoWriter},
         recorder::demo_actions,
     },
-    eval::{EvalPlan, Player, evaluate, summarize},
-    game::build_world,
-    learner::{DeviceKind, SkillModel, SkillTrainer},
     policy::ActionDraw,
-    prelude::*,
-    train::{Algorithm, Experiment, Trainer, config_file::parse_experiment},
-    vision::Sight,
+    vision::ObservationConfig,
 };
 use playbot_games::maze2d::Maze2d;
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    demo::dataset::Demonstrations,
+    eval::{EvalPlan, Player, evaluate, summarize},
+    train::{Algorithm, Experiment, Trainer, config_file::parse_experiment},
+    worlds::build_world,
+};
+use playbot_learner::{DeviceKind, SkillModel, SkillTrainer};
 
 const GAME: Maze2d = Maze2d { physics: false };
 
@@ -59,7 +61,7 @@ fn skills() -> SkillModel {
     while world.resource::<Recorder>().steps() < 20_000 {
         world.tick().expect("sound");
     }
-    let demos = Demonstrations::read(&GAME, &Sight::default(), &path, None).expect("readable");
+    let demos = Demonstrations::read(&GAME, &ObservationConfig::default(), &path, None).expect("readable");
     let dataset = demos.dataset(&GAME, 2, |_| {}).expect("replays");
     let config = experiment(Algorithm::ScorePpo).skills;
     let epochs = config.epochs;
@@ -75,7 +77,7 @@ fn measure(player: &Player) -> (f64, f64) {
     let split: LevelSplit = experiment(Algorithm::Ppo).test;
     let plan = EvalPlan {
         split: split.clone(),
-        sight: Sight::default(),
+        sight: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 32,

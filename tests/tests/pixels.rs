@@ -2,20 +2,21 @@
 
 use std::path::Path;
 
+use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
     bot::BlindBot,
     demo::{
-        dataset::Demonstrations,
         file::{DemoHeader, DemoWriter},
         recorder::demo_actions,
     },
+    policy_file::{PolicyMisfit, policy_observation},
+    vision::{ImageOptions, ObservationConfig, ObservationKind, VisionError},
+};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    demo::dataset::Demonstrations,
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
-    game::{build_seeing_world, build_world},
-    learner::{
-        DeviceKind, ObsKind, Observations, Policy, PolicyFile, PolicySpec, PpoLearner, SkillModel, SkillTrainer,
-    },
-    policy_file::{PolicyMisfit, check_policy, export_policy, policy_file, policy_sight},
-    prelude::*,
+    policy_export::{export_policy, policy_file},
     train::{
         Algorithm, Experiment, Learner, Trainer,
         checkpoint::Which,
@@ -24,7 +25,10 @@ use bevy_playbot::{
         run_dir::{RunDir, RunInfo},
         trainer::TrainError,
     },
-    vision::{ImageOptions, ObservationKind, Sight, VisionError},
+    worlds::{build_observing_world, build_world},
+};
+use playbot_learner::{
+    DeviceKind, ObsKind, Observations, Policy, PolicyFile, PolicySpec, PpoLearner, SkillModel, SkillTrainer,
 };
 use playbot_tests::{Corridor, PaintedCorridor};
 
@@ -57,7 +61,7 @@ fn record(folder: &Path) {
     }
 }
 
-fn demonstrations(folder: &Path, sight: &Sight) -> Demonstrations {
+fn demonstrations(folder: &Path, sight: &ObservationConfig) -> Demonstrations {
     let test = experiment().test;
     Demonstrations::read(&PaintedCorridor, sight, folder, Some(&test)).expect("readable")
 }
@@ -135,12 +139,12 @@ fn what_is_learned_from_pictures_survives_its_files() {
     let file = policy_file(&PaintedCorridor, &experiment.sight(), learner.policy(), learner.skills(), about);
     export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");
     let read = PolicyFile::load(&path, DeviceKind::Flex).expect("as written");
-    check_policy(&PaintedCorridor, &read).expect("fits");
-    assert_eq!(policy_sight(&read), Ok(experiment.sight()));
+    check_policy(&PaintedCorridor.card(), &read).expect("fits");
+    assert_eq!(policy_observation(&read), Ok(experiment.sight()));
     let prior = read.skills.as_ref().map(SkillPrior::from);
     assert_eq!(measure(&read.policy, prior, 2), results, "the file plays another game");
 
-    let error = check_policy(&Corridor, &read).expect_err("cannot be drawn");
+    let error = check_policy(&Corridor.card(), &read).expect_err("cannot be drawn");
     assert!(matches!(error, PolicyMisfit::Vision { error: VisionError::NoPicture { .. }, .. }), "{error}");
 }
 
@@ -178,7 +182,7 @@ fn stopping_and_threads_change_nothing() {
 }
 
 /// An untrained policy of pictures.
-fn untrained(sight: &Sight) -> Policy {
+fn untrained(sight: &ObservationConfig) -> Policy {
     let config = experiment().ppo;
     let spec = PolicySpec { obs: sight.image.obs_kind(), latent: 0, action_space: PaintedCorridor.actions() };
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid").policy()
@@ -253,7 +257,7 @@ fn pictures_without_end_are_refused_before_anything_is_replayed() {
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path());
     let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
-    let sight = Sight { kind: ObservationKind::Raster, image };
+    let sight = ObservationConfig { kind: ObservationKind::Raster, image };
     let demos = demonstrations(folder.path(), &sight);
     let error = demos.dataset(&PaintedCorridor, 1, |_| {}).expect_err("too large").to_string();
     for words in ["GiB", "`demo_steps`", "1024×1024 colour pictures of the raster, 16 in a stack"] {
@@ -279,7 +283,7 @@ fn eyes_that_do_not_fit_are_refused_with_a_way_out() {
         (|e| e.image.paint_velocity = true, "with painted velocity"),
     ] {
         let error = refuse(change, &PaintedCorridor);
-        assert!(matches!(error, TrainError::SkillSight { .. }), "{error}");
+        assert!(matches!(error, TrainError::SkillObservation { .. }), "{error}");
         let text = error.to_string();
         assert!(text.contains(words) && text.contains("playbot learn-skills"), "{text}");
     }
@@ -294,17 +298,17 @@ fn a_policy_says_which_eyes_it_needs() {
     let sight = experiment().sight();
     let vectors = PolicySpec { obs: ObsKind::Vector(2), latent: 0, action_space: PaintedCorridor.actions() };
     let vectors = PpoLearner::new(experiment().ppo, vectors, 1, DeviceKind::Flex).expect("valid").policy();
-    let colour = Sight { image: ImageOptions { grayscale: false, ..sight.image }, ..sight };
+    let colour = ObservationConfig { image: ImageOptions { grayscale: false, ..sight.image }, ..sight };
     for (policy, sight, words) in [
         (
             untrained(&sight),
-            Sight::default(),
+            ObservationConfig::default(),
             ["images of 4 channels", "gives 2 observation values", "a sensor that makes"],
         ),
         (vectors, sight, ["made for 2 observation values", "gives images of 4 channels", "`VectorSensor`"]),
         (untrained(&colour), sight, ["images of 12 channels", "gives images of 4 channels", "`ImageOptions`"]),
     ] {
-        let (mut world, agents) = build_seeing_world(&PaintedCorridor, "plain", &sight, 0, 0, 1).expect("drawable");
+        let (mut world, agents) = build_observing_world(&PaintedCorridor, "plain", &sight, 0, 0, 1).expect("drawable");
         world.insert_resource(ActivePolicy { policy, draw: ActionDraw::Sample });
         world.entity_mut(agents[0]).insert(Control::Policy);
         let fault = world.tick().expect_err("does not fit").to_string();

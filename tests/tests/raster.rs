@@ -7,10 +7,10 @@ use bevy::{
 };
 use bevy_playbot::{
     headless::into_world,
-    prelude::*,
     raster::{RasterPlugin, RasterSensor},
     vision::{Frame, ImageOptions, Stage, TileLayer},
 };
+use playbot_lab::prelude::*;
 use playbot_tests::scene::{image, pixel};
 
 const RED: [u8; 4] = [255, 0, 0, 255];

@@ -10,10 +10,10 @@ use std::{
 use bevy::prelude::*;
 use bevy_playbot::{
     headless::into_world,
-    prelude::*,
     raster::{RasterPlugin, RasterSensor},
     vision::{ImageOptions, PaintedVelocity, Stage, TileLayer},
 };
+use playbot_lab::prelude::*;
 use playbot_tests::scene::image;
 
 struct Counting;

@@ -6,7 +6,6 @@ use bevy::{
 };
 use bevy_playbot::{
     camera::{CameraSensor, TileBorder},
-    prelude::*,
     raster::{RasterPlugin, RasterSensor},
     vision::{Difference, Frame, ImageOptions, TileLayer},
 };
@@ -14,6 +13,7 @@ use playbot_games::{
     ant::{Ant, walk::Walker},
     coinrun::{CoinRun, picture::VIEW},
 };
+use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, draw, image, spawn_eye};
 
 /// A World with a camera and a raster that see the same, each an agent.

@@ -5,14 +5,18 @@ use std::{path::Path, sync::Arc};
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
-        dataset::Demonstrations,
         file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
         recorder::{demo_actions, flush_unfinished},
+    },
+    vision::ObservationConfig,
+};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    demo::{
+        dataset::Demonstrations,
         verify::{ReplayStage, verify_file},
     },
-    game::build_world,
-    prelude::*,
-    vision::Sight,
+    worlds::build_world,
 };
 use playbot_tests::{Corridor, Drift};
 
@@ -88,7 +92,7 @@ fn kept_observations_equal_those_of_a_replay() {
     record(&bare.join("walk.demo"), header(), 10);
     record(&full.join("walk.demo"), DemoHeader { observation_names: Corridor.observation().names, ..header() }, 10);
     let load = |path: &Path| {
-        let demos = Demonstrations::read(&Corridor, &Sight::default(), path, None).expect("readable");
+        let demos = Demonstrations::read(&Corridor, &ObservationConfig::default(), path, None).expect("readable");
         demos.dataset(&Corridor, 2, |_| {}).expect("replays")
     };
     assert_eq!(load(&bare), load(&full));
@@ -100,7 +104,7 @@ fn held_out_levels_are_not_learned_from() {
     let path = folder.path().join("walk.demo");
     record(&path, header(), 10);
     let load = |held_out: &str| {
-        Demonstrations::read(&Corridor, &Sight::default(), &path, Some(&held_out.parse().expect("a split")))
+        Demonstrations::read(&Corridor, &ObservationConfig::default(), &path, Some(&held_out.parse().expect("a split")))
     };
     let error = load("plain:7..15").expect_err("level 7 is recorded").to_string();
     for words in ["walk.demo", "level 7", "plain:7..15", "`test`"] {

@@ -4,15 +4,17 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    game::{build_seeing_world, build_world, furnish_app, spawn_agents},
-    prelude::*,
     test_app::{PlaybotTestExt, test_app},
-    train::worlds::on_threads,
-    vision::{ObservationKind, Sight},
+    vision::{ObservationConfig, ObservationKind},
 };
 use playbot_games::{
     antmaze::{AntMaze, SightedAntMaze},
     maze2d::{Maze2d, SightedMaze2d},
+};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    parallel::on_threads,
+    worlds::{add_game, build_observing_world, build_world, spawn_agents},
 };
 
 /// Every game with eyes, the same without, a mode, and how long an episode may take there.
@@ -24,8 +26,8 @@ fn games() -> [(Arc<dyn Game>, Arc<dyn Game>, &'static str, u64); 2] {
 }
 
 /// Two agents that push at random.
-fn build(game: &dyn Game, mode: &str, sight: &Sight, first: u32) -> (World, Vec<Entity>) {
-    let (mut world, agents) = build_seeing_world(game, mode, sight, 3, first, 2).expect("can be drawn");
+fn build(game: &dyn Game, mode: &str, sight: &ObservationConfig, first: u32) -> (World, Vec<Entity>) {
+    let (mut world, agents) = build_observing_world(game, mode, sight, 3, first, 2).expect("can be drawn");
     for &agent in &agents {
         let levels = LevelQueue::Uniform { first: 0, last: 63 };
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, levels));
@@ -36,7 +38,7 @@ fn build(game: &dyn Game, mode: &str, sight: &Sight, first: u32) -> (World, Vec<
 #[test]
 fn eyes_change_nothing_in_the_game() {
     for (sighted, blind, mode, _) in games() {
-        let mut pair = [&sighted, &blind].map(|game| build(&**game, mode, &Sight::default(), 0));
+        let mut pair = [&sighted, &blind].map(|game| build(&**game, mode, &ObservationConfig::default(), 0));
         let (all, own) = (sighted.observation().len(), blind.observation().len());
         assert_eq!((all, sighted.version()), (own + 10, blind.version()));
         for tick in 0..150 {
@@ -62,7 +64,7 @@ fn eyes_change_nothing_in_the_game() {
 fn threads_change_nothing_that_is_seen() {
     for (game, _, mode, _) in games() {
         let seen = |threads| {
-            let mut worlds = [0, 2].map(|first| build(&*game, mode, &Sight::default(), first));
+            let mut worlds = [0, 2].map(|first| build(&*game, mode, &ObservationConfig::default(), first));
             on_threads(&mut worlds, threads, |(world, agents)| {
                 let mut seen = Vec::new();
                 for _ in 0..120 {
@@ -82,8 +84,8 @@ fn systems_are_in_one_order_with_pictures_and_without() {
     for (game, _, mode, limit) in games() {
         for kind in [ObservationKind::Vector, ObservationKind::Raster] {
             let mut app = test_app();
-            let sight = Sight { kind, ..Sight::default() };
-            furnish_app(&*game, &mut app, mode, &sight, 1).expect("can be drawn");
+            let sight = ObservationConfig { kind, ..ObservationConfig::default() };
+            add_game(&*game, &mut app, mode, &sight, 1).expect("can be drawn");
             let agent = spawn_agents(&*game, app.world_mut(), &sight, 0, 1)[0];
             game.arm_demonstrator(app.world_mut(), agent, 0.2);
             app.world_mut().entity_mut(agent).insert(Control::Bot);

@@ -14,10 +14,10 @@ use bevy_playbot::{
     demo::file::{Decider, DemoEnd, DemoReader, merge_demos},
     fault::FaultOccurred,
     headless::{Tick, set_fixed_step},
-    learner::{DeviceKind, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner},
     prelude::*,
     takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest},
 };
+use playbot_learner::{DeviceKind, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner};
 use playbot_tests::{Cell, Drift, corridor_plugin, spawn_walker};
 
 #[derive(Resource, Default)]
@@ -53,8 +53,14 @@ fn frames(app: &mut App, n: u32) {
 fn press_key(app: &mut App) {
     for state in [ButtonState::Pressed, ButtonState::Released] {
         let (key_code, logical_key, window) = (KeyCode::F9, Key::F9, Entity::PLACEHOLDER);
-        app.world_mut()
-            .write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window });
+        app.world_mut().write_message(KeyboardInput {
+            key_code,
+            logical_key,
+            state,
+            text: None,
+            repeat: false,
+            window,
+        });
     }
     app.update();
 }

@@ -1,16 +1,16 @@
 //! Where agents went, as the evaluation notes it and the picture shows it.
 
 use bevy::math::{Rect, Vec2};
-use bevy_playbot::{
+use bevy_playbot::vision::ObservationConfig;
+use playbot_games::{
+    maze::{Cell, Planner, fixed},
+    registry,
+};
+use playbot_lab::{
     eval::{EvalPlan, Player, Trail, evaluate, evaluate_with_trails},
     floor_plan::FloorPlan,
     game::Game,
     report::{Floor, Shape, TrailChart, Visits, Walker},
-    vision::Sight,
-};
-use playbot_games::{
-    maze::{Cell, Planner, fixed},
-    registry,
 };
 
 fn game(name: &str) -> &'static dyn Game {
@@ -20,7 +20,7 @@ fn game(name: &str) -> &'static dyn Game {
 fn plan(levels: &str, threads: usize) -> EvalPlan {
     EvalPlan {
         split: levels.parse().expect("a split"),
-        sight: Sight::default(),
+        sight: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 4,

@@ -5,13 +5,15 @@ use std::path::Path;
 use bevy_playbot::{
     bot::BlindBot,
     demo::{
-        dataset::Demonstrations,
         file::{DemoHeader, DemoWriter},
         recorder::demo_actions,
     },
-    game::build_world,
-    learner::{DeviceKind, SkillModel, SkillTrainer},
-    prelude::*,
+    vision::ObservationConfig,
+};
+use playbot_games::coinrun::CoinRun;
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    demo::dataset::Demonstrations,
     train::{
         Algorithm, Experiment, Trainer,
         checkpoint::Which,
@@ -19,9 +21,9 @@ use bevy_playbot::{
         run_dir::{RunDir, RunError, RunInfo},
         trainer::TrainError,
     },
-    vision::Sight,
+    worlds::build_world,
 };
-use playbot_games::coinrun::CoinRun;
+use playbot_learner::{DeviceKind, SkillModel, SkillTrainer};
 use playbot_tests::Corridor;
 
 const EXPERIMENT: &str = r#"(
@@ -66,7 +68,7 @@ fn skills(folder: &Path) -> SkillModel {
     while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
         world.tick().expect("sound");
     }
-    let demos = Demonstrations::read(&Corridor, &Sight::default(), &path, None).expect("readable");
+    let demos = Demonstrations::read(&Corridor, &ObservationConfig::default(), &path, None).expect("readable");
     let dataset = demos.dataset(&Corridor, 2, |_| {}).expect("replays");
     let config = experiment().skills;
     let epochs = config.epochs;
@@ -205,7 +207,7 @@ fn levels_can_be_chosen_as_the_original_does() {
     let queue = playbot_games::coinrun::LevelQueue::new(levels, 3);
     let mut expected = queue.clone();
     let mut source = LevelQueue::Custom(Box::new(queue));
-    let mut unused = bevy_playbot::learner::Streams::new(0).stream("unused", 0);
+    let mut unused = playbot_learner::Streams::new(0).stream("unused", 0);
     for _ in 0..20 {
         let level = source.next_level(&mut unused).expect("never ends");
         assert_eq!(level, u64::from(expected.next_level()));

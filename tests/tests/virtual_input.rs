@@ -250,9 +250,10 @@ fn mouse() -> VirtualInput {
 }
 
 fn note_motions(app: &mut App) {
-    let in_ticks = |motion: Res<AccumulatedMouseMotion>, wheel: Res<AccumulatedMouseScroll>, mut seen: ResMut<Motions>| {
-        seen.ticks.push(Vec2::new(motion.delta.x, wheel.delta.y));
-    };
+    let in_ticks =
+        |motion: Res<AccumulatedMouseMotion>, wheel: Res<AccumulatedMouseScroll>, mut seen: ResMut<Motions>| {
+            seen.ticks.push(Vec2::new(motion.delta.x, wheel.delta.y));
+        };
     let in_frames = |motion: Res<AccumulatedMouseMotion>,
                      wheel: Res<AccumulatedMouseScroll>,
                      mut read: MessageReader<MouseMotion>,
@@ -260,7 +261,9 @@ fn note_motions(app: &mut App) {
         seen.frames.push(Vec2::new(motion.delta.x, wheel.delta.y));
         seen.messages += read.read().map(|message| message.delta).sum::<Vec2>();
     };
-    app.init_resource::<Motions>().add_systems(FixedUpdate, in_ticks.ambiguous_with_all()).add_systems(Update, in_frames);
+    app.init_resource::<Motions>()
+        .add_systems(FixedUpdate, in_ticks.ambiguous_with_all())
+        .add_systems(Update, in_frames);
 }
 
 #[test]

@@ -5,16 +5,15 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
-    game::build_seeing_world,
     headless::{Tick, into_world},
-    prelude::*,
-    train::worlds::on_threads,
     vision::{
-        BlankEpisodes, Frame, ImageOptions, ImageSensor, ObservationKind, PaintedVelocity, Sight, VisionPlugin,
-        VisionSystems,
+        BlankEpisodes, Frame, ImageOptions, ImageSensor, ObservationConfig, ObservationKind, PaintedVelocity,
+        VisionPlugin, VisionSystems,
     },
 };
 use playbot_games::coinrun::CoinRun;
+use playbot_lab::prelude::*;
+use playbot_lab::{parallel::on_threads, worlds::build_observing_world};
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 
 /// What is wrong with the test's sensor.
@@ -209,7 +208,7 @@ fn an_agent_that_sees_nothing_is_reported_once() {
     assert_eq!(world.get::<BlankEpisodes>(agent).expect("an eye").episodes, 2);
 }
 
-const RASTER: Sight = Sight {
+const RASTER: ObservationConfig = ObservationConfig {
     kind: ObservationKind::Raster,
     image: ImageOptions { width: 64, height: 64, stack: 2, grayscale: false, paint_velocity: true },
 };
@@ -218,7 +217,7 @@ const RASTER: Sight = Sight {
 fn coinrun(agents: &[(u32, u32)]) -> Vec<(World, Vec<Entity>)> {
     let mut worlds = Vec::new();
     for &(first, count) in agents {
-        let built = build_seeing_world(&CoinRun::default(), "hard", &RASTER, 3, first, count);
+        let built = build_observing_world(&CoinRun::default(), "hard", &RASTER, 3, first, count);
         let (mut world, agents) = built.expect("it can be drawn");
         for agent in &agents {
             let queue = LevelQueue::Uniform { first: 0, last: 63 };

@@ -3,11 +3,9 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    floor_plan::FloorPlan,
-    prelude::*,
-    vision::{Picture, VisionSystems},
-};
+use bevy_playbot::vision::{Picture, VisionSystems};
+use playbot_lab::floor_plan::FloorPlan;
+use playbot_lab::prelude::*;
 
 use super::{
     picture::AntPicturePlugin,
@@ -89,6 +87,15 @@ impl Game for Ant {
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         let agent = Agent::new(index, self.actions());
         world.spawn((agent, VectorSensor::from_space(SPACE.clone()), Walker::default())).id()
+    }
+
+    fn has_space_view(&self) -> bool {
+        true
+    }
+
+    #[cfg(feature = "view3d")]
+    fn build_space_view(&self, app: &mut App) {
+        app.add_plugins(crate::antview::SolidViewPlugin);
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the open floor looks like.
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 use super::walk::{GOAL_RADIUS, Walker};
 use crate::antview::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround};

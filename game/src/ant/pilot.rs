@@ -3,7 +3,7 @@
 use std::{path::Path, sync::LazyLock};
 
 use bevy::math::Vec2;
-use bevy_playbot::learner::{Action, DeviceKind, FileError, LearnError, Policy, PolicyFile};
+use playbot_learner::{Action, DeviceKind, FileError, LearnError, Policy, PolicyFile};
 use thiserror::Error;
 
 use super::{

@@ -1,6 +1,7 @@
 //! Positions and velocities of the ant, in MuJoCo's order.
 
-use bevy_playbot::{learner::rng::normal, state_hash::StateHash};
+use bevy_playbot::state_hash::StateHash;
+use playbot_learner::rng::normal;
 use rand::{Rng, RngExt};
 
 use super::skeleton::NOMINAL_HEIGHT;

@@ -1,7 +1,8 @@
 //! People: keys say which way, and the walker walks.
 
 use bevy::prelude::*;
-use bevy_playbot::{agent::AgentOrder, fault::Faults, prelude::*};
+use bevy_playbot::{agent::AgentOrder, fault::Faults};
+use playbot_lab::prelude::*;
 
 use super::{
     pilot::{Pilot, PilotInput},

@@ -1,7 +1,9 @@
 //! The game `ant`: get to goals on an open floor.
 
 use bevy::prelude::*;
-use bevy_playbot::{fault::Faults, floor_plan::FloorPlan, prelude::*};
+use bevy_playbot::fault::Faults;
+use playbot_lab::floor_plan::FloorPlan;
+use playbot_lab::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_playbot::{agent::AgentOrder, fault::Faults, learner::rng::normal, policy::AgentStreams, prelude::*};
+use bevy_playbot::{agent::AgentOrder, fault::Faults, policy::AgentStreams};
+use playbot_lab::prelude::*;
+use playbot_learner::rng::normal;
 
 use super::{
     components::{InMaze, MazeAnt},

@@ -1,7 +1,7 @@
 //! A level as the plan that trajectories are drawn on, in metres.
 
 use bevy::math::{Rect, Vec2};
-use bevy_playbot::floor_plan::FloorPlan;
+use playbot_lab::floor_plan::FloorPlan;
 
 use super::{
     geometry::{CELL, centre_of},

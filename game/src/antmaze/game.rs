@@ -3,13 +3,20 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{floor_plan::FloorPlan, mode::ModeError, prelude::*, vision::Picture};
+use bevy_playbot::vision::{ObservationKind, Picture};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView},
+    mode::ModeError,
+};
 
 use super::{
     components::{MazeAnt, PlaysIn},
     demonstrator_bot::DemonstratorBot,
     level::generate,
-    mode::AntMazeMode,
+    mode::{AntMazeMode, AntMazeModeError},
     picture::AntMazePicturePlugin,
     plugin::AntMazePlugin,
     view,
@@ -21,7 +28,10 @@ use crate::{
         steering::key_bindings,
     },
     antview,
-    maze::Map,
+    maze::{
+        Map, Maze,
+        show_level::{self, MazeSource, unfit},
+    },
 };
 
 /// AntMaze under its name `antmaze`.
@@ -121,4 +131,29 @@ impl Game for AntMaze {
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
+
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        let vector = Benchmark::simulate("vector", "medium");
+        vec![vector, Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster)]
+    }
+
+    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        show_level::show(request, &MazeSource { map: Map::antmaze, level: maze_of })
+    }
+
+    fn has_space_view(&self) -> bool {
+        true
+    }
+
+    #[cfg(feature = "view3d")]
+    fn build_space_view(&self, app: &mut App) {
+        app.add_plugins(crate::antview::SolidViewPlugin);
+    }
+}
+
+/// The maze of a level, with its start and goal.
+fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
+    let parsed: AntMazeMode = mode.parse().map_err(|error: AntMazeModeError| error.of(mode))?;
+    let level = generate(&parsed, seed).map_err(unfit)?;
+    level.maze.with_ends(level.start, level.goal).map_err(unfit)
 }

@@ -1,6 +1,6 @@
 //! A level: the maze, where the ant is put into it, and where it should go.
 
-use bevy_playbot::learner::rng::{ChaCha8Rng, Streams, below, unit};
+use playbot_learner::rng::{ChaCha8Rng, Streams, below, unit};
 
 use super::{
     geometry::centre_of,

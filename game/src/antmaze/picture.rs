@@ -1,7 +1,7 @@
 //! What AntMaze looks like.
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 use super::{
     components::{InMaze, MazeAnt, PlaysIn},

@@ -1,7 +1,8 @@
 //! One tick of every arena.
 
 use bevy::{math::ops, prelude::*};
-use bevy_playbot::{fault::Faults, prelude::*};
+use bevy_playbot::fault::Faults;
+use playbot_lab::prelude::*;
 
 use super::{
     components::{AntMazeRules, InMaze, MazeAnt},

@@ -1,7 +1,8 @@
 //! AntMaze as a Bevy plugin.
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
+use playbot_lab::prelude::*;
 
 use super::{
     arena,

@@ -1,8 +1,9 @@
 //! AntMaze for ants that see.
 
 use bevy::{math::Vec3, prelude::*};
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
 use bevy_rapier3d::rapier::prelude::{QueryFilter, Ray};
+use playbot_lab::prelude::*;
 
 use super::{
     components::{InMaze, MazeAnt},
@@ -48,7 +49,7 @@ fn distance(walls: &Walls, eye: Vec3, [east, north]: [f64; 2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::game::build_world;
+    use playbot_lab::worlds::build_world;
 
     use super::*;
 

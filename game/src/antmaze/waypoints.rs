@@ -1,6 +1,6 @@
 //! From cell to cell to the goal.
 
-use bevy_playbot::learner::rng::{ChaCha8Rng, unit};
+use playbot_learner::rng::{ChaCha8Rng, unit};
 
 use super::{
     geometry::{cell_at, centre_of, distance},
@@ -54,7 +54,7 @@ impl Waypoints {
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::learner::rng::Streams;
+    use playbot_learner::rng::Streams;
 
     use super::*;
     use crate::antmaze::generate;

@@ -12,10 +12,11 @@ mod solid;
 pub use components::{AntPose, GoalMark, Ground, OnGround};
 pub use flat::VIEW;
 #[cfg(feature = "view3d")]
-pub use solid::{SolidAnt, SolidViewPlugin};
+pub use solid::SolidViewPlugin;
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
+use playbot_lab::prelude::*;
 
 /// Parts of [`VisionSystems::Dress`] for games with ants, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,7 +1,5 @@
 //! The program `playbot`.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    playbot_games::cli::main()
+fn main() -> std::process::ExitCode {
+    playbot_cli::main(&playbot_games::registry::GAMES)
 }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_playbot::{bot::uniform, fault::Faults, policy::AgentStreams, prelude::*};
+use bevy_playbot::{bot::uniform, fault::Faults, policy::AgentStreams};
+use playbot_lab::prelude::*;
 use rand::RngExt;
 
 use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator, play::NOTHING};

@@ -1,7 +1,7 @@
 //! A level as the plan that trajectories are drawn on.
 
 use bevy::math::{Rect, Vec2};
-use bevy_playbot::floor_plan::{FloorPlan, joined_tiles};
+use playbot_lab::floor_plan::{FloorPlan, joined_tiles};
 
 use super::{Level, Spawn, rules::Body};
 

@@ -3,7 +3,13 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{floor_plan::FloorPlan, prelude::*, vision::Picture};
+use bevy_playbot::vision::{ObservationKind, Picture};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView},
+};
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
@@ -12,7 +18,7 @@ use super::{
     picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
     rules::ACTIONS,
-    view,
+    show_level, view,
 };
 
 /// CoinRun under its name `coinrun`.
@@ -121,5 +127,36 @@ impl Game for CoinRun {
 
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+
+    fn experiment(&self) -> Option<(&'static str, &'static str)> {
+        Some(("assets/experiments/coinrun.ron", include_str!("../../../assets/experiments/coinrun.ron")))
+    }
+
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        let mut all = vec![
+            Benchmark::simulate("vector", "hard"),
+            Benchmark::simulate("physics", "hard").of(&CoinRun { physics: true }),
+            Benchmark::simulate("raster", "hard").seeing(ObservationKind::Raster),
+            Benchmark::train("vector", "hard"),
+            Benchmark::train("raster", "hard").seeing(ObservationKind::Raster),
+        ];
+        if cfg!(feature = "camera") {
+            all.push(Benchmark::simulate("camera", "hard").seeing(ObservationKind::Camera));
+        }
+        all
+    }
+
+    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        show_level::show(self, request)
+    }
+
+    fn trace_columns(&self) -> Vec<String> {
+        ["x", "y", "vx", "vy"].map(str::to_owned).to_vec()
+    }
+
+    fn trace_row(&self, world: &World, agent: Entity) -> Vec<f32> {
+        let body = world.get::<PlayerBody>(agent).map(|body| body.0).unwrap_or_default();
+        vec![body.x, body.y, body.vx, body.vy]
     }
 }

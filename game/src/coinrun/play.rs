@@ -1,7 +1,7 @@
 //! One tick of every arena, by the rules.
 
 use bevy::{ecs::system::SystemParam, prelude::*};
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 use super::{
     Outcome,

@@ -1,7 +1,8 @@
 //! CoinRun as a Bevy plugin.
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
+use playbot_lab::prelude::*;
 
 use super::{Mode, arena, components::CoinRunMode, demonstrator_bot, physics::CoinRunPhysicsPlugin, play};
 

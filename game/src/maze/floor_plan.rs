@@ -1,7 +1,7 @@
 //! A maze as the plan that trajectories are drawn on.
 
 use bevy::math::{Rect, Vec2};
-use bevy_playbot::floor_plan::FloorPlan;
+use playbot_lab::floor_plan::FloorPlan;
 
 use super::{cell::Cell, layout::Maze};
 

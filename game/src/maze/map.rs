@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use bevy_playbot::game::UnknownName;
+use bevy_playbot::unknown_name::UnknownName;
 use thiserror::Error;
 
 use super::{error::MazeError, fixed, generator::generate, layout::Maze, spec::MazeSpec, spec_text::OptionError};

@@ -16,6 +16,7 @@ mod layout;
 mod map;
 mod planner;
 mod rooms;
+pub mod show_level;
 mod spec;
 mod spec_text;
 mod text;

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_playbot::{fault::Faults, prelude::*};
+use bevy_playbot::fault::Faults;
+use playbot_lab::prelude::*;
 
 use super::{
     components::{Maze2dRules, MazeArena, MazeBall, PlaysIn},

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use bevy_playbot::learner::rng::unit;
+use playbot_learner::rng::unit;
 use rand::Rng;
 
 use super::{

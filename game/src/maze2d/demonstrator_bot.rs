@@ -1,7 +1,8 @@
 //! The waypoint demonstrator as an agent of the game.
 
 use bevy::prelude::*;
-use bevy_playbot::{policy::AgentStreams, prelude::*};
+use bevy_playbot::policy::AgentStreams;
+use playbot_lab::prelude::*;
 
 use super::{
     components::{Maze2dRules, MazeArena, MazeBall, PlaysIn},

@@ -1,6 +1,6 @@
 //! Random numbers that are the same on every machine.
 
-use bevy_playbot::learner::rng::unit;
+use playbot_learner::rng::unit;
 use rand::Rng;
 
 /// A standard normal number, by Marsaglia's polar method.
@@ -22,7 +22,7 @@ pub(super) fn uniform(rng: &mut impl Rng, half: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy_playbot::learner::rng::Streams;
+    use playbot_learner::rng::Streams;
 
     #[test]
     fn normal_draws_have_mean_zero_and_variance_one() {

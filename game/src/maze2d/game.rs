@@ -3,17 +3,32 @@
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
-use bevy_playbot::{floor_plan::FloorPlan, mode::ModeError, prelude::*, vision::Picture};
+use bevy_playbot::vision::{ObservationKind, Picture};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
+    mode::ModeError,
+};
 
 use super::{
     components::{MazeBall, PlaysIn},
     demonstrator_bot::DemonstratorBot,
     floor_plan::point,
     level::Maze2dLevel,
-    mode::Maze2dMode,
+    mode::{Maze2dMode, Maze2dModeError},
     picture::{Maze2dPicturePlugin, VIEW},
     play::OBSERVED,
     plugin::Maze2dPlugin,
+    trace,
+};
+use crate::{
+    maze::{
+        Map, Maze,
+        show_level::{self, MazeSource, unfit},
+    },
+    sighted::Sighted,
 };
 
 /// Maze2D under its name `maze2d`.
@@ -125,4 +140,31 @@ impl Game for Maze2d {
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
+
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        vec![
+            Benchmark::simulate("vector", "medium"),
+            Benchmark::simulate("physics", "medium").of(&Maze2d { physics: true }),
+            Benchmark::simulate("rapier", "medium+contact=rapier"),
+            Benchmark::simulate("random", "random"),
+            Benchmark::simulate("sighted", "random").of(&Sighted(Maze2d { physics: false })),
+            Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster),
+            Benchmark::train("vector", "medium"),
+        ]
+    }
+
+    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        show_level::show(request, &MazeSource { map: Map::maze2d, level: maze_of })
+    }
+
+    fn trace(&self, request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>> {
+        Some(trace::run(request, print))
+    }
+}
+
+/// The maze of a level, with its start and goal.
+fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
+    let parsed: Maze2dMode = mode.parse().map_err(|error: Maze2dModeError| error.of(mode))?;
+    let Maze2dLevel { maze, start_cell, goal_cell, .. } = Maze2dLevel::new(&parsed, seed).map_err(unfit)?;
+    maze.with_ends(start_cell, goal_cell).map_err(unfit)
 }

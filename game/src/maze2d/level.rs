@@ -1,6 +1,6 @@
 //! A level: maze, start and goal, from a mode and a seed.
 
-use bevy_playbot::learner::rng::{Streams, below};
+use playbot_learner::rng::{Streams, below};
 use rand::Rng;
 
 use super::{

@@ -23,6 +23,7 @@ mod ray;
 pub mod sighted;
 pub mod sim;
 pub mod soft;
+mod trace;
 pub mod walls;
 
 pub use ball::Ball;

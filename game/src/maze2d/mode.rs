@@ -2,7 +2,8 @@
 
 use std::{fmt, str::FromStr};
 
-use bevy_playbot::{game::UnknownName, mode::ModeError};
+use bevy_playbot::unknown_name::UnknownName;
+use playbot_lab::mode::ModeError;
 use thiserror::Error;
 
 use super::walls::D4RL_OFFSET;

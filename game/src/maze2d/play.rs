@@ -1,7 +1,7 @@
 //! One tick of every arena.
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 use super::{
     ball::clip_action,

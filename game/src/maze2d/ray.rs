@@ -35,8 +35,8 @@ impl Walls {
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::learner::rng::Streams;
     use bevy_rapier2d::rapier::prelude::{QueryFilter, Ray, Vector};
+    use playbot_learner::rng::Streams;
 
     use super::*;
     use crate::{

@@ -1,7 +1,8 @@
 //! Maze2D for balls that see.
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
+use playbot_lab::prelude::*;
 
 use super::{
     ball::sub,
@@ -47,7 +48,7 @@ fn see(
 mod tests {
     use std::f32::consts::SQRT_2;
 
-    use bevy_playbot::game::build_world;
+    use playbot_lab::worlds::build_world;
 
     use super::*;
     use crate::maze2d::Ball;

@@ -1,1 +1,30 @@
-//! x
+//! The laboratory of [`bevy_playbot`]: everything that trains, measures and compares bots, headless and on many levels.
+//!
+//! - A [`Game`](game::Game) says how a game is built without a window, many arenas at a time.
+//! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
+//! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
+//! - [`policy_export`] makes the one file that a game ships with, for
+//!   [`policy_file`](bevy_playbot::policy_file) to load there.
+//!
+//! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.
+
+pub mod benchmark;
+pub mod demo;
+pub mod eval;
+pub mod floor_plan;
+pub mod game;
+pub mod games;
+pub mod held_out;
+pub mod inspect;
+pub mod mode;
+pub mod parallel;
+pub mod policy_export;
+pub mod prelude;
+pub mod report;
+pub mod runs;
+pub mod sensors;
+pub mod space_view;
+pub mod split;
+pub mod stage_clock;
+pub mod train;
+pub mod worlds;

@@ -1,8 +1,5 @@
-//! Demonstrations: recording what an agent does, checking recordings by replay, and reading them back for learning.
+//! Demonstrations: recording what an agent does, and replaying it to the bit.
 
-pub mod dataset;
 pub mod file;
-mod onlooker;
 pub mod recorder;
 pub mod replay;
-pub mod verify;

@@ -100,7 +100,8 @@ fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
 }
 
 /// Appends this tick to each recorded agent's episode; an ended episode goes to disk.
-pub(crate) fn record_ticks(
+#[doc(hidden)]
+pub fn record_ticks(
     recorder: Option<ResMut<Recorder>>,
     order: Res<AgentOrder>,
     mut agents: Query<(&Agent, &Control, &Action, &Reward, &StateHash, &Observation, &Episode, &mut Recording)>,

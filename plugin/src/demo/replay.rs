@@ -45,7 +45,7 @@ impl Replay {
     }
 
     /// Hands an agent over to this recording, from its first tick on: whatever it was playing is left at once.
-    pub(crate) fn begin(episode: Arc<DemoEpisode>, agent: &mut EntityWorldMut) {
+    pub fn begin(episode: Arc<DemoEpisode>, agent: &mut EntityWorldMut) {
         if let Some(mut running) = agent.get_mut::<Episode>() {
             running.abandon();
         }

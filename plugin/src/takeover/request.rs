@@ -5,7 +5,7 @@ use std::{fmt, path::PathBuf, str::FromStr};
 use bevy::prelude::*;
 use thiserror::Error;
 
-use crate::game::nearest;
+use crate::unknown_name::nearest;
 
 /// What somebody wants who takes over; in text `record:FILE`, `policy:FILE` or `replay:FILE`.
 #[derive(Clone, Debug, PartialEq, Eq, Reflect)]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::names::{unit_names, unit_variant};
-use crate::game::nearest;
+use crate::unknown_name::nearest;
 
 /// A key, a mouse button or a gamepad button.
 ///

@@ -3,18 +3,18 @@
 use playbot_learner::{ObsKind, PictureCard};
 use thiserror::Error;
 
-use super::{ImageOptions, ObservationKind, Sight};
-use crate::game::UnknownName;
+use super::{ImageOptions, ObservationConfig, ObservationKind};
+use crate::unknown_name::UnknownName;
 
 /// A file does not say how the pictures are made that its networks read, or not in a way that this version knows.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the file does not say how the pictures that it reads are made ({why}): make it again with this version")]
-pub struct UnknownSight {
+pub struct UnknownObservation {
     /// What is wrong.
     pub why: String,
 }
 
-impl Sight {
+impl ObservationConfig {
     /// What a file keeps of it; nothing for vectors, whose names are kept.
     pub fn card(&self) -> Option<PictureCard> {
         let ImageOptions { stack, grayscale, paint_velocity, .. } = self.image;
@@ -26,9 +26,9 @@ impl Sight {
     ///
     /// # Errors
     ///
-    /// [`UnknownSight`] if the card is missing, not understood, or of pictures of another shape.
-    pub fn from_card(card: Option<&PictureCard>, observation: &ObsKind) -> Result<Self, UnknownSight> {
-        let unknown = |why: String| Err(UnknownSight { why });
+    /// [`UnknownObservation`] if the card is missing, not understood, or of pictures of another shape.
+    pub fn from_card(card: Option<&PictureCard>, observation: &ObsKind) -> Result<Self, UnknownObservation> {
+        let unknown = |why: String| Err(UnknownObservation { why });
         let (card, shape) = match (card, observation) {
             (None, ObsKind::Vector(_)) => return Ok(Self::default()),
             (Some(card), ObsKind::Image(shape)) => (card, shape),
@@ -36,7 +36,7 @@ impl Sight {
             (Some(_), _) => return unknown(format!("it reads {observation}, and has a card of pictures")),
         };
         let kind: ObservationKind =
-            card.sensor.parse().map_err(|error: UnknownName| UnknownSight { why: error.to_string() })?;
+            card.sensor.parse().map_err(|error: UnknownName| UnknownObservation { why: error.to_string() })?;
         let image = ImageOptions {
             width: shape.width as u32,
             height: shape.height as u32,
@@ -59,10 +59,13 @@ mod tests {
     #[test]
     fn cards_are_read_as_written_and_only_beside_what_they_describe() {
         let image = ImageOptions { stack: 4, grayscale: true, width: 48, ..ImageOptions::default() };
-        let sight = Sight { kind: ObservationKind::Camera, image };
+        let sight = ObservationConfig { kind: ObservationKind::Camera, image };
         let card = sight.card();
-        assert_eq!(Sight::from_card(card.as_ref(), &image.obs_kind()), Ok(sight));
-        assert_eq!(Sight::from_card(Sight::default().card().as_ref(), &ObsKind::Vector(3)), Ok(Sight::default()));
+        assert_eq!(ObservationConfig::from_card(card.as_ref(), &image.obs_kind()), Ok(sight));
+        assert_eq!(
+            ObservationConfig::from_card(ObservationConfig::default().card().as_ref(), &ObsKind::Vector(3)),
+            Ok(ObservationConfig::default())
+        );
         let other = |sensor: &str| card.clone().map(|card| PictureCard { sensor: sensor.to_owned(), ..card });
         for (card, observation, words) in [
             (None, image.obs_kind(), "has no card"),
@@ -71,7 +74,8 @@ mod tests {
             (other("sonar"), image.obs_kind(), "sonar"),
             (other("vector"), image.obs_kind(), "tells of vectors"),
         ] {
-            let error = Sight::from_card(card.as_ref(), &observation).expect_err("does not fit").to_string();
+            let error =
+                ObservationConfig::from_card(card.as_ref(), &observation).expect_err("does not fit").to_string();
             assert!(error.contains(words), "{error}");
         }
     }

@@ -5,7 +5,7 @@ mod ground;
 mod limbs;
 
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 use super::AntViewSystems;
 use art::Art;

@@ -2,6 +2,8 @@
 
 use bevy::prelude::*;
 
+use playbot_lab::space_view::CameraFocus;
+
 use super::scenery::matt;
 use crate::{
     ant::{PARTS, Part},
@@ -21,13 +23,6 @@ pub struct SolidAnt {
     to: [Part; PARTS],
 }
 
-impl SolidAnt {
-    /// The entity of the torso, for cameras to follow.
-    pub fn torso(&self) -> Entity {
-        self.limbs[0]
-    }
-}
-
 /// Makes meshes of new ants.
 pub fn build(
     new: Query<(Entity, &OnGround, &AntPose), Without<SolidAnt>>,
@@ -44,7 +39,8 @@ pub fn build(
             commands.spawn((ChildOf(ground.0), Mesh3d(mesh), MeshMaterial3d(paint), place(&limb))).id()
         });
         let goal = commands.spawn((ChildOf(ground.0), Transform::default(), Visibility::default())).id();
-        commands.entity(agent).insert(SolidAnt { limbs, goal, from: pose.0, to: pose.0 });
+        // The camera follows the torso.
+        commands.entity(agent).insert((CameraFocus(limbs[0]), SolidAnt { limbs, goal, from: pose.0, to: pose.0 }));
     }
 }
 

@@ -3,10 +3,8 @@
 mod ants;
 mod scenery;
 
-pub use ants::SolidAnt;
-
 use bevy::prelude::*;
-use bevy_playbot::prelude::*;
+use playbot_lab::prelude::*;
 
 use super::AntViewSystems;
 

@@ -1,7 +1,8 @@
 //! Brings sprites up to date with the game: places, poses, directions. Touches what moves, and nothing else.
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::PaintedVelocity};
+use bevy_playbot::vision::PaintedVelocity;
+use playbot_lab::prelude::*;
 
 use super::{
     art::{Art, Pose},

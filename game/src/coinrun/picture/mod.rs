@@ -13,7 +13,8 @@ mod trail;
 pub use art::{Art, Pose};
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
+use playbot_lab::prelude::*;
 
 /// Tiles from the left to the right edge of what an agent sees.
 pub const VIEW: f32 = 13.0;

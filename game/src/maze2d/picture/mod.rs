@@ -6,7 +6,8 @@ mod art;
 mod dress;
 
 use bevy::prelude::*;
-use bevy_playbot::{prelude::*, vision::VisionSystems};
+use bevy_playbot::vision::VisionSystems;
+use playbot_lab::prelude::*;
 
 /// Width of what an agent sees, in world units: the longer side of the maze.
 pub const VIEW: f32 = 12.0;

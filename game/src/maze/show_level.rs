@@ -1,0 +1,131 @@
+//! A maze for people, for programs, and as a drawing.
+
+use std::{fs::File, io::Read, path::Path};
+
+use bevy::math::{Rect, Vec2};
+use playbot_lab::{
+    inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
+    report::{Drawing, MarkForm, Rgb, Shape},
+};
+use serde_json::json;
+
+use super::{Cell, MAX_CELLS, Map, MapError, Maze, MazeError};
+
+/// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
+const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
+
+/// Where the mazes of a game come from.
+pub struct MazeSource {
+    /// A map and a seed, with the start and the goal of the map.
+    pub map: fn(&Map, u64) -> Result<Maze, MazeError>,
+    /// A whole mode and a seed, with the start and the goal of that level.
+    pub level: fn(&str, u64) -> Result<Maze, InspectError>,
+}
+
+/// A maze that cannot be, as something that was asked for.
+pub fn unfit(error: MazeError) -> InspectError {
+    InspectError::Usage(error.to_string())
+}
+
+/// Shows a maze.
+pub fn show(request: &LevelRequest, game: &MazeSource) -> Result<LevelView, InspectError> {
+    if request.mode.is_some() {
+        return Err(InspectError::Usage(
+            "mazes are named by --map, which takes whole modes too, and --seed".to_owned(),
+        ));
+    }
+    let maze = maze(request, game)?;
+    let json = json!({
+        "rows": maze.to_rows(),
+        "start": maze.start(),
+        "goal": maze.goal(),
+        "shortest_path_length": maze.difficulty(),
+    });
+    // The empty line ends the rows for whoever reads this as a file.
+    let legend = format!("S start  G goal  # wall  . shortest path: {} moves", maze.difficulty());
+    Ok(LevelView {
+        text: format!("{}\n\n{legend}", picture(&maze).join("\n")),
+        json: json.to_string(),
+        picture: request.picture.then(|| draw(&maze).map(LevelPicture::Drawing)).transpose()?,
+    })
+}
+
+fn maze(request: &LevelRequest, game: &MazeSource) -> Result<Maze, InspectError> {
+    let text = request.map.unwrap_or("random");
+    let seed = request.seed.unwrap_or(0);
+    let map: Map = match text.parse() {
+        Ok(map) => map,
+        Err(MapError::Name(error)) if error.what == "map" => {
+            return from_file(Path::new(text), request, &error.to_string());
+        }
+        // Not an option of the map: one of the game's.
+        Err(_) => return (game.level)(text, seed),
+    };
+    if request.seed.is_some() && !matches!(map, Map::Random(_)) {
+        return Err(no_seed(&map.to_string()));
+    }
+    (game.map)(&map, seed).map_err(unfit)
+}
+
+fn no_seed(map: &str) -> InspectError {
+    InspectError::Usage(format!("`{map}` has no seed: leave --seed out, or take --map random"))
+}
+
+/// The maze in a file of rows; `unknown` says that the text names no map either.
+fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze, InspectError> {
+    let shown = path.display();
+    let file = File::open(path).map_err(|error| InspectError::Usage(format!("{unknown}; and no file: {error}")))?;
+    if request.seed.is_some() {
+        return Err(no_seed(&shown.to_string()));
+    }
+    let mut text = String::new();
+    let read = file.take(MAX_BYTES + 1).read_to_string(&mut text);
+    read.map_err(|error| InspectError::Usage(format!("cannot read {shown}: {error}")))?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(InspectError::Usage(format!(
+            "{shown}: more than {MAX_CELLS} cells are no maze that fits into memory"
+        )));
+    }
+    // Some editors put a mark in front of all they write.
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim_end);
+    let rows: Vec<&str> = lines.skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();
+    Maze::parse(&rows).map_err(|error| InspectError::Usage(format!("{shown}: {error}")))
+}
+
+/// The rows for people, with the shortest path.
+fn picture(maze: &Maze) -> Vec<String> {
+    let mut rows: Vec<Vec<char>> = maze.to_rows().iter().map(|row| row.replace('O', " ").chars().collect()).collect();
+    let path = maze.shortest_path();
+    let inner = path.iter().skip(1).take(path.len().saturating_sub(2));
+    for &Cell { row, col } in inner {
+        rows[row][col] = '.';
+    }
+    rows.into_iter().map(String::from_iter).collect()
+}
+
+/// Side of a cell in a drawing, pixels.
+const SIDE: f32 = 16.0;
+/// Most cells to a side of a drawing.
+const MOST_DRAWN: usize = 256;
+const WALL: Rgb = [190, 195, 201];
+const PATH: Rgb = [0, 114, 178];
+const INK: Rgb = [31, 35, 40];
+
+/// The maze with its shortest path, the first row at the top.
+fn draw(maze: &Maze) -> Result<Drawing, InspectError> {
+    if maze.rows().max(maze.columns()) > MOST_DRAWN {
+        return Err(InspectError::Usage(format!(
+            "no more than {MOST_DRAWN} cells to a side are drawn: leave --png out"
+        )));
+    }
+    let place = |cell: Cell| Vec2::new(cell.col as f32 + 0.5, cell.row as f32 + 0.5) * SIDE;
+    let square = |cell| Rect::from_center_size(place(cell), Vec2::splat(SIDE));
+    let mut shapes: Vec<_> = maze.wall_cells().map(|cell| Shape::Block { area: square(cell), fill: WALL }).collect();
+    let points = maze.shortest_path().into_iter().map(place).collect();
+    shapes.push(Shape::Line { points, width: 3.0, colour: PATH, opacity: 1.0 });
+    for (form, cell, fill) in [(MarkForm::Disc, maze.start(), [255; 3]), (MarkForm::Diamond, maze.goal(), INK)] {
+        shapes.push(Shape::Mark { form, centre: place(cell), radius: SIDE / 3.0, fill, outline: INK });
+    }
+    let size = Vec2::new(maze.columns() as f32, maze.rows() as f32) * SIDE;
+    Ok(Drawing { label: "A maze with its shortest path".to_owned(), size, shapes })
+}

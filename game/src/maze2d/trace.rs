@@ -1,0 +1,90 @@
+//! Tracing Maze2D: the ball under given pushes.
+
+use std::path::Path;
+
+use playbot_lab::inspect::{InspectError, Print, TraceRequest, plain, read_text};
+
+use super::{
+    Ball, Maze2dLevel, Maze2dMode, Maze2dModeError,
+    ball::{Vec2d, clip_action},
+    sim::BallSim,
+};
+
+/// Plays the pushes of a file and prints the ball after each; says how many of them had to be clipped.
+pub(super) fn run(request: &TraceRequest, print: Print) -> Result<Option<String>, InspectError> {
+    let Some(path) = request.file else {
+        return Err(InspectError::Usage(
+            "the pushes of maze2d are numbers: write them to a file, one `ux uy` a line, and \
+            name it with --actions-file"
+                .to_owned(),
+        ));
+    };
+    let name = request.mode.unwrap_or("medium");
+    let mode: Maze2dMode = name.parse().map_err(|error: Maze2dModeError| error.of(name))?;
+    let mut level = Maze2dLevel::new(&mode, request.seed).map_err(|error| InspectError::Usage(error.to_string()))?;
+    if !request.start.is_empty() {
+        level.start = start(request.start, &level)?;
+    }
+    let (pushes, clipped) = pushes(&read_text(path)?, path)?;
+    let mut sim = BallSim::new(&mode, &level);
+    if !request.json {
+        print(format!("{:>5} {:>22} {:>22} {:>22} {:>22}", "step", "x", "y", "vx", "vy"))?;
+    }
+    for (step, push) in pushes.into_iter().enumerate() {
+        sim.step(push);
+        let Ball { position: [x, y], velocity: [vx, vy] } = sim.ball;
+        let state = [x, y, vx, vy].map(plain);
+        if request.json {
+            print(format!("[{}]", state.join(",")))?;
+        } else {
+            let [x, y, vx, vy] = state;
+            print(format!("{:>5} {x:>22} {y:>22} {vx:>22} {vy:>22}", step + 1))?;
+        }
+    }
+    let note = format!("{}: {clipped} pushes lay outside -1 to 1 and were clipped", path.display());
+    Ok((clipped > 0).then_some(note))
+}
+
+/// The ball as `--start` has it.
+fn start(values: &[f64], level: &Maze2dLevel) -> Result<Ball, InspectError> {
+    let &[x, y, vx, vy] = values else {
+        return Err(InspectError::Usage(format!("--start has {} numbers: write four, x,y,vx,vy", values.len())));
+    };
+    if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
+        return Err(InspectError::Usage(format!("--start has {bad}: write finite numbers")));
+    }
+    if !level.walls.is_free([x, y]) {
+        return Err(InspectError::Usage(format!(
+            "--start {x},{y} lies in a wall: x is the row and y the column of the map"
+        )));
+    }
+    Ok(Ball { position: [x, y], velocity: [vx, vy] })
+}
+
+/// The pushes in a file, clipped, and how many of them had to be.
+fn pushes(text: &str, path: &Path) -> Result<(Vec<Vec2d>, usize), InspectError> {
+    let mut clipped = 0;
+    let mut pushes = Vec::new();
+    for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let push = push(line).ok_or_else(|| {
+            let (path, line_number) = (path.display(), index + 1);
+            InspectError::Usage(format!(
+                "{path}, line {line_number}: `{line}` is no push; write two finite numbers, `ux uy`, each from -1 to 1"
+            ))
+        })?;
+        let (push, was_clipped) = clip_action(push);
+        clipped += usize::from(was_clipped);
+        pushes.push(push);
+    }
+    if pushes.is_empty() {
+        return Err(InspectError::Usage(format!("{} has no pushes: write one `ux uy` a line", path.display())));
+    }
+    Ok((pushes, clipped))
+}
+
+fn push(line: &str) -> Option<[f32; 2]> {
+    let mut words = line.split([' ', '\t', ',']).filter(|word| !word.is_empty());
+    let mut next = || words.next()?.parse::<f32>().ok().filter(|value| value.is_finite());
+    let push = [next()?, next()?];
+    words.next().is_none().then_some(push)
+}

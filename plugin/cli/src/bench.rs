@@ -1,0 +1,203 @@
+//! `playbot bench`: speed, as steps per second of the whole and microseconds of its parts.
+
+use std::time::Instant;
+
+use bevy::prelude::World;
+use bevy_playbot::vision::{ObservationConfig, ObservationKind};
+use playbot_lab::games::Games;
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    game::Game,
+    parallel::{default_threads, on_threads},
+    stage_clock::StageClock,
+    train::{Algorithm, Trainer},
+    worlds::build_observing_world,
+};
+use playbot_learner::{DeviceKind, nn::CnnKind};
+use serde_json::{Value, json};
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment::ExperimentArgs,
+};
+
+/// Measures speed. Numbers are for this machine and this moment; nothing is tested.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot bench --json
+  playbot bench --case sim/coinrun/vector --threads 1")]
+pub struct Args {
+    /// Only cases whose name contains this.
+    #[arg(long, default_value = "")]
+    case: String,
+    /// Arenas.
+    #[arg(long, default_value_t = 64)]
+    arenas: u32,
+    /// Threads; each has a World of its own.
+    #[arg(long, default_value_t = usual_threads())]
+    threads: usize,
+    /// Seconds to measure each case for, at least.
+    #[arg(long, default_value_t = 5.0)]
+    seconds: f64,
+    /// One line of JSON per case.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The largest power of two that the cores and the usual 64 arenas allow.
+fn usual_threads() -> usize {
+    1 << default_threads().min(64).ilog2()
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.seconds <= 0.0 {
+        return Err(CliError::Usage("--seconds must be more than 0".to_owned()));
+    }
+    if args.arenas == 0 || args.threads == 0 || !args.arenas.is_multiple_of(args.threads as u32) {
+        return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
+    }
+    let all: Vec<_> = games.iter().flat_map(|game| cases(game)).collect();
+    let wanted: Vec<_> = all.iter().filter(|(name, ..)| name.contains(&args.case)).collect();
+    if wanted.is_empty() {
+        let names: Vec<_> = all.iter().map(|(name, ..)| name.as_str()).collect();
+        return Err(CliError::Usage(format!("no case is called `{}`; cases: {}", args.case, names.join(", "))));
+    }
+    for (name, game, case) in wanted {
+        let measure = if case.train { train } else { simulate };
+        let measured = match measure(*game, case.mode, case.observation, &args, games) {
+            Err(CliError::Vision(error)) if args.case.is_empty() => {
+                tell!("{name}: {error}");
+                continue;
+            }
+            measured => measured?,
+        };
+        if args.json {
+            print_line(measured.to_json(name, &args))?;
+        } else {
+            print_line(format!(
+                "{name}: {:.0} steps/s with {} arenas on {} threads; peak memory {:.0} MiB; {}",
+                measured.steps_per_s,
+                args.arenas,
+                args.threads,
+                peak_rss_mib(),
+                measured.parts
+            ))?;
+        }
+    }
+    Ok(Outcome::Pass)
+}
+
+/// The measurements of a game: their names, the game that is played, and how.
+fn cases(game: &dyn Game) -> Vec<(String, &dyn Game, Benchmark)> {
+    let of = |case: Benchmark| (case.name(game), case.game.map_or(game, |other| other as &dyn Game), case);
+    game.benchmarks().into_iter().map(of).collect()
+}
+
+struct Measure {
+    steps_per_s: f64,
+    /// Microseconds per step of the parts, over all threads together.
+    parts: Value,
+}
+
+impl Measure {
+    fn to_json(&self, case: &str, args: &Args) -> Value {
+        json!({
+            "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
+            "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts,
+        })
+    }
+}
+
+/// Random actions on 64 levels, observations filled every tick.
+fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
+    let threads = args.threads as u32;
+    let (share, sight) = (args.arenas / threads, ObservationConfig { kind, ..ObservationConfig::default() });
+    let mut worlds = Vec::new();
+    for index in 0..threads {
+        let (mut world, agents) = build_observing_world(game, mode, &sight, 1, index * share, share)?;
+        for agent in agents {
+            let queue = LevelQueue::Uniform { first: 0, last: 63 };
+            world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
+        }
+        worlds.push(world);
+    }
+    if sight.is_image() {
+        // The first pictures are late: shaders and textures are prepared.
+        worlds.iter_mut().try_for_each(|world| world.ticks(10))?;
+    }
+    worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    const TICKS: u64 = 100;
+    let (start, mut ticks) = (Instant::now(), 0);
+    while start.elapsed().as_secs_f64() < args.seconds {
+        for done in on_threads(&mut worlds, args.threads, |world| world.ticks(TICKS)) {
+            done?;
+        }
+        ticks += TICKS;
+    }
+    let steps = (ticks * u64::from(args.arenas)) as f64;
+    let steps_per_s = steps / start.elapsed().as_secs_f64();
+    Ok(Measure { steps_per_s, parts: stages(worlds.iter_mut(), steps) })
+}
+
+/// PPO with 3 epochs and 8 minibatches: on state vectors with 256 steps a rollout, on pictures with 32 and the
+/// Nature-CNN.
+fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games: &Games) -> Result<Measure, CliError> {
+    let mut experiment = ExperimentArgs::default().load(games, [])?;
+    experiment.game = game.name().to_owned();
+    (experiment.train, experiment.test) = (levels(mode, 0), levels(mode, 64));
+    experiment.observation = kind;
+    experiment.arenas = args.arenas;
+    experiment.worlds = args.threads as u32;
+    experiment.algorithm = Algorithm::Ppo;
+    experiment.ppo.num_steps = if experiment.sight().is_image() { 32 } else { 256 };
+    experiment.ppo.cnn = CnnKind::Nature { feature: 256 };
+    experiment.ppo.epochs = 3;
+    experiment.ppo.minibatches = 8;
+    let mut trainer = Trainer::new(game, &experiment, None, DeviceKind::default(), args.threads)?;
+    trainer.update()?;
+    trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    let (start, before) = (Instant::now(), trainer.steps());
+    let mut learn_s = 0.0;
+    while start.elapsed().as_secs_f64() < args.seconds {
+        learn_s += trainer.update()?.timing.learn_s;
+    }
+    let steps = (trainer.steps() - before) as f64;
+    let steps_per_s = steps / start.elapsed().as_secs_f64();
+    let mut parts = stages(trainer.worlds_mut(), steps);
+    parts["learn"] = json!(microseconds(learn_s * args.threads as f64, steps));
+    Ok(Measure { steps_per_s, parts })
+}
+
+/// 64 levels of a mode.
+fn levels(mode: &str, first: u64) -> LevelSplit {
+    LevelSplit { mode: mode.to_owned(), first, last: first + 63 }
+}
+
+/// Microseconds per step that the Worlds' threads spent in each part of their ticks.
+fn stages<'a>(worlds: impl Iterator<Item = &'a mut World>, steps: f64) -> Value {
+    let mut sum = StageClock::default();
+    for world in worlds {
+        let clock = world.resource::<StageClock>();
+        sum.simulate_s += clock.simulate_s;
+        sum.observe_s += clock.observe_s;
+        sum.infer_s += clock.infer_s;
+        sum.record_s += clock.record_s;
+    }
+    json!({
+        "simulate": microseconds(sum.simulate_s, steps), "observe": microseconds(sum.observe_s, steps),
+        "infer": microseconds(sum.infer_s, steps), "record": microseconds(sum.record_s, steps),
+    })
+}
+
+fn microseconds(seconds: f64, steps: f64) -> f64 {
+    (1e8 * seconds / steps).round() / 100.0
+}
+
+/// Largest resident memory of this process so far, MiB; 0 where the system does not say.
+fn peak_rss_mib() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|rest| rest.split_whitespace().next()?.parse::<f64>().ok());
+    (kib.unwrap_or(0.0) / 1024.0).round()
+}

@@ -1,0 +1,78 @@
+//! `playbot config`.
+
+use clap::Subcommand;
+use playbot_lab::games::Games;
+use playbot_lab::train::{
+    Experiment,
+    presets::{PRESETS, Preset},
+};
+use serde_json::json;
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment::{ExperimentArgs, resolve},
+};
+
+/// Shows what an experiment comes to, and what it can be built on.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot config show --experiment my.ron --set ppo.lr=0.0003
+  playbot config presets
+  playbot config presets skill-paper")]
+pub struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Print the experiment with all its values, as it would be run, in RON.
+    Show {
+        #[command(flatten)]
+        from: ExperimentArgs,
+    },
+    /// List the presets that `base: [...]` in an experiment file can name, or print one.
+    Presets {
+        /// The preset to print.
+        name: Option<String>,
+        /// One line of JSON per preset.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Checks what an experiment says of its game. Recordings may still be made.
+fn check(experiment: &Experiment, games: &Games) -> Result<(), CliError> {
+    experiment.check_levels(games.get(&experiment.game)?)?;
+    let demos = experiment.demos.as_deref().filter(|_| experiment.algorithm.needs_skills());
+    if let Some(path) = demos.filter(|path| !resolve(path).exists()) {
+        tell!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
+    }
+    Ok(())
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    match args.what {
+        What::Show { from } => {
+            let experiment = from.load(games, [])?;
+            check(&experiment, games)?;
+            print_line(experiment.to_ron().map_err(|error| CliError::Usage(error.to_string()))?)?;
+        }
+        What::Presets { name, json } => {
+            let chosen_by_name = name.is_some();
+            let chosen = match &name {
+                Some(name) => vec![Preset::find(name)?],
+                None => PRESETS.to_vec(),
+            };
+            for preset in chosen {
+                let (Preset { name, text }, about) = (preset, preset.about());
+                print_line(match (json, chosen_by_name) {
+                    (true, _) => json!({ "name": name, "about": about, "ron": text }).to_string(),
+                    (false, true) => text.trim_end().to_owned(),
+                    (false, false) => format!("{name:<24} {about}"),
+                })?;
+            }
+        }
+    }
+    Ok(Outcome::Pass)
+}

@@ -1,0 +1,290 @@
+//! `playbot eval`.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::{
+    policy::{ActionDraw, in_words},
+    skill_prior::SkillPrior,
+    vision::{ObservationConfig, ObservationKind},
+};
+use playbot_lab::games::Games;
+use playbot_lab::sensors::GameSensors;
+use playbot_lab::{
+    eval::{EvalPlan, Player},
+    game::Game,
+    held_out::HeldOut,
+    parallel::default_threads,
+    report::to_text_table,
+    split::LevelSplit,
+    train::{Experiment, checkpoint::Which, run_dir::RunDir},
+};
+use playbot_learner::{DeviceKind, PolicyFile, SkillModel, SkillSource};
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment::{ExperimentArgs, option},
+    footprints::Footprints,
+    methods,
+    number::at_least_one,
+    player::Chosen,
+};
+
+/// Measures trained runs, behaviour cloning and bots on the held-out levels, every level equally often.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot eval --run runs/first
+  playbot eval --bot right-jump --bot random --levels hard:0..63 --json
+  playbot eval --skills skills.safetensors
+  playbot eval --run runs/pixels --observation camera
+  playbot eval --run runs/first --bot right-jump --levels hard:64..66 --plot where.png
+  playbot eval --run runs/first --bot search --levels hard:64..127 --levels easy:500..599")]
+pub struct Args {
+    /// Folder of a run; may be given several times.
+    #[arg(long)]
+    run: Vec<PathBuf>,
+    /// Checkpoint of the runs: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, default_value = "last")]
+    checkpoint: Which,
+    /// Skill model: measures behaviour cloning, the decoder under the prior.
+    #[arg(long)]
+    skills: Vec<PathBuf>,
+    /// Policy file, as written by `playbot policy export`, which says what game is played; may be given several times.
+    #[arg(long)]
+    policy: Vec<PathBuf>,
+    /// Bot of the game, such as random, right-jump or search; may be given several times.
+    #[arg(long)]
+    bot: Vec<String>,
+    /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
+    #[arg(long)]
+    observation: Option<ObservationKind>,
+    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named, or the first 64 of
+    /// the game if a policy file is of another game than the built-in experiment.
+    #[arg(long)]
+    levels: Vec<LevelSplit>,
+    /// Episodes on each level, instead of the experiment's.
+    #[arg(long)]
+    episodes_per_level: Option<u32>,
+    /// Take the most probable action instead of drawing one.
+    #[arg(long)]
+    greedy: bool,
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// Seed of the players' draws, instead of the experiment's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Threads; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
+    threads: usize,
+    /// Where to compute: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+    /// Also draw where the players went, and how often they were where, into this .png or .svg.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// One line of JSON per player and range of levels.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty() && args.bot.is_empty() {
+        return Err(CliError::Usage(
+            "nobody to measure: name a --run, a --skills file, a --policy or a --bot (see `playbot eval --help`)"
+                .to_owned(),
+        ));
+    }
+    let experiment = read_experiment(&args, games)?;
+    let game = games.get(&experiment.game)?;
+    let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
+    let episodes = experiment.eval.episodes_per_level;
+    if args.levels.is_empty() {
+        let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
+        experiment.check_test(game).map_err(or_levels)?;
+    }
+    splits.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    let players = players(game, &experiment, &args, games)?;
+    let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
+    let mut rows = Vec::new();
+    for split in &splits {
+        for Chosen { name, player, sight } in &players {
+            let plan = EvalPlan { sight: *sight, ..methods::plan(&experiment, split, episodes, args.threads) };
+            let measured = match &mut footprints {
+                Some(footprints) => {
+                    let (measured, trails) = methods::follow(game, name, player, &plan)?;
+                    footprints.add(game, split, name, trails);
+                    measured
+                }
+                None => methods::measure(game, name, player, &plan)?,
+            };
+            if args.json {
+                methods::print_json(&measured.summary)?;
+            }
+            rows.push(measured.into_row());
+        }
+    }
+    if !args.json {
+        print_line(to_text_table(&rows))?;
+    }
+    // Last: a measurement is not lost because it cannot be drawn.
+    if let Some(footprints) = footprints {
+        footprints.write(game)?;
+    }
+    Ok(Outcome::Pass)
+}
+
+fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
+    let of_sight = |set: &&String| ["observation", "image"].iter().any(|key| set.trim_start().starts_with(key));
+    if let Some(set) = args.from.set.iter().find(of_sight) {
+        return Err(CliError::Usage(format!(
+            "`{set}`: a policy sees what it was trained with; look at the same pictures through other eyes with \
+             --observation camera or --observation raster"
+        )));
+    }
+    let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
+    match (&args.from.experiment, args.run.first()) {
+        (None, Some(run)) => {
+            let experiment = RunDir::open(run)?.1.with_set(&args.from.sets(options))?;
+            experiment.check()?;
+            Ok(experiment)
+        }
+        _ => Ok(args.from.over(of_policy(args, games)?).load(games, options)?),
+    }
+}
+
+/// The game of the first policy file, and levels of it, where nobody says which: the built-in experiment is CoinRun's.
+fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
+    let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
+    let file = PolicyFile::load(path, args.device)?;
+    let game = games.get(&file.card.game)?;
+    if args.from.load(games, [])?.game == game.name() {
+        return Ok(Vec::new());
+    }
+    let mode = game.modes().first().copied().unwrap_or_default();
+    Ok(vec![format!("game={}", game.name()), format!("test={mode}:0..63")])
+}
+
+fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games) -> Result<Vec<Chosen>, CliError> {
+    let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    let mut players = Vec::new();
+    for path in &args.run {
+        let (run, own, info) = RunDir::open(path)?;
+        check_run(path, game, &own, experiment, args)?;
+        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.device)?;
+        players.push(named(chosen, path, args.run.len()));
+    }
+    for path in &args.skills {
+        let model = SkillModel::load(path, args.device)?;
+        let sight = check_skills(path, &model, game, &args.from, games)?;
+        let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), sight };
+        players.push(named(chosen, path, args.skills.len()));
+    }
+    for path in &args.policy {
+        let chosen = Chosen::policy_file(game, path, draw, args.device)?;
+        players.push(named(chosen, path, args.policy.len()));
+    }
+    for name in &args.bot {
+        players.push(Chosen::bot(game, name)?);
+    }
+    for chosen in &mut players {
+        if matches!(chosen.player, Player::Policy { .. }) {
+            look_through(&mut chosen.sight, args.observation, &chosen.name)?;
+        }
+        chosen.check_fit(game)?;
+    }
+    Ok(players)
+}
+
+/// Puts other eyes in place of those that a policy was trained with, as far as they see the same.
+fn look_through(sight: &mut ObservationConfig, eyes: Option<ObservationKind>, name: &str) -> Result<(), CliError> {
+    let Some(kind) = eyes else { return Ok(()) };
+    let other = ObservationConfig { kind, ..*sight };
+    if other.is_image() != sight.is_image() {
+        let offered = if sight.is_image() { "vectors" } else { "pictures" };
+        return Err(CliError::Usage(format!(
+            "the policy {name} reads {sight}, and --observation {kind} gives {offered}: leave --observation out, or \
+             measure it by itself"
+        )));
+    }
+    *sight = other;
+    Ok(())
+}
+
+/// A run is measured in its own game, and on levels it was trained on only if somebody names them.
+fn check_run(
+    path: &Path,
+    game: &dyn Game,
+    own: &Experiment,
+    measured: &Experiment,
+    args: &Args,
+) -> Result<(), CliError> {
+    let path = path.display();
+    if own.game != measured.game {
+        return Err(CliError::Usage(format!(
+            "{path} is a run of `{}`, but `{}` is measured: call `playbot eval` once for each game",
+            own.game, measured.game
+        )));
+    }
+    if args.levels.is_empty() && HeldOut::new(game, &measured.test).first_of(&own.train).is_some() {
+        return Err(CliError::Usage(format!(
+            "{path} was trained on {}, which shares levels with the held-out levels {}: choose levels that none of the \
+             runs has seen, or measure there on purpose, with --levels",
+            own.train, measured.test
+        )));
+    }
+    Ok(())
+}
+
+/// A player, with its path in its name where there are several of its kind.
+fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
+    if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
+}
+
+/// Checks that a skill model was learned for a game, and returns what it sees. The model's file does not name its game.
+///
+/// # Errors
+///
+/// What the model reads and how it acts, and which game has that.
+pub fn check_skills(
+    path: &Path,
+    model: &SkillModel,
+    game: &dyn Game,
+    from: &ExperimentArgs,
+    games: &Games,
+) -> Result<ObservationConfig, CliError> {
+    let sight = ObservationConfig::from_card(model.picture(), &model.observation())?;
+    let fits = |game: &dyn Game| {
+        let can_see = sight.check(game).is_ok();
+        can_see && (model.observation(), model.action_space()) == (sight.obs_kind(game), game.actions())
+    };
+    if fits(game) {
+        return Ok(sight);
+    }
+    let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
+    let whose = if others.is_empty() { "no game".to_owned() } else { others.join(" or ") };
+    let advice = match from.names_game() {
+        true => "name another one".to_owned(),
+        false => {
+            let game = others.first().copied().unwrap_or("NAME");
+            format!("name its experiment with --experiment, or its game and levels with --set game={game}")
+        }
+    };
+    Err(CliError::Usage(format!(
+        "{} holds skills for {} and {:?}, which are those of {whose}, not of `{}`: {advice}",
+        path.display(),
+        in_words(&model.observation()),
+        model.action_space(),
+        game.name()
+    )))
+}
+
+/// Behaviour cloning: the decoder under the prior, without any reinforcement learning.
+pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
+    let skills = cloning_skills(model, experiment);
+    Player::Policy { policy: model.policy(), prior: Some(SkillPrior::from(&skills)), draw }
+}
+
+/// The skills of behaviour cloning, held and drawn as the experiment says.
+pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
+    let (horizon, draw) = (experiment.score.horizon, experiment.score.skill_draw);
+    SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
+}

@@ -1,0 +1,89 @@
+//! Finding and reading experiments, from a path or from those that come with the program, with what the command line
+//! changes in them.
+
+use std::{
+    fmt::Display,
+    path::{Path, PathBuf},
+};
+
+use playbot_lab::{
+    games::Games,
+    train::{
+        Experiment,
+        config_file::{ConfigError, parse_experiment_with, read_experiment_with},
+        default_experiment::default_experiment,
+    },
+};
+
+/// Which experiment, and what to change in it.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct ExperimentArgs {
+    /// Experiment file; that of the program's first game (for `eval --run` the run's own) if none is named.
+    #[arg(long, value_name = "FILE")]
+    pub experiment: Option<PathBuf>,
+    /// Change a value of the experiment, such as ppo.lr=0.0003; may be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl ExperimentArgs {
+    /// Reads the experiment, changes what `--set` and then what the options with names of their own say, and checks it.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] with file, line and column, or with the `key=value` that does not fit.
+    pub fn load(
+        &self,
+        games: &Games,
+        options: impl IntoIterator<Item = Option<String>>,
+    ) -> Result<Experiment, ConfigError> {
+        let sets = self.sets(options);
+        match &self.experiment {
+            Some(path) => read_experiment_with(path, &sets),
+            None => {
+                let (path, text) = default_experiment(games);
+                parse_experiment_with(&text, Path::new(&path), &sets)
+            }
+        }
+    }
+
+    /// Whether somebody said which game: in an experiment file, or with `--set`.
+    pub fn names_game(&self) -> bool {
+        self.experiment.is_some() || self.set.iter().any(|set| sets_key(set, "game"))
+    }
+
+    /// These, under what is already known of the experiment, as `key=value`.
+    pub fn over(&self, known: impl IntoIterator<Item = String>) -> Self {
+        Self { experiment: self.experiment.clone(), set: known.into_iter().chain(self.set.iter().cloned()).collect() }
+    }
+
+    /// What `--set` and then what the options with names of their own say.
+    pub fn sets(&self, options: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
+        self.set.iter().cloned().chain(options.into_iter().flatten()).collect()
+    }
+}
+
+fn sets_key(set: &str, key: &str) -> bool {
+    set.split_once('=').is_some_and(|(name, _)| name.trim() == key)
+}
+
+/// A word for the shell.
+pub fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
+    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+}
+
+/// An option with a name of its own, as `key=value`.
+pub fn option<T: Display>(key: &str, value: &Option<T>) -> Option<String> {
+    value.as_ref().map(|value| format!("{key}={value}"))
+}
+
+/// A path of the repository: as given if it exists, otherwise below the sources the program was built from, so that
+/// `cargo run` works from any folder.
+pub fn resolve(path: &Path) -> PathBuf {
+    if path.exists() || path.is_absolute() {
+        return path.into();
+    }
+    let below_sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
+    if below_sources.exists() { below_sources } else { path.into() }
+}

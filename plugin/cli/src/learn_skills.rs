@@ -1,0 +1,232 @@
+//! `playbot learn-skills`.
+
+use std::{
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+};
+
+use playbot_lab::games::Games;
+use playbot_lab::{
+    demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
+    game::Game,
+    parallel::default_threads,
+    train::Experiment,
+};
+use playbot_learner::{Dataset, DeviceKind, SkillMetrics, SkillModel, SkillTrainer};
+use serde_json::json;
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment::{self, ExperimentArgs, option},
+    interrupt,
+    number::{at_least_one, counted},
+    output::{beside, prepare},
+    progress,
+};
+
+/// Learns the skill model (encoder, decoder, prior) from recordings.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot learn-skills --out skills.safetensors
+  playbot learn-skills --set observation=Raster --max-steps 30000 --out eyes.safetensors
+  playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors
+  playbot learn-skills --out skills.safetensors --resume")]
+pub struct Args {
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// File or folder of recordings, instead of the experiment's.
+    #[arg(long)]
+    demos: Option<PathBuf>,
+    /// Learn from at most so many recorded steps, instead of the experiment's `demo_steps`. Whole episodes are taken, and
+    /// at least one, however long it is.
+    #[arg(long)]
+    max_steps: Option<u64>,
+    /// Passes over the recordings, instead of the experiment's.
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// File to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// Start anew: overwrite the file, and forget what Ctrl-C or a crash stopped, if there is any.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// Go on where Ctrl-C or a crash stopped, from FILE.checkpoint.
+    #[arg(long)]
+    resume: bool,
+    /// Threads that replay recordings; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
+    threads: usize,
+    /// Where to compute: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+    /// Print the metrics of each epoch as a line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let experiment =
+        args.from.load(games, [option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
+    let checkpoint = checkpoint(&args)?;
+    let game = games.get(&experiment.game)?;
+    let demos = match &args.demos {
+        Some(demos) => demos.clone(),
+        None => experiment::resolve(experiment.recordings()?),
+    };
+    prepare(&args.out)?;
+    let dataset = read_demos(game, &experiment, &demos, args.threads)?;
+    if args.force {
+        // Not earlier: what there is stays if there is nothing to learn from.
+        remove(&checkpoint)?;
+    }
+    interrupt::listen();
+    let report = |epoch, metrics: &SkillMetrics| {
+        if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
+    };
+    match learn(&experiment, dataset, args.device, Some(&checkpoint), report)? {
+        None => {
+            tell!("stopped and saved; no skill model is written yet: go on with the same command and --resume");
+            return Ok(Outcome::Stopped);
+        }
+        Some(model) => {
+            model.save(&args.out)?;
+            remove(&checkpoint)?;
+            tell!("skill model written to {}", args.out.display());
+        }
+    }
+    Ok(Outcome::Pass)
+}
+
+/// Where the state of an unfinished training is kept.
+pub fn checkpoint_of(out: &Path) -> PathBuf {
+    beside(out, ".checkpoint")
+}
+
+/// Removes a checkpoint that is not needed any more, if there is one.
+///
+/// # Errors
+///
+/// The system refuses.
+pub fn remove(checkpoint: &Path) -> Result<(), CliError> {
+    match std::fs::remove_file(checkpoint) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(CliError::Io(format!("cannot remove {}: {error}", checkpoint.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The checkpoint's path, if what lies there fits what was asked for.
+fn checkpoint(args: &Args) -> Result<PathBuf, CliError> {
+    let checkpoint = checkpoint_of(&args.out);
+    if args.out.exists() && !args.force {
+        return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
+    }
+    match (args.resume, checkpoint.exists()) {
+        _ if args.force => Ok(checkpoint),
+        (true, false) => Err(CliError::Usage(format!("nothing to resume: there is no {}", checkpoint.display()))),
+        (false, true) => Err(CliError::Usage(format!(
+            "{} holds an unfinished training: go on with --resume, or start anew with --force",
+            checkpoint.display()
+        ))),
+        _ => Ok(checkpoint),
+    }
+}
+
+fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
+    json!({
+        "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl, "accuracy": metrics.accuracy,
+    })
+}
+
+/// Reads recordings, replaying them through the sensor where they keep no observations. Says first how much memory
+/// pictures will take.
+///
+/// # Errors
+///
+/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a
+/// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
+pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
+    experiment.check_actions(game.actions())?;
+    let sight = experiment.sight();
+    let mut demos = Demonstrations::read(game, &sight, path, Some(&experiment.test))?;
+    if let Some(steps) = experiment.demo_steps {
+        demos = demos.at_most(steps);
+    }
+    let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
+    begin_to_tell!(
+        "{} in {} from {}",
+        counted(steps, "step"),
+        counted(demos.episodes() as u64, "episode"),
+        path.display()
+    );
+    if experiment.demo_steps.is_some_and(|wanted| wanted < steps) {
+        begin_to_tell!(" (more than was asked for: episodes are kept whole)");
+    }
+    match demos.picture_bytes() {
+        0 => tell!(),
+        bytes => tell!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+    }
+    let bar = progress::bar("replay recordings", steps, "steps");
+    let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
+    bar.finish_and_clear();
+    Ok(dataset?)
+}
+
+/// Learns the model, with a progress bar and, where there is room for one, a checkpoint after each epoch, from which a
+/// stopped training goes on bit for bit. `None` after Ctrl-C.
+///
+/// # Errors
+///
+/// A loss is not a number, the checkpoint belongs to another training, or it or `after_epoch` fails.
+pub fn learn(
+    experiment: &Experiment,
+    dataset: Dataset,
+    device: DeviceKind,
+    checkpoint: Option<&Path>,
+    mut after_epoch: impl FnMut(u64, &SkillMetrics) -> Result<(), CliError>,
+) -> Result<Option<SkillModel>, CliError> {
+    let epochs = experiment.skills.epochs as u64;
+    let mut trainer = begin(experiment, dataset, device, checkpoint)?;
+    let per_epoch = trainer.batches_per_epoch() as u64;
+    let bar = progress::bar("learn skills", epochs * per_epoch, "batches");
+    bar.set_position(trainer.epochs_done() * per_epoch + trainer.batches_done() as u64);
+    while trainer.epochs_done() < epochs {
+        let metrics = trainer.train_epoch(&mut |_| {
+            bar.inc(1);
+            if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        if let Some(checkpoint) = checkpoint {
+            trainer.save(checkpoint)?;
+        }
+        let Some(metrics) = metrics else {
+            bar.finish_and_clear();
+            return Ok(None);
+        };
+        bar.set_message(format!("NLL {:.3} KL {:.2}", metrics.nll, metrics.kl));
+        after_epoch(trainer.epochs_done(), &metrics)?;
+    }
+    bar.finish_and_clear();
+    Ok(Some(trainer.into_model().with_picture(experiment.sight().card())))
+}
+
+/// A trainer at its start, or where the checkpoint left it.
+fn begin(
+    experiment: &Experiment,
+    dataset: Dataset,
+    device: DeviceKind,
+    checkpoint: Option<&Path>,
+) -> Result<SkillTrainer, CliError> {
+    let Some(path) = checkpoint.filter(|path| path.exists()) else {
+        return Ok(SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?);
+    };
+    let trainer = SkillTrainer::load(path, dataset, device)?;
+    if (trainer.config(), trainer.seed()) != (&experiment.skills, experiment.seed) {
+        return Err(CliError::Usage(format!(
+            "{} was made with other settings or another seed: take the same experiment, or start anew with --force",
+            path.display()
+        )));
+    }
+    tell!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
+    Ok(trainer)
+}

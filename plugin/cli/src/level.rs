@@ -1,0 +1,73 @@
+//! `playbot level`.
+
+use std::path::{Path, PathBuf};
+
+use playbot_lab::{
+    games::Games,
+    inspect::{LevelPicture, LevelRequest},
+};
+
+use crate::{
+    error::{CliError, Outcome, print_line},
+    output,
+    plot::PlotFile,
+    view::{self, film::Film},
+};
+
+/// Shows the layout of a level.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot level coinrun --mode hard --seed 7
+  playbot level coinrun --mode easy --seed 0 --json
+  playbot level coinrun --seed 7 --png level.png
+  playbot level antmaze --map large
+  playbot level maze2d --seed 7 --json
+  playbot level maze2d --map random+size=21x21+loops=0.2 --seed 7
+  playbot level antmaze --map medium+goals=random+random-start --seed 7
+  playbot level maze2d --map my-maze.txt --png my-maze.png
+
+A file of rows is a maze as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell;
+the rows end at the first empty line.")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Mode of CoinRun; hard if none is named.
+    #[arg(long)]
+    mode: Option<String>,
+    /// Map of a maze: umaze, medium, large, xl, random with its options, a whole mode of the game such as medium+sparse,
+    /// with the start and goal that it draws for the seed, or a file of rows; random if none is named.
+    #[arg(long, value_name = "MAP", conflicts_with = "mode")]
+    map: Option<String>,
+    /// Seed of the level; 0 if none is named.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Print one line of JSON instead of a picture.
+    #[arg(long)]
+    json: bool,
+    /// Also draw the whole level into this .png; mazes into a .svg too.
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let file = args.png.as_deref().map(|path| PlotFile::new(path).map(|file| (path, file))).transpose()?;
+    let (mode, map) = (args.mode.as_deref(), args.map.as_deref());
+    let level = game.show_level(&LevelRequest { mode, map, seed: args.seed, picture: file.is_some() })?;
+    if let (Some((path, file)), Some(picture)) = (file, &level.picture) {
+        write(path, &file, picture, game.tick_hz())?;
+    }
+    print_line(if args.json { level.json } else { level.text })?;
+    Ok(Outcome::Pass)
+}
+
+fn write(path: &Path, file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> Result<(), CliError> {
+    match picture {
+        LevelPicture::Drawing(drawing) => file.write(drawing),
+        LevelPicture::Pixels { image, pixels } => {
+            output::png(&path.to_string_lossy())
+                .map_err(|why| CliError::Usage(format!("{}: {why}", path.display())))?;
+            view::write(path, &Film::new(*image, 1, tick_hz)?.still(pixels)?.0)
+        }
+    }
+}

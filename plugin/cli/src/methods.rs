@@ -1,0 +1,133 @@
+//! Players by name: what `eval` and `quickstart` measure.
+
+use bevy_playbot::unknown_name::UnknownName;
+use playbot_lab::{
+    eval::{EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, evaluate, evaluate_with_trails, summarize},
+    game::Game,
+    report::ResultRow,
+    split::LevelSplit,
+    train::Experiment,
+};
+use serde_json::json;
+
+use super::{
+    error::{CliError, print_line},
+    progress,
+};
+
+/// The bot of a game with this name: one of its blind bots or its demonstrator.
+///
+/// # Errors
+///
+/// [`UnknownName`] with the game's bots.
+pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
+    if game.demonstrator() == Some(name) {
+        return Ok(Player::Demonstrator);
+    }
+    let bots = game.blind_bots();
+    match bots.iter().find(|(bot, _)| *bot == name) {
+        Some((_, bot)) => Ok(Player::Blind(bot.clone())),
+        None => Err(UnknownName::new("method", name, &bot_names(game))),
+    }
+}
+
+/// Names of all bots of a game.
+pub fn bot_names(game: &dyn Game) -> Vec<&'static str> {
+    game.blind_bots().into_iter().map(|(name, _)| name).chain(game.demonstrator()).collect()
+}
+
+/// The plan of an experiment for one split, for a player that sees as the experiment says.
+pub fn plan(experiment: &Experiment, split: &LevelSplit, episodes_per_level: u32, threads: usize) -> EvalPlan {
+    EvalPlan {
+        split: split.clone(),
+        sight: experiment.sight(),
+        episodes_per_level,
+        seed: experiment.seed,
+        arenas: experiment.arenas,
+        worlds: experiment.worlds,
+        threads,
+    }
+}
+
+/// A measured player: its row of the result table, its episodes and its speed.
+pub struct Measured {
+    /// The row.
+    pub summary: EvalSummary,
+    /// Environment steps per second.
+    pub steps_per_s: f64,
+}
+
+impl Measured {
+    /// The row as reports have it.
+    pub fn into_row(self) -> ResultRow {
+        let summary = self.summary;
+        ResultRow {
+            method: summary.method,
+            split: summary.split,
+            episodes: summary.episodes as usize,
+            return_mean: summary.return_mean,
+            return_se: summary.return_se,
+            success: summary.success,
+            length_mean: summary.length_mean,
+            steps_per_s: Some(self.steps_per_s),
+        }
+    }
+}
+
+/// Measures one player, with a progress bar.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub fn measure(game: &dyn Game, name: &str, player: &Player, plan: &EvalPlan) -> Result<Measured, CliError> {
+    timed(name, plan, |progress| evaluate(game, player, plan, progress), |episode| episode)
+        .map(|(measured, _)| measured)
+}
+
+/// [`measure`], and where every episode led.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub fn follow(
+    game: &dyn Game,
+    name: &str,
+    player: &Player,
+    plan: &EvalPlan,
+) -> Result<(Measured, Vec<Trail>), CliError> {
+    timed(name, plan, |progress| evaluate_with_trails(game, player, plan, progress), |trail| &trail.result)
+}
+
+fn timed<T>(
+    name: &str,
+    plan: &EvalPlan,
+    play: impl FnOnce(&(dyn Fn(u64) + Sync)) -> Result<Vec<T>, EvalError>,
+    result: impl Fn(&T) -> &EpisodeResult,
+) -> Result<(Measured, Vec<T>), CliError> {
+    let total = plan.split.len() * u64::from(plan.episodes_per_level);
+    let bar = progress::bar(&format!("test {name}"), total, "episodes");
+    let start = std::time::Instant::now();
+    let played = play(&|n| bar.inc(n))?;
+    let seconds = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let episodes: Vec<_> = played.iter().map(|episode| *result(episode)).collect();
+    let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
+    let summary = summarize(name, &plan.split, &episodes);
+    if summary.clipped > 0.0 {
+        tell!(
+            "{name} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
+            plan.split,
+            100.0 * summary.clipped
+        );
+    }
+    Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
+}
+
+/// Prints a row as one line of JSON.
+///
+/// # Errors
+///
+/// Standard output is closed.
+pub fn print_json(summary: &EvalSummary) -> Result<(), CliError> {
+    print_line(json!(summary))
+}

@@ -1,0 +1,103 @@
+//! `playbot play` in a program that was built with a window.
+
+use std::path::Path;
+
+use bevy_playbot::{
+    demo::{
+        file::{DemoHeader, DemoSummary},
+        recorder::demo_actions,
+    },
+    vision::ObservationConfig,
+};
+use playbot_lab::games::Games;
+use playbot_lab::{game::Game, split::LevelSplit};
+
+use super::Args;
+use crate::{
+    demo::deciders,
+    error::{CliError, Outcome},
+    interrupt,
+    player::Chosen,
+    window::{GameWindow, Partner, Playlist, WindowSetup},
+};
+
+/// Levels are numbered with 32 bits where nobody says how many there are.
+const LAST_LEVEL: u64 = u32::MAX as u64;
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let playlist = playlist(game, &args)?;
+    let (partner, sight) = partner(game, &args)?;
+    let header = header(game, playlist.mode(), &args);
+    let seed = args.seed.unwrap_or(0);
+    let mut window = GameWindow::open(WindowSetup { game, playlist, partner, sight, seed, stop: interrupt::asked })?;
+    // Not before there is a window: a recording without one would only be in the way.
+    if let Some(path) = &args.record {
+        window.record(args.existing.open(path, header)?);
+    }
+    interrupt::listen();
+    announce(game, &args);
+    window.run()?;
+    args.record.as_deref().map_or(Ok(Outcome::Pass), conclude)
+}
+
+fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
+    let named = args.mode.as_deref();
+    let mode = named.or(game.modes().last().copied()).unwrap_or_default();
+    let levels = match args.levels.as_deref() {
+        Some(text) if text.contains(':') => text.parse()?,
+        Some(text) => format!("{mode}:{text}").parse()?,
+        None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL },
+    };
+    game.check_mode(&levels.mode)?;
+    if named.is_some_and(|mode| mode != levels.mode) {
+        return Err(CliError::Usage(format!(
+            "--mode and --levels name different modes: leave out --mode, or {levels}"
+        )));
+    }
+    let first = args.seed.unwrap_or(levels.first);
+    if !levels.contains(&levels.mode, first) {
+        return Err(CliError::Usage(format!("--seed {first} is none of the levels {levels}")));
+    }
+    Ok(Playlist::new(levels, first))
+}
+
+/// Whoever takes over with Tab, and what it sees.
+fn partner(game: &dyn Game, args: &Args) -> Result<(Option<Partner>, ObservationConfig), CliError> {
+    Ok(match args.partner.load(game)? {
+        Some(Chosen { name, player, sight }) => (Some(Partner { name, player }), sight),
+        None => (None, ObservationConfig::default()),
+    })
+}
+
+fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
+    let actions = demo_actions(&game.actions());
+    let header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), actions);
+    DemoHeader { demonstrator: args.name.clone(), ..header }
+}
+
+fn announce(game: &dyn Game, args: &Args) {
+    if let Some(keys) = game.key_bindings() {
+        tell!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
+    }
+    if args.partner.is_named() {
+        tell!("Tab hands over and takes over again");
+    } else {
+        tell!("there is nobody to hand over to: name a --policy, a --run or a --bot");
+    }
+}
+
+/// Says where the recording is, what it holds and what can be done with it.
+fn conclude(path: &Path) -> Result<Outcome, CliError> {
+    let summary = DemoSummary::read(path)?;
+    let file = path.display();
+    tell!(
+        "{file}: {} episodes, {} steps, decided by {}",
+        summary.episodes,
+        summary.steps,
+        deciders(&summary.steps_by_decider)
+    );
+    tell!("  playbot demo verify {file}   proves that it replays");
+    tell!("  playbot learn-skills --set demos={file} --out skills.safetensors   learns from it");
+    Ok(Outcome::Pass)
+}

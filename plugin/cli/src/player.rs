@@ -1,0 +1,159 @@
+//! Who plays, as the command line names them.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::policy_file::check_policy;
+use bevy_playbot::{
+    policy::{ActionDraw, in_words},
+    policy_file::policy_observation,
+    skill_prior::SkillPrior,
+    vision::ObservationConfig,
+};
+use playbot_lab::sensors::GameSensors;
+use playbot_lab::{
+    eval::Player,
+    game::Game,
+    train::{Algorithm, Experiment, Learner, checkpoint::Which, run_dir::RunDir},
+};
+use playbot_learner::{DeviceKind, PolicyFile};
+
+use super::{error::CliError, methods};
+
+/// A policy, a run or a bot.
+#[derive(clap::Args, Clone, Debug)]
+pub struct PlayerArgs {
+    /// Policy file, as written by `playbot policy export`.
+    #[arg(long, value_name = "FILE", group = "player")]
+    policy: Option<PathBuf>,
+    /// Folder of a run.
+    #[arg(long, value_name = "DIR", group = "player")]
+    run: Option<PathBuf>,
+    /// Bot of the game, such as random, right-jump or search.
+    #[arg(long, value_name = "NAME", group = "player")]
+    bot: Option<String>,
+    /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, default_value = "last", requires = "run")]
+    checkpoint: Which,
+    /// The policy takes its most probable action instead of drawing one.
+    #[arg(long)]
+    greedy: bool,
+    /// Where the policy computes: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+}
+
+/// A player, its name and what it sees.
+pub struct Chosen {
+    /// Its name, for people.
+    pub name: String,
+    /// The player.
+    pub player: Player,
+    /// What it was trained to see; vectors for bots.
+    pub sight: ObservationConfig,
+}
+
+impl Chosen {
+    /// A bot of the game, by name.
+    ///
+    /// # Errors
+    ///
+    /// The game has no such bot.
+    pub fn bot(game: &dyn Game, name: &str) -> Result<Self, CliError> {
+        Ok(Self { name: name.to_owned(), player: methods::bot(game, name)?, sight: ObservationConfig::default() })
+    }
+
+    /// The demonstrator, or else the first of the game's bots.
+    ///
+    /// # Errors
+    ///
+    /// The game has none.
+    pub fn usual(game: &dyn Game) -> Result<Self, CliError> {
+        let bots = methods::bot_names(game);
+        let name = game.demonstrator().or(bots.first().copied());
+        Self::bot(game, name.ok_or(CliError::Usage("the game has no bot: name a --policy or a --run".to_owned()))?)
+    }
+
+    /// The policy in a file, under the name of its algorithm.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
+        let file = PolicyFile::load(path, device)?;
+        check_policy(&game.card(), &file)?;
+        let (prior, sight) = (file.skills.as_ref().map(SkillPrior::from), policy_observation(&file)?);
+        Ok(Self { name: file.card.algorithm, player: Player::Policy { policy: file.policy, prior, draw }, sight })
+    }
+
+    /// What a run has learned, under the name of its algorithm.
+    ///
+    /// # Errors
+    ///
+    /// The checkpoint cannot be loaded.
+    pub fn run(
+        run: &RunDir,
+        experiment: &Experiment,
+        algorithm: Algorithm,
+        checkpoint: Which,
+        draw: ActionDraw,
+        device: DeviceKind,
+    ) -> Result<Self, CliError> {
+        let learner = Learner::load(algorithm, &run.checkpoint(checkpoint)?.learner_file(), device)?;
+        let prior = learner.skills().as_ref().map(SkillPrior::from);
+        let player = Player::Policy { policy: learner.policy(), prior, draw };
+        Ok(Self { name: algorithm.name().to_owned(), player, sight: experiment.sight() })
+    }
+
+    /// Checks that a policy reads what the game shows it, and acts as the game does; bots always fit.
+    ///
+    /// # Errors
+    ///
+    /// What differs, in words.
+    pub fn check_fit(&self, game: &dyn Game) -> Result<(), CliError> {
+        let Player::Policy { policy, .. } = &self.player else { return Ok(()) };
+        self.sight.check(game)?;
+        let (seen, acts) = (self.sight.obs_kind(game), game.actions());
+        if (policy.observation(), policy.action_space()) == (seen, acts) {
+            return Ok(());
+        }
+        let (reads, made_for) = (in_words(&policy.observation()), policy.action_space());
+        Err(CliError::Usage(format!(
+            "the policy {} was made for {reads} and {made_for:?}, but `{}` has {} and {acts:?}: use one that was \
+             trained for this game and this version",
+            self.name,
+            game.name(),
+            in_words(&seen)
+        )))
+    }
+}
+
+impl PlayerArgs {
+    /// Loads the player; `None` if none is named.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn load(&self, game: &dyn Game) -> Result<Option<Chosen>, CliError> {
+        let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        if let Some(name) = &self.bot {
+            return Ok(Some(Chosen::bot(game, name)?));
+        }
+        if let Some(path) = &self.policy {
+            return Ok(Some(Chosen::policy_file(game, path, draw, self.device)?));
+        }
+        let Some(path) = &self.run else { return Ok(None) };
+        let (run, experiment, info) = RunDir::open(path)?;
+        if experiment.game != game.name() {
+            return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
+        }
+        let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, self.device)?;
+        chosen.check_fit(game)?;
+        Ok(Some(chosen))
+    }
+
+    /// Whether somebody is named.
+    #[cfg(feature = "window")]
+    pub fn is_named(&self) -> bool {
+        self.policy.is_some() || self.run.is_some() || self.bot.is_some()
+    }
+}

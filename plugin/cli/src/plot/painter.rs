@@ -1,0 +1,171 @@
+//! Painting a drawing as pixels.
+
+use bevy::math::Vec2;
+use playbot_lab::report::{Drawing, MarkForm, Rgb, Shape};
+
+use crate::{
+    error::CliError,
+    view::{film, font, screen::Screen},
+};
+
+/// Pixels of the picture to one of the drawing, so that it is sharp on any screen.
+const ZOOM: f32 = 2.0;
+/// Font size, in pixels of the picture, for each pixel of a letter's height.
+const LETTER: f32 = 8.5;
+/// Half of the width of an outline, in pixels of the picture.
+const OUTLINE: f32 = 1.5;
+
+/// A drawing as the bytes of a PNG.
+///
+/// # Errors
+///
+/// It is too large for a PNG.
+pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, CliError> {
+    film::to_png(&paint(drawing)?)
+}
+
+fn paint(drawing: &Drawing) -> Result<Screen, CliError> {
+    let size = (drawing.size * ZOOM).ceil().as_uvec2();
+    let mut screen = Screen::new(size.x as usize, size.y as usize, [255; 3])?;
+    for shape in &drawing.shapes {
+        add(&mut screen, shape);
+    }
+    Ok(screen)
+}
+
+fn add(screen: &mut Screen, shape: &Shape) {
+    match shape {
+        Shape::Block { area, fill } => {
+            let (min, max) = ((area.min * ZOOM).round().as_uvec2(), (area.max * ZOOM).round().as_uvec2());
+            let size = max.saturating_sub(min);
+            screen.block(min.x as usize, min.y as usize, size.x as usize, size.y as usize, *fill);
+        }
+        Shape::Line { points, width, colour, opacity } => {
+            let points: Vec<_> = points.iter().map(|point| *point * ZOOM).collect();
+            line(screen, &points, width * ZOOM / 2.0, *colour, *opacity);
+        }
+        Shape::Mark { form, centre, radius, fill, outline } => {
+            let (centre, radius) = (*centre * ZOOM, radius * ZOOM);
+            mark(screen, *form, centre, radius + OUTLINE, *outline);
+            mark(screen, *form, centre, radius - OUTLINE, *fill);
+        }
+        Shape::Text { at, size, colour, words } => {
+            let scale = (size * ZOOM / LETTER).round().max(1.0) as usize;
+            let left = (at.x * ZOOM).round().max(0.0) as usize;
+            let top = (at.y * ZOOM).round().max(0.0) as usize;
+            font::write(screen, words, scale, (left, top.saturating_sub(font::HEIGHT * scale)), *colour);
+        }
+    }
+}
+
+/// The pixels between two corners, as far as they are on the screen: first column and row, number of columns and rows.
+fn window(screen: &Screen, min: Vec2, max: Vec2) -> [usize; 4] {
+    let clamp = |at: f32, most: usize| at.clamp(0.0, most as f32) as usize;
+    let (left, top) = (clamp(min.x.floor(), screen.width), clamp(min.y.floor(), screen.height));
+    let (right, bottom) = (clamp(max.x.ceil(), screen.width), clamp(max.y.ceil(), screen.height));
+    [left, top, right - left, bottom - top]
+}
+
+fn centre_of(column: usize, row: usize) -> Vec2 {
+    Vec2::new(column as f32 + 0.5, row as f32 + 0.5)
+}
+
+/// A line of a half width. Each pixel is covered as much as by the piece that is nearest to it, and painted once.
+fn line(screen: &mut Screen, points: &[Vec2], half: f32, colour: Rgb, opacity: f32) {
+    let bounds = points.iter().fold(None, |bounds: Option<(Vec2, Vec2)>, point| {
+        let (min, max) = bounds.unwrap_or((*point, *point));
+        Some((min.min(*point), max.max(*point)))
+    });
+    let Some((min, max)) = bounds else { return };
+    let [left, top, columns, rows] = window(screen, min - half - 1.0, max + half + 1.0);
+    let mut covered = vec![0.0f32; columns * rows];
+    for piece in points.windows(2) {
+        let (from, to) = (piece[0], piece[1]);
+        let [first, above, wide, high] = window(screen, from.min(to) - half - 1.0, from.max(to) + half + 1.0);
+        for (row, column) in
+            (above..above + high).flat_map(|row| (first..first + wide).map(move |column| (row, column)))
+        {
+            let coverage = (half + 0.5 - distance(centre_of(column, row), from, to)).clamp(0.0, 1.0);
+            let pixel = &mut covered[(row - top) * columns + column - left];
+            *pixel = pixel.max(coverage);
+        }
+    }
+    for (at, coverage) in covered.into_iter().enumerate().filter(|(_, coverage)| *coverage > 0.0) {
+        screen.blend(left + at % columns, top + at / columns, colour, coverage * opacity);
+    }
+}
+
+/// From a point to a piece of a line.
+fn distance(at: Vec2, from: Vec2, to: Vec2) -> f32 {
+    let way = to - from;
+    let along = ((at - from).dot(way) / way.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    at.distance(from + way * along)
+}
+
+fn mark(screen: &mut Screen, form: MarkForm, centre: Vec2, radius: f32, colour: Rgb) {
+    let [left, top, columns, rows] = window(screen, centre - radius - 1.0, centre + radius + 1.0);
+    for (row, column) in (top..top + rows).flat_map(|row| (left..left + columns).map(move |column| (row, column))) {
+        let away = centre_of(column, row) - centre;
+        let inside = match form {
+            MarkForm::Disc => radius - away.length(),
+            MarkForm::Diamond => (radius - away.x.abs() - away.y.abs()) / std::f32::consts::SQRT_2,
+        };
+        screen.blend(column, row, colour, (inside + 0.5).clamp(0.0, 1.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::Rect;
+
+    use super::*;
+
+    fn pixel(screen: &Screen, x: usize, y: usize) -> [u8; 3] {
+        let at = 3 * (y * screen.width + x);
+        [screen.bytes()[at], screen.bytes()[at + 1], screen.bytes()[at + 2]]
+    }
+
+    #[test]
+    fn shapes_are_where_the_drawing_has_them() {
+        let (red, blue) = ([200, 0, 0], [0, 0, 200]);
+        let shapes = vec![
+            Shape::Block { area: Rect::new(1.0, 1.0, 5.0, 3.0), fill: red },
+            Shape::Line {
+                points: vec![Vec2::new(0.0, 10.0), Vec2::new(20.0, 10.0)],
+                width: 2.0,
+                colour: blue,
+                opacity: 0.5,
+            },
+            Shape::Mark {
+                form: MarkForm::Diamond,
+                centre: Vec2::new(15.0, 20.0),
+                radius: 4.0,
+                fill: red,
+                outline: blue,
+            },
+        ];
+        let screen = paint(&Drawing { label: String::new(), size: Vec2::new(20.0, 30.0), shapes }).expect("small");
+        assert_eq!((screen.width, screen.height), (40, 60));
+        assert_eq!((pixel(&screen, 2, 2), pixel(&screen, 9, 5)), (red, red));
+        assert_eq!((pixel(&screen, 1, 2), pixel(&screen, 10, 5)), ([255; 3], [255; 3]));
+        assert_eq!(pixel(&screen, 20, 20), [128, 128, 228], "half of blue over white");
+        assert_eq!(pixel(&screen, 20, 23), [255; 3]);
+        assert_eq!(
+            (pixel(&screen, 30, 40), pixel(&screen, 22, 33)),
+            (red, [255; 3]),
+            "the corners of a diamond are cut"
+        );
+    }
+
+    #[test]
+    fn what_lies_off_the_paper_is_cut() {
+        let far = Vec2::splat(1e6);
+        let shapes = vec![
+            Shape::Line { points: vec![-far, far], width: 2.0, colour: [0; 3], opacity: 1.0 },
+            Shape::Mark { form: MarkForm::Disc, centre: -far, radius: 5.0, fill: [0; 3], outline: [0; 3] },
+            Shape::Text { at: far, size: 13.0, colour: [0; 3], words: "far".to_owned() },
+        ];
+        let screen = paint(&Drawing { label: String::new(), size: Vec2::splat(10.0), shapes }).expect("small");
+        assert_eq!((pixel(&screen, 10, 10), pixel(&screen, 19, 0)), ([0; 3], [255; 3]));
+    }
+}

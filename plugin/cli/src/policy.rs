@@ -1,0 +1,176 @@
+//! `playbot policy export|show`.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::policy_file::check_policy;
+use bevy_playbot::policy_file::policy_observation;
+use playbot_lab::games::Games;
+use playbot_lab::{
+    game::Game,
+    policy_export::{export_policy, policy_file},
+    train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
+};
+use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
+use serde_json::json;
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    eval::{check_skills, cloning_skills},
+    experiment::{ExperimentArgs, quoted},
+    output::prepare,
+};
+
+/// Make and look at the policy files that a game ships with.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot policy export --run runs/first --checkpoint best --out coinrun.policy
+  playbot policy export --skills skills.safetensors --out clone.policy
+  playbot policy show coinrun.policy
+  playbot eval --policy coinrun.policy")]
+pub struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(clap::Subcommand)]
+enum Verb {
+    /// Write the policy of a run, or behaviour cloning, into one self-describing file.
+    Export(Export),
+    /// Check a policy file and say what it is.
+    Show {
+        /// The file.
+        file: PathBuf,
+        /// Where to compute: flex or ndarray.
+        #[arg(long, default_value_t)]
+        device: DeviceKind,
+        /// Print it as a line of JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(clap::Args)]
+struct Export {
+    /// Folder of a run.
+    #[arg(long, conflicts_with_all = ["skills", "experiment", "set"], required_unless_present = "skills")]
+    run: Option<PathBuf>,
+    /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, default_value = "last", conflicts_with = "skills")]
+    checkpoint: Which,
+    /// Skill model: exports behaviour cloning, the decoder under the prior.
+    #[arg(long)]
+    skills: Option<PathBuf>,
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// File to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// Overwrite the file if it exists.
+    #[arg(long)]
+    force: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    match args.verb {
+        Verb::Export(args) => export(&args, games),
+        Verb::Show { file, device, json } => show(&file, device, json),
+    }
+}
+
+fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
+    if args.out.exists() && !args.force {
+        return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
+    }
+    prepare(&args.out)?;
+    let (game, experiment, file) = match (&args.run, &args.skills) {
+        (Some(run), _) => from_run(run, args.checkpoint, games)?,
+        (None, Some(skills)) => from_skills(skills, &args.from, games)?,
+        (None, None) => return Err(CliError::Usage("nothing to export: name a --run or a --skills file".to_owned())),
+    };
+    check_policy(&game.card(), &file)?;
+    export_policy(game, &file, &experiment.train, experiment.seed, &args.out)?;
+    let out = args.out.display().to_string();
+    let mut command = format!("playbot eval --policy {}", quoted(&out));
+    if experiment.check_test(game).is_ok() {
+        command += &format!(" --levels {}", quoted(&experiment.test.to_string()));
+    }
+    tell!("policy written to {out}: measure it with `{command}`");
+    Ok(Outcome::Pass)
+}
+
+type Exported<'a> = (&'a dyn Game, Experiment, PolicyFile);
+
+fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<'a>, CliError> {
+    let (run, experiment, info) = RunDir::open(path)?;
+    let game = games.get(&experiment.game)?;
+    let checkpoint = run.checkpoint(which)?;
+    let learner = Learner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
+    let training = format!(
+        "{} of {} steps on {}, seed {}",
+        checkpoint.summary.step, experiment.steps, experiment.train, info.seed
+    );
+    let about = (info.algorithm.name().to_owned(), training, code(&info.version, &info.revision));
+    let mut file = policy_file(game, &experiment.sight(), learner.policy(), learner.skills(), about);
+    // The rules that it was trained under, which may not be those of today.
+    file.card.game_version = info.game_version;
+    Ok((game, experiment, file))
+}
+
+fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Result<Exported<'a>, CliError> {
+    let experiment = from.load(games, [])?;
+    let game = games.get(&experiment.game)?;
+    let model = SkillModel::load(path, DeviceKind::default())?;
+    let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
+    let training = match &experiment.demos {
+        Some(demos) => format!("demonstrations in {}", demos.display()),
+        None => "demonstrations".to_owned(),
+    };
+    let about = ("bc".to_owned(), training, code);
+    let sight = check_skills(path, &model, game, from, games)?;
+    experiment.check_train(game)?;
+    let file = policy_file(game, &sight, model.policy(), Some(cloning_skills(&model, &experiment)), about);
+    Ok((game, experiment, file))
+}
+
+fn code(version: &str, revision: &str) -> String {
+    format!("{version} ({revision})")
+}
+
+fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliError> {
+    let file = PolicyFile::load(path, device)?;
+    let (card, policy) = (&file.card, &file.policy);
+    let skills = file.skills.as_ref();
+    if as_json {
+        print_line(json!({
+            "card": card, "action_space": policy.action_space(), "latent": policy.latent(),
+            "horizon": skills.map(|skills| skills.horizon), "normalised": policy.normalises(),
+        }))?;
+        return Ok(Outcome::Pass);
+    }
+    print_line(format!("{}, version {} of its rules", card.game, card.game_version))?;
+    print_line(format!("algorithm     {}", card.algorithm))?;
+    print_line(format!("trained on    {}", card.training))?;
+    print_line(format!("code          {}", card.code))?;
+    print_line(match policy_observation(&file)? {
+        sight if sight.is_image() => format!("observation   {sight}"),
+        _ => format!(
+            "observation   {} values{}: {}",
+            policy.obs_dim(),
+            if policy.normalises() { ", normalised" } else { "" },
+            listed(&card.observations)
+        ),
+    })?;
+    print_line(format!("actions       {:?}: {}", policy.action_space(), listed(&card.actions)))?;
+    print_line(match skills {
+        Some(skills) => format!("skills        {} numbers, held for {} ticks", policy.latent(), skills.horizon),
+        None => "skills        none".to_owned(),
+    })?;
+    Ok(Outcome::Pass)
+}
+
+/// The first few names.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 6;
+    let more = if names.len() > SHOWN { ", …" } else { "" };
+    names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ") + more
+}

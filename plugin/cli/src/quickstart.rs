@@ -1,0 +1,244 @@
+//! `playbot quickstart`: the main job from end to end.
+
+mod report;
+
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use bevy_playbot::policy::ActionDraw;
+use playbot_lab::games::Games;
+use playbot_lab::{
+    eval::Player,
+    game::Game,
+    parallel::default_threads,
+    report::to_text_table,
+    train::{
+        Algorithm, Experiment, Trainer,
+        run_dir::{check_replaceable, is_unborn, write_atomically},
+        run_lock::RunLock,
+    },
+};
+use playbot_learner::{DeviceKind, SkillModel};
+use serde_json::json;
+
+use report::write_report;
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    eval::cloning,
+    experiment::{self, ExperimentArgs, option},
+    interrupt, learn_skills, methods,
+    number::at_least_one,
+    train::{create_run, drive},
+};
+
+/// The file of the skill model.
+const SKILLS: &str = "skills.safetensors";
+
+/// Learns skills from the shipped demonstrations, trains SCORE-PPO and PPO for the same number of steps on the training
+/// levels, and measures both, behaviour cloning and the blind baselines on levels that none of them has seen.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot
+  playbot quickstart --json --run runs/another --seed 2")]
+pub struct Args {
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// Folder for everything the quickstart writes; what an earlier quickstart left there is replaced.
+    #[arg(long, default_value = "runs/quickstart")]
+    run: PathBuf,
+    /// Seed, instead of the experiment's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Environment steps for each learner, instead of the experiment's.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Passes over the demonstrations, instead of the experiment's.
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// Threads; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
+    threads: usize,
+    /// One line of JSON per method instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Default for Args {
+    fn default() -> Self {
+        Self {
+            from: ExperimentArgs::default(),
+            run: "runs/quickstart".into(),
+            seed: None,
+            steps: None,
+            epochs: None,
+            threads: default_threads(),
+            json: false,
+        }
+    }
+}
+
+/// A training as the report shows it.
+struct Trained {
+    algorithm: Algorithm,
+    player: Player,
+    curve: Vec<CurvePoint>,
+    steps_per_s: f64,
+    finished: bool,
+}
+
+struct CurvePoint {
+    step: u64,
+    episodic_return: f64,
+    success_rate: f64,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let start = Instant::now();
+    let experiment = read_experiment(&args, games)?;
+    let game = games.get(&experiment.game)?;
+    Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() }.check_memory(game)?;
+    let _lock = take_folder(&args.run)?;
+    let Some(skills) = skills(game, &experiment, &args)? else {
+        tell!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
+        return Ok(Outcome::Stopped);
+    };
+    let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    let mut trained = Vec::new();
+    for algorithm in [Algorithm::ScorePpo, Algorithm::Ppo] {
+        let one = train_one(game, &experiment, algorithm, &skills, &args, draw)?;
+        let finished = one.finished;
+        trained.push(one);
+        if !finished {
+            return Ok(stopped(&args, algorithm));
+        }
+    }
+    let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
+    players.push(("bc".to_owned(), cloning(&skills, &experiment, draw)));
+    players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
+    let mut rows = Vec::new();
+    for (name, player) in &players {
+        let plan = methods::plan(&experiment, &experiment.test, experiment.eval.episodes_per_level, args.threads);
+        let measured = methods::measure(game, name, player, &plan)?;
+        if args.json {
+            methods::print_json(&measured.summary)?;
+        }
+        let mut row = measured.into_row();
+        if let Some(one) = trained.iter().find(|one| one.algorithm.name() == name) {
+            row.steps_per_s = Some(one.steps_per_s);
+        }
+        rows.push(row);
+    }
+    if !args.json {
+        print_line(to_text_table(&rows))?;
+    }
+    let comparison = compare(&trained);
+    tell!("{comparison}");
+    let report = args.run.join("report.html");
+    write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
+    tell!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
+    Ok(Outcome::Pass)
+}
+
+fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
+    Ok(args.from.load(
+        games,
+        [option("seed", &args.seed), option("steps", &args.steps), option("skills.epochs", &args.epochs)],
+    )?)
+}
+
+/// Makes the folder of the quickstart and locks it. Only that of an earlier quickstart is written into again.
+fn take_folder(path: &Path) -> Result<RunLock, CliError> {
+    let is_run = path.join("run.json").exists();
+    let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
+    if path.exists() && !is_unborn(path) && (is_run || !was_ours) {
+        return Err(CliError::Usage(format!(
+            "{} holds something else than an earlier quickstart, so it is left alone: choose another --run",
+            path.display()
+        )));
+    }
+    std::fs::create_dir_all(path)
+        .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+    let lock = RunLock::take(path)?;
+    for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
+        if run.exists() {
+            // Found out before skills are learned.
+            check_replaceable(&run)?;
+            RunLock::take(&run)?;
+        }
+    }
+    Ok(lock)
+}
+
+/// Learns the skill model and saves it; `None` after Ctrl-C.
+fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Option<SkillModel>, CliError> {
+    interrupt::listen();
+    let demos = experiment::resolve(experiment.recordings()?);
+    let dataset = learn_skills::read_demos(game, experiment, &demos, args.threads)?;
+    let mut log = String::new();
+    let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
+        let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });
+        log.push_str(&format!("{line}\n"));
+        Ok(())
+    })?;
+    let Some(model) = model else { return Ok(None) };
+    write_atomically(&args.run.join("skills.jsonl"), log.as_bytes())?;
+    model.save(&args.run.join(SKILLS))?;
+    Ok(Some(model))
+}
+
+fn train_one(
+    game: &dyn Game,
+    experiment: &Experiment,
+    algorithm: Algorithm,
+    skills: &SkillModel,
+    args: &Args,
+    draw: ActionDraw,
+) -> Result<Trained, CliError> {
+    let experiment = Experiment { algorithm, ..experiment.clone() };
+    let skills = algorithm.needs_skills().then_some(skills);
+    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads)?;
+    let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
+    let run = create_run(&folder, game, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
+    let (start, mut curve) = (Instant::now(), Vec::new());
+    let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
+        if let Some(kl) = report.initial_kl {
+            tell!("{algorithm}: the first policy is the decoder, KL {kl}");
+        }
+        if let (Some(episodic_return), Some(success_rate)) = (report.episodic_return, report.success_rate) {
+            curve.push(CurvePoint { step: report.step, episodic_return, success_rate });
+        }
+    })?;
+    let steps_per_s = trainer.steps() as f64 / start.elapsed().as_secs_f64();
+    let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
+    Ok(Trained { algorithm, player, curve, steps_per_s, finished })
+}
+
+fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
+    let run = args.run.join(algorithm.name());
+    tell!(
+        "stopped and saved; there is no report yet: go on with this training alone, `playbot train --run {} --resume`, \
+         or start again with `playbot quickstart`",
+        run.display()
+    );
+    Outcome::Stopped
+}
+
+/// How many steps SCORE needed for what PPO reached in the end, in words.
+fn compare(trained: &[Trained]) -> String {
+    let [score, ppo] = trained else { return String::new() };
+    let (Some(target), Some(total)) = (ppo.curve.last().map(|point| point.episodic_return), ppo.curve.last()) else {
+        return "no episode ended during training: train for longer".to_owned();
+    };
+    match score.curve.iter().find(|point| point.episodic_return >= target) {
+        Some(point) => format!(
+            "SCORE-PPO reached PPO's final training return of {target:.2} after {} of {} steps ({:.0} %)",
+            point.step,
+            total.step,
+            100.0 * point.step as f64 / total.step as f64
+        ),
+        None => format!("SCORE-PPO did not reach PPO's final training return of {target:.2}"),
+    }
+}

@@ -1,0 +1,195 @@
+//! `playbot record`.
+
+use std::path::PathBuf;
+
+use bevy_playbot::demo::{
+    file::{DemoHeader, DemoWriter},
+    recorder::{Recorder, Recording, demo_actions, flush_unfinished},
+};
+use playbot_lab::games::Games;
+use playbot_lab::prelude::*;
+use playbot_lab::{game::Game, held_out::HeldOut, worlds::build_world};
+
+use super::{
+    error::{CliError, Outcome},
+    interrupt, progress,
+    recording::Existing,
+};
+
+/// Records the game's demonstrator: a bot that plans, with noise on its actions.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot record coinrun --levels hard:0..9 --out my.demo
+  playbot record coinrun --levels easy:0..499 --noise 0.2 --steps 100000 --out demos/coinrun/easy.demo
+  playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
+  playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Levels, as mode:first..last, both included; played in order, again and again until --steps is reached. Without it
+    /// levels 0 to 499 of the game's first mode.
+    #[arg(long)]
+    levels: Option<LevelSplit>,
+    /// Leave out these levels, and any that look like one of them; may be given several times.
+    #[arg(long, value_name = "LEVELS")]
+    hold_out: Vec<LevelSplit>,
+    /// File to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// Discrete actions: probability with which one is replaced by a uniformly random one. Continuous actions: standard
+    /// deviation of the normal noise on each value, before it is clipped.
+    #[arg(long, default_value_t = 0.0)]
+    noise: f64,
+    /// Stop after exactly this many steps, not counting those that --append finds; without it, after one round of the
+    /// levels.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Keep the observation vectors too (larger; not needed, since replaying brings them back).
+    #[arg(long)]
+    observations: bool,
+    #[command(flatten)]
+    existing: Existing,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let levels = args.levels.clone().unwrap_or_else(|| usual_levels(game));
+    game.check_mode(&levels.mode)?;
+    check_demonstrator(game)?;
+    check_noise(game, args.noise)?;
+    if args.steps == Some(0) {
+        return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
+    }
+    let chosen = choose_levels(game, &levels, &args.hold_out)?;
+    let writer = open_writer(game, &levels.mode, &args)?;
+    let (mut world, agents) = build_world(game, &levels.mode, args.seed, 0, 1);
+    let agent = agents[0];
+    game.arm_demonstrator(&mut world, agent, args.noise);
+    let mut recorder = Recorder::new(writer);
+    if let Some(steps) = args.steps {
+        recorder = recorder.with_step_limit(steps);
+    }
+    world.insert_resource(recorder);
+    let count = chosen.len() as u64;
+    let queue = if args.steps.is_some() { LevelQueue::rounds(chosen) } else { LevelQueue::list(chosen) };
+    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue));
+    let finished = play(&mut world, agent, count, args.steps)?;
+    let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
+    let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
+    let share = 100.0 * ended.successes as f64 / ended.finished.max(1) as f64;
+    tell!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
+    if finished {
+        return Ok(Outcome::Pass);
+    }
+    let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
+    let rest = Rest { level, steps };
+    tell!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
+    Ok(Outcome::Stopped)
+}
+
+/// Where a recording was stopped.
+struct Rest {
+    /// The level that was being played, unless every level has been played already.
+    level: Option<u64>,
+    /// Steps that this call has recorded.
+    steps: u64,
+}
+
+impl Rest {
+    /// What is to be changed in the call. Each call begins with the first of its levels, counts its own steps, and draws
+    /// the same noise from the same seed.
+    fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
+        let mut changes = "--append".to_owned();
+        if let Some(first) = self.level {
+            changes += &format!(" --levels {}", LevelSplit { first, ..levels.clone() });
+        }
+        if let Some(steps) = args.steps {
+            changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
+        }
+        if args.noise > 0.0 {
+            changes += &format!(" --seed {}", args.seed.wrapping_add(1));
+        }
+        format!("add the rest with the same command and `{changes}`")
+    }
+}
+
+/// Somebody must play.
+fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
+    if game.demonstrator().is_some() {
+        return Ok(());
+    }
+    let name = game.name();
+    let mut advice = "train a policy without demonstrations (`playbot train --algorithm ppo`)".to_owned();
+    if game.key_bindings().is_some() {
+        advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
+    }
+    Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
+}
+
+fn usual_levels(game: &dyn Game) -> LevelSplit {
+    LevelSplit { mode: game.modes().first().copied().unwrap_or_default().to_owned(), first: 0, last: 499 }
+}
+
+/// A probability for discrete actions, a standard deviation for continuous ones.
+fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
+    let (fits, wanted) = match game.actions() {
+        ActionSpace::Discrete(_) => ((0.0..=1.0).contains(&noise), "a probability lies between 0 and 1"),
+        ActionSpace::Continuous(_) => {
+            (noise.is_finite() && noise >= 0.0, "a standard deviation is a finite number, 0 or more")
+        }
+    };
+    if fits { Ok(()) } else { Err(CliError::Usage(format!("--noise is {noise}; {wanted}"))) }
+}
+
+fn open_writer(game: &dyn Game, mode: &str, args: &Args) -> Result<DemoWriter, CliError> {
+    let mut header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), demo_actions(&game.actions()));
+    header.demonstrator = game.demonstrator().unwrap_or("none").to_owned();
+    header.action_noise = args.noise;
+    if args.observations {
+        header.observation_names = game.observation().names;
+    }
+    args.existing.open(&args.out, header)
+}
+
+/// The levels but for those that are held out.
+fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
+    held_out.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
+    let chosen: Vec<u64> =
+        levels.levels().filter(|&level| !hidden.iter().any(|hidden| hidden.contains(&levels.mode, level))).collect();
+    if chosen.is_empty() {
+        return Err(CliError::Usage(format!("every one of the levels {levels} is held out: record others")));
+    }
+    Ok(chosen)
+}
+
+/// Plays until enough is recorded; false if somebody stopped it before.
+fn play(
+    world: &mut bevy::prelude::World,
+    agent: bevy::prelude::Entity,
+    levels: u64,
+    steps: Option<u64>,
+) -> Result<bool, CliError> {
+    interrupt::listen();
+    let (length, unit) = steps.map_or((levels, "levels"), |steps| (steps, "steps"));
+    let bar = progress::bar("record", length, unit);
+    let finished = loop {
+        world.tick()?;
+        let recorder = world.resource::<Recorder>();
+        let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
+        bar.set_position(done);
+        let idle = !world.get::<Control>(agent).is_some_and(|control| control.is_active());
+        if idle || steps.is_some_and(|steps| done >= steps) {
+            break true;
+        }
+        if interrupt::asked() {
+            break false;
+        }
+    };
+    bar.finish_and_clear();
+    flush_unfinished(world)?;
+    Ok(finished)
+}

@@ -1,0 +1,125 @@
+//! `playbot runs ls`.
+
+use std::{path::PathBuf, time::SystemTime};
+
+use playbot_lab::{
+    report::{PlainTable, readable, whole},
+    runs::{RunRecord, RunsError, find_runs},
+    train::metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+};
+use serde_json::{Value, json};
+
+use super::super::error::{CliError, Outcome, print_line};
+
+/// Stands where there is no number.
+pub const UNKNOWN: &str = "–";
+
+/// Lists the runs in a folder and the folders below it; exit code 1 if one is damaged.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot runs ls
+  playbot runs ls runs/study --json")]
+pub struct Args {
+    /// The folder.
+    #[arg(default_value = "runs")]
+    root: PathBuf,
+    /// One line of JSON per run.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<Outcome, CliError> {
+    let (mut table, mut damaged) = (table(), Vec::new());
+    for path in find_runs(&args.root)? {
+        match RunRecord::read(&path) {
+            Ok(run) if args.json => print_line(to_json(&run))?,
+            Ok(run) => table.rows.push(row(&run)),
+            Err(error) if args.json => {
+                print_line(json!({ "path": path, "error": error.to_string() }))?;
+                damaged.push(error);
+            }
+            Err(error) => damaged.push(error),
+        }
+    }
+    if !args.json {
+        print_table(&table, &damaged)?;
+    }
+    Ok(if damaged.is_empty() { Outcome::Pass } else { Outcome::Findings })
+}
+
+fn print_table(table: &PlainTable, damaged: &[RunsError]) -> Result<(), CliError> {
+    if !table.rows.is_empty() {
+        print_line(table.to_text().trim_end())?;
+    }
+    for error in damaged {
+        print_line(format!("damaged: {error}"))?;
+    }
+    Ok(())
+}
+
+fn table() -> PlainTable {
+    let columns =
+        ["run", "game", "algorithm", "seed", "steps", "of", "return", "success", "steps/s", "updated", "state"];
+    PlainTable { columns: columns.map(str::to_owned).to_vec(), ..PlainTable::default() }
+}
+
+fn row(run: &RunRecord) -> Vec<String> {
+    let number = |value: Option<f64>| value.map_or(UNKNOWN.to_owned(), readable);
+    let state = match (run.is_finished(), run.checkpoints.is_empty()) {
+        _ if !run.info.algorithm.is_trained() => "nothing to train",
+        (true, false) => "finished",
+        (true, true) => "finished, no checkpoint",
+        (false, false) => "can be resumed",
+        (false, true) => "no checkpoint yet",
+    };
+    vec![
+        run.path.display().to_string(),
+        run.experiment.game.clone(),
+        run.info.algorithm.name().to_owned(),
+        run.info.seed.to_string(),
+        whole(run.curves.last_step() as f64),
+        whole(run.experiment.steps as f64),
+        number(run.curves.last(EPISODIC_RETURN)),
+        number(run.curves.last(SUCCESS_RATE)),
+        run.curves.steps_per_s().map_or(UNKNOWN.to_owned(), whole),
+        age_s(run).map_or(UNKNOWN.to_owned(), |seconds| format!("{} ago", duration(seconds))),
+        state.to_owned(),
+    ]
+}
+
+/// What `ls` and `show` say of a run as JSON.
+pub fn to_json(run: &RunRecord) -> Value {
+    json!({
+        "path": run.path,
+        "game": run.experiment.game,
+        "algorithm": run.info.algorithm.name(),
+        "seed": run.info.seed,
+        "steps": run.curves.last_step(),
+        "steps_planned": run.experiment.steps,
+        "finished": run.is_finished(),
+        "episodic_return": run.curves.last(EPISODIC_RETURN),
+        "success_rate": run.curves.last(SUCCESS_RATE),
+        "steps_per_s": run.curves.steps_per_s(),
+        "age_s": age_s(run),
+        "checkpoints": run.checkpoints.iter().map(|checkpoint| checkpoint.summary).collect::<Vec<_>>(),
+        "version": run.info.version,
+        "revision": run.info.revision,
+        "skills": run.info.skills,
+        "device": run.info.device,
+    })
+}
+
+/// Seconds since the run was last logged to.
+pub fn age_s(run: &RunRecord) -> Option<u64> {
+    Some(SystemTime::now().duration_since(run.updated?).unwrap_or_default().as_secs())
+}
+
+/// Seconds in the largest unit that fits.
+pub fn duration(seconds: u64) -> String {
+    match seconds {
+        0..120 => format!("{seconds} s"),
+        120..7200 => format!("{} min", seconds / 60),
+        7200..172_800 => format!("{} h", seconds / 3600),
+        _ => format!("{} days", seconds / 86_400),
+    }
+}

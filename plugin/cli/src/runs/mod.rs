@@ -1,0 +1,49 @@
+//! `playbot runs ls|show|compare`.
+
+mod compare;
+mod ls;
+mod show;
+
+use std::path::Path;
+
+use playbot_lab::train::run_dir::write_atomically;
+
+use super::error::{CliError, Outcome};
+
+/// Look at trainings: list them, show one, compare several over their seeds.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot runs ls
+  playbot runs show runs/first --plot first.svg
+  playbot runs compare runs/study --threshold 0.8 --plot compare.svg
+  playbot runs compare runs/ppo-1 runs/ppo-2 runs/score-1 runs/score-2 --metric charts/episodic_return
+  tensorboard --logdir runs                        the same curves in TensorBoard (pip install tensorboard)")]
+pub struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(clap::Subcommand)]
+enum Verb {
+    /// List runs and how far they are.
+    Ls(ls::Args),
+    /// Show the settings and the metrics of a run.
+    Show(show::Args),
+    /// Compare runs: those that differ only in their seed are one group.
+    Compare(compare::Args),
+}
+
+pub fn run(args: Args) -> Result<Outcome, CliError> {
+    match args.verb {
+        Verb::Ls(args) => ls::run(&args),
+        Verb::Show(args) => show::run(&args),
+        Verb::Compare(args) => compare::run(&args),
+    }
+}
+
+/// Writes a plot, whole or not at all, and says where.
+fn write_plot(path: &Path, svg: &str) -> Result<(), CliError> {
+    write_atomically(path, svg.as_bytes())?;
+    tell!("plot: {}", path.display());
+    Ok(())
+}

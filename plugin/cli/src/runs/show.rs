@@ -1,0 +1,179 @@
+//! `playbot runs show`.
+
+use std::path::PathBuf;
+
+use playbot_lab::{
+    report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whole},
+    runs::{RunRecord, changed_settings},
+    train::{
+        checkpoint::Checkpoint,
+        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
+    },
+};
+use serde_json::{Value, json};
+
+use super::{
+    super::{
+        error::{CliError, Outcome, print_line},
+        output,
+    },
+    ls::{UNKNOWN, age_s, duration, to_json},
+    write_plot,
+};
+
+/// Characters of a curve drawn as text.
+const SPARKS: usize = 60;
+
+/// Shows the settings of a run that are not the defaults, its curves and all its metrics.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot runs show runs/first
+  playbot runs show runs/first --plot first.svg --metric charts/episodic_return --metric losses/entropy
+  playbot runs show runs/first --json")]
+pub struct Args {
+    /// Folder of the run.
+    run: PathBuf,
+    /// Metric to draw; may be given several times. Return and success rate if none is named.
+    #[arg(long)]
+    metric: Vec<String>,
+    /// Draw the curves into this SVG file.
+    #[arg(long, value_name = "FILE.svg", value_parser = output::svg)]
+    plot: Option<PathBuf>,
+    /// Print everything as one line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<Outcome, CliError> {
+    let run = RunRecord::read(&args.run)?;
+    run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
+    let curves = curves(&run, &args.metric)?;
+    if args.plot.is_some() && curves.is_empty() {
+        return Err(CliError::Usage(format!(
+            "{}: no episode has ended yet, so there is no curve to draw: train for longer, or name a --metric",
+            run.path.display()
+        )));
+    }
+    if args.json {
+        print_line(full_json(&run))?;
+    } else {
+        print_head(&run)?;
+        print_curves(&curves)?;
+        print_line(metrics(&run).to_text().trim_end())?;
+    }
+    if let Some(path) = &args.plot {
+        let charts: Vec<Chart> = curves.into_iter().map(|(tag, curve)| chart(&run, tag, curve)).collect();
+        write_plot(path, &to_svg(&charts))?;
+    }
+    Ok(Outcome::Pass)
+}
+
+type TaggedCurve<'a> = (&'a str, &'a [(u64, f64)]);
+
+/// The curves that were asked for, or return and success rate as far as they are there: no episode may have ended yet.
+fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurve<'a>>, CliError> {
+    if !wanted.is_empty() {
+        return wanted.iter().map(|tag| Ok((tag.as_str(), run.curve(tag)?))).collect();
+    }
+    let usual = [EPISODIC_RETURN, SUCCESS_RATE];
+    Ok(usual.into_iter().map(|tag| (tag, run.curves.curve(tag))).filter(|(_, curve)| !curve.is_empty()).collect())
+}
+
+fn print_head(run: &RunRecord) -> Result<(), CliError> {
+    let (info, experiment) = (&run.info, &run.experiment);
+    print_line(format!(
+        "{}: {} on {}, seed {}, by version {} ({}) on {}{}",
+        run.path.display(),
+        info.algorithm,
+        experiment.game,
+        info.seed,
+        info.version,
+        info.revision,
+        info.device,
+        info.skills.as_ref().map_or(String::new(), |skills| format!(", skill model {skills}"))
+    ))?;
+    let state = if run.is_finished() { "finished" } else { "not finished" };
+    let speed = run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", whole(speed)));
+    let age = age_s(run).map_or(String::new(), |age| format!(", updated {} ago", duration(age)));
+    let (done, planned) = (whole(run.curves.last_step() as f64), whole(experiment.steps as f64));
+    print_line(format!("{done} of {planned} steps, {state}{speed}{age}"))?;
+    print_line(format!(
+        "trained on {}, held out {}, {} arenas in {} Worlds",
+        experiment.train, experiment.test, experiment.arenas, experiment.worlds
+    ))?;
+    let changed: Vec<String> =
+        changed_settings(experiment).iter().map(|(key, value)| format!("{key}={value}")).collect();
+    if !changed.is_empty() {
+        print_line(format!("not the default: {}", changed.join(", ")))?;
+    }
+    for Checkpoint { path, summary } in &run.checkpoints {
+        let value = summary.episodic_return.map_or("no episode yet".to_owned(), |value| format!("return {value:.2}"));
+        print_line(format!("checkpoint: {} ({value})", path.display()))?;
+    }
+    print_line("")
+}
+
+fn print_curves(curves: &[TaggedCurve]) -> Result<(), CliError> {
+    for (tag, curve) in curves {
+        let values: Vec<f64> = curve.iter().map(|(_, value)| *value).collect();
+        print_line(format!("{tag}\n  {}", sparkline(&values, SPARKS)))?;
+    }
+    if curves.is_empty() { print_line("no episode has ended yet\n") } else { print_line("") }
+}
+
+/// The first, the lowest, the highest and the last point that is a number.
+fn extremes(curve: &[(u64, f64)]) -> Option<[(u64, f64); 4]> {
+    let known = || curve.iter().copied().filter(|(_, value)| !value.is_nan());
+    // Of equal values the first one is shown.
+    let lowest = known().reduce(|best, point| if point.1 < best.1 { point } else { best })?;
+    let highest = known().reduce(|best, point| if point.1 > best.1 { point } else { best })?;
+    Some([known().next()?, lowest, highest, known().next_back()?])
+}
+
+fn metrics(run: &RunRecord) -> PlainTable {
+    let columns = ["metric", "first", "lowest", "at step", "highest", "at step", "last"];
+    let rows = run.curves.iter().map(|(tag, curve)| {
+        let Some([first, lowest, highest, last]) = extremes(curve) else {
+            return vec![tag.to_owned(), UNKNOWN.to_owned()];
+        };
+        let (low_step, high_step) = (whole(lowest.0 as f64), whole(highest.0 as f64));
+        vec![
+            tag.to_owned(),
+            readable(first.1),
+            readable(lowest.1),
+            low_step,
+            readable(highest.1),
+            high_step,
+            readable(last.1),
+        ]
+    });
+    PlainTable { columns: columns.map(str::to_owned).to_vec(), rows: rows.collect(), ..PlainTable::default() }
+}
+
+fn full_json(run: &RunRecord) -> Value {
+    let point = |(step, value): (u64, f64)| json!({ "step": step, "value": value });
+    let metrics: serde_json::Map<String, Value> = run
+        .curves
+        .iter()
+        .filter_map(|(tag, curve)| {
+            let [first, lowest, highest, last] = extremes(curve)?.map(point);
+            Some((tag.to_owned(), json!({ "first": first, "lowest": lowest, "highest": highest, "last": last })))
+        })
+        .collect();
+    let mut all = to_json(run);
+    all["experiment"] = json!(run.experiment);
+    all["metrics"] = Value::Object(metrics);
+    all
+}
+
+fn chart(run: &RunRecord, tag: &str, curve: &[(u64, f64)]) -> Chart {
+    let points = curve.iter().map(|(step, value)| (*step as f64, *value)).collect();
+    Chart {
+        title: format!("{}: {tag}", run.path.display()),
+        x_label: "environment steps".to_owned(),
+        y_label: format!("{} on {}, seed {}", run.info.algorithm, run.experiment.game, run.info.seed),
+        curves: vec![Curve::new("", points)],
+        y_range: range_of(tag),
+        marks: Vec::new(),
+    }
+}

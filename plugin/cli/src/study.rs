@@ -1,0 +1,210 @@
+//! `playbot study`.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::unknown_name::UnknownName;
+use indicatif::ProgressBar;
+use playbot_lab::games::Games;
+use playbot_lab::{
+    parallel::default_threads,
+    report::StudyReport,
+    train::{
+        Experiment,
+        run_dir::{is_unborn, write_atomically},
+        study::{StudyRun, study_runs},
+    },
+};
+use playbot_learner::DeviceKind;
+use serde_json::json;
+
+use super::{
+    error::{CliError, Outcome, print_line},
+    experiment::{ExperimentArgs, quoted},
+    interrupt,
+    number::at_least_one,
+    progress,
+    study_run::Runner,
+};
+
+/// Runs every variant of an experiment with every seed: learns skills, trains, and measures on the held-out levels. The
+/// tables and the plot say nothing of the machine: the same study gives the same files.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
+  playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
+  playbot study --experiment my.ron --variant full --variant no-kl --out study
+  playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume")]
+pub struct Args {
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// Only this variant of the experiment's; may be given several times. All of them if none is named.
+    #[arg(long, value_name = "NAME")]
+    variant: Vec<String>,
+    /// Seeds, instead of the experiment's.
+    #[arg(long, value_delimiter = ',')]
+    seeds: Vec<u64>,
+    /// Folder for table.md, curves.svg and results.json, which are replaced.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Folder of the runs; `runs/` and the name of the experiment file if none is named.
+    #[arg(long, value_name = "FOLDER")]
+    runs: Option<PathBuf>,
+    /// Go on with the runs that are there: finished ones are not repeated.
+    #[arg(long)]
+    resume: bool,
+    /// Replace the runs that are there.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// Threads; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
+    threads: usize,
+    /// Where to compute: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+    /// One line of JSON per run instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
+    let mut experiment = args.from.load(games, [seeds])?;
+    let runs = chosen(study_runs(&experiment)?, &args.variant)?;
+    experiment.variants.retain(|variant| runs.iter().any(|run| run.variant == variant.name));
+    check_games(&runs, games)?;
+    let folder = runs_folder(&args);
+    check_folder(&folder, &args)?;
+    for path in [&folder, &args.out] {
+        std::fs::create_dir_all(path)
+            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+    }
+    interrupt::listen();
+    let mut runner = Runner::new(games, &folder, args.force, args.device, args.threads);
+    runner.check_folders(&runs)?;
+    if args.force {
+        runner.check_demos(&runs)?;
+    }
+    let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
+        tell!(
+            "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
+            restart(&args)
+        );
+        return Ok(Outcome::Stopped);
+    };
+    write(&args.out, &report)?;
+    if args.json {
+        report.results.iter().try_for_each(|result| print_line(json!(result)))?;
+    } else {
+        print_line(report.summary().trim_end())?;
+    }
+    tell!("written to {}: table.md, curves.svg, results.json", args.out.display());
+    Ok(Outcome::Pass)
+}
+
+/// Every run, one after the other; `None` after Ctrl-C.
+fn all(
+    runner: &mut Runner<'_>,
+    runs: &[StudyRun],
+    command: String,
+    experiment: Experiment,
+) -> Result<Option<StudyReport>, CliError> {
+    let steps = |run: &StudyRun| if run.experiment.algorithm.is_trained() { run.experiment.steps } else { 0 };
+    let whole = progress::bar("study", runs.iter().map(steps).sum(), "steps");
+    let mut report = StudyReport { command, experiment, results: Vec::new(), curves: Vec::new() };
+    let mut done = 0;
+    for (index, run) in runs.iter().enumerate() {
+        let id = run.id();
+        whole.set_message(format!("run {} of {}", index + 1, runs.len()));
+        let ended = runner.run(run, &id, |step| whole.set_position(done + step.min(steps(run))))?;
+        let Some((result, curve)) = ended.filter(|_| !interrupt::asked() || index + 1 == runs.len()) else {
+            return Ok(None);
+        };
+        done += steps(run);
+        whole.set_position(done);
+        say(&whole, &format!("{id}: held-out return {:.2} ± {:.2}", result.test.return_mean, result.test.return_se));
+        report.results.push(result);
+        report.curves.push(curve);
+    }
+    whole.finish_and_clear();
+    Ok(Some(report))
+}
+
+fn say(bar: &ProgressBar, line: &str) {
+    bar.suspend(|| tell!("{line}"));
+}
+
+/// The runs of some variants, in the order of the experiment; of all variants if none is named.
+fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>, CliError> {
+    let mut names: Vec<&str> = runs.iter().map(|run| run.variant.as_str()).collect();
+    names.dedup();
+    if let Some(unknown) = variants.iter().find(|name| !names.contains(&name.as_str())) {
+        return Err(UnknownName::new("variant", unknown, &names).into());
+    }
+    runs.retain(|run| variants.is_empty() || variants.contains(&run.variant));
+    Ok(runs)
+}
+
+fn check_games(runs: &[StudyRun], games: &Games) -> Result<(), CliError> {
+    for StudyRun { experiment, .. } in runs {
+        let game = games.get(&experiment.game)?;
+        experiment.check_levels(game)?;
+        experiment.check_memory(game)?;
+    }
+    Ok(())
+}
+
+fn runs_folder(args: &Args) -> PathBuf {
+    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or("study".as_ref());
+    args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
+}
+
+/// Runs that are there are neither overwritten nor mixed with new ones unless somebody says so.
+fn check_folder(folder: &Path, args: &Args) -> Result<(), CliError> {
+    let is_used =
+        std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| !is_unborn(&entry.path())));
+    if !is_used || args.resume || args.force {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "{} holds runs already: go on with --resume, replace them with --force, or choose another folder with --runs",
+        folder.display()
+    )))
+}
+
+fn write(out: &Path, report: &StudyReport) -> Result<(), CliError> {
+    let unreadable = |error: &dyn std::error::Error| CliError::Usage(format!("cannot write the experiment: {error}"));
+    let table = report.to_markdown().map_err(|error| unreadable(&error))?;
+    let json = report.to_json().map_err(|error| unreadable(&error))?;
+    write_atomically(&out.join("table.md"), table.as_bytes())?;
+    write_atomically(&out.join("curves.svg"), report.chart().to_svg().as_bytes())?;
+    Ok(write_atomically(&out.join("results.json"), json.as_bytes())?)
+}
+
+/// The command that gives the same files: without what does not change them.
+fn command(args: &Args) -> String {
+    let mut words = vec!["playbot study".to_owned()];
+    let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
+    if let Some(path) = &args.from.experiment {
+        push("experiment", path.display().to_string());
+    }
+    for set in &args.from.set {
+        push("set", set.clone());
+    }
+    for variant in &args.variant {
+        push("variant", variant.clone());
+    }
+    if !args.seeds.is_empty() {
+        push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
+    }
+    if args.device != DeviceKind::default() {
+        push("device", args.device.to_string());
+    }
+    push("out", args.out.display().to_string());
+    words.join(" ")
+}
+
+/// The command with what it needs to find its runs again.
+fn restart(args: &Args) -> String {
+    let runs = args.runs.as_ref().map(|path| format!(" --runs {}", quoted(&path.display().to_string())));
+    command(args) + &runs.unwrap_or_default()
+}

@@ -1,0 +1,274 @@
+//! One run of a study: skills, training and measurement, each taken up where it was left.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bevy_playbot::{policy::ActionDraw, vision::ObservationConfig};
+use playbot_lab::games::Games;
+use playbot_lab::{
+    eval::Player,
+    game::Game,
+    report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
+    runs::RunCurves,
+    split::LevelSplit,
+    train::{
+        Experiment, Trainer,
+        checkpoint::Which,
+        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+        run_dir::{RunDir, RunInfo, check_replaceable, is_unborn, write_atomically},
+        run_lock::RunLock,
+        study::StudyRun,
+    },
+};
+use playbot_learner::{Dataset, DeviceKind, SkillModel};
+use serde_json::json;
+
+use super::{
+    error::CliError,
+    eval::cloning,
+    experiment, learn_skills, methods,
+    train::{drive, run_info},
+};
+
+const RESULT: &str = "result.json";
+
+/// Where the runs of a study live, and how they are computed.
+pub struct Runner<'a> {
+    games: &'a Games<'a>,
+    /// Folder of all runs.
+    folder: PathBuf,
+    /// Replace what is there instead of going on with it.
+    force: bool,
+    /// Where to compute.
+    device: DeviceKind,
+    /// Threads.
+    threads: usize,
+    /// Skill models that this process has learned already.
+    learned: BTreeSet<PathBuf>,
+    /// The recordings that were read last, and what they are.
+    demos: Option<(Recordings, Dataset)>,
+}
+
+/// Game, path, the levels that must not be among them, what is seen, and how many steps at most.
+type Recordings = (String, PathBuf, LevelSplit, ObservationConfig, Option<u64>);
+
+/// The folder of a run, locked.
+enum Place {
+    /// What is there is gone on with.
+    Begun(RunDir),
+    /// What is there, if anything, is replaced.
+    New(RunLock),
+}
+
+/// What came of a run, or `None` after Ctrl-C.
+pub type Ended = Option<(StudyResult, SuccessCurve)>;
+
+impl<'a> Runner<'a> {
+    pub fn new(games: &'a Games<'a>, folder: &Path, force: bool, device: DeviceKind, threads: usize) -> Self {
+        Self { games, folder: folder.into(), force, device, threads, learned: BTreeSet::new(), demos: None }
+    }
+
+    /// Brings a run to its end. `on_step` hears the steps of its training as it goes on.
+    ///
+    /// # Errors
+    ///
+    /// The folder holds a run with other settings, or learning, training, measuring or saving fails.
+    pub fn run(&mut self, run: &StudyRun, title: &str, on_step: impl FnMut(u64)) -> Result<Ended, CliError> {
+        let game = self.games.get(&run.experiment.game)?;
+        let folder = self.folder.join(run.id());
+        let is_saved = self.is_saved(run, &folder)?;
+        if is_saved && folder.join(RESULT).exists() {
+            return Ok(Some((read_result(&folder.join(RESULT))?, success_curve(&folder)?)));
+        }
+        fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
+        let lock = RunLock::take(&folder)?;
+        let dir = if is_saved { Place::Begun(RunDir::open_with(lock)?.0) } else { Place::New(lock) };
+        // Nobody else writes there until the result is written.
+        let Some((_dir, player, training, curve)) = self.player(game, run, dir, title, on_step)? else {
+            return Ok(None);
+        };
+        let experiment = &run.experiment;
+        let plan = methods::plan(experiment, &experiment.test, experiment.eval.episodes_per_level, self.threads);
+        let measured = methods::measure(game, &run.id(), &player, &plan)?;
+        let result = StudyResult {
+            variant: run.variant.clone(),
+            algorithm: experiment.algorithm,
+            seed: experiment.seed,
+            training,
+            test: TestResult::from(&measured.summary),
+        };
+        write_atomically(&folder.join(RESULT), json!(result).to_string().as_bytes())?;
+        Ok(Some((result, curve)))
+    }
+
+    /// Reads the demonstrations of all runs that learn skills, so that nothing is replaced if one cannot be read.
+    ///
+    /// # Errors
+    ///
+    /// Recordings cannot be read, belong to another game, or show held-out levels.
+    pub fn check_demos(&mut self, runs: &[StudyRun]) -> Result<(), CliError> {
+        for StudyRun { experiment, .. } in runs.iter().filter(|run| run.experiment.algorithm.needs_skills()) {
+            self.demos(self.games.get(&experiment.game)?, experiment)?;
+        }
+        Ok(())
+    }
+
+    /// Looks at the folders of all runs that are there, so that nothing is begun if one of them is in use, or is no run
+    /// and would have to be replaced.
+    ///
+    /// # Errors
+    ///
+    /// The folder, and what it is.
+    pub fn check_folders(&self, runs: &[StudyRun]) -> Result<(), CliError> {
+        for folder in runs.iter().map(|run| self.folder.join(run.id())).filter(|folder| folder.exists()) {
+            if self.force {
+                check_replaceable(&folder)?;
+            }
+            if RunLock::is_known(&folder) {
+                RunLock::take(&folder)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether there is a folder with this run that is gone on with.
+    fn is_saved(&self, run: &StudyRun, folder: &Path) -> Result<bool, CliError> {
+        if self.force || !folder.exists() || is_unborn(folder) {
+            return Ok(false);
+        }
+        let (_, saved, info) = RunDir::open(folder)?;
+        if saved == run.experiment {
+            self.warn_of_others(folder, &info);
+            return Ok(true);
+        }
+        Err(CliError::Usage(format!(
+            "{} holds a run with other settings: choose another folder with --runs, or replace all with --force",
+            folder.display()
+        )))
+    }
+
+    /// Says if another program or device made a run whose results go into the same table.
+    fn warn_of_others(&self, folder: &Path, info: &RunInfo) {
+        let revision = env!("PLAYBOT_REVISION");
+        if info.revision != revision {
+            let folder = folder.display();
+            tell!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+        }
+        if info.device != self.device {
+            tell!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);
+        }
+    }
+
+    /// Makes a folder that of a run, in place of what is there.
+    fn begin(&self, run: &StudyRun, lock: RunLock) -> Result<RunDir, CliError> {
+        let skills = self.skill_file(run)?;
+        let game = self.games.get(&run.experiment.game)?;
+        let info = run_info(game, &run.experiment, Some(&skills), self.device)?;
+        Ok(RunDir::begin(lock, &run.experiment, &info)?)
+    }
+
+    /// Trains what has to be trained. What is to be replaced stays until its skills are there.
+    fn player(
+        &mut self,
+        game: &dyn Game,
+        run: &StudyRun,
+        place: Place,
+        title: &str,
+        mut on_step: impl FnMut(u64),
+    ) -> Result<Option<(RunDir, Player, Option<TrainingResult>, SuccessCurve)>, CliError> {
+        let experiment = &run.experiment;
+        let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let begun = matches!(&place, Place::Begun(dir) if dir.checkpoint(Which::Last).is_ok());
+        let skills = match experiment.algorithm.needs_skills() && !begun {
+            true => match self.skills(game, run)? {
+                Some(skills) => Some(skills),
+                None => return Ok(None),
+            },
+            false => None,
+        };
+        let dir = match place {
+            Place::Begun(dir) => dir,
+            Place::New(lock) => self.begin(run, lock)?,
+        };
+        if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
+            return Ok(Some((dir, cloning(skills, experiment, draw), None, Vec::new())));
+        }
+        let mut trainer = if begun {
+            dir.resume(game, experiment, self.device, self.threads)?
+        } else {
+            Trainer::new(game, experiment, skills.as_ref(), self.device, self.threads)?
+        };
+        if !drive(&dir, &mut trainer, title, |report| on_step(report.step))? {
+            return Ok(None);
+        }
+        let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
+        let training = training_result(dir.path(), experiment, trainer.steps())?;
+        let curve = success_curve(dir.path())?;
+        Ok(Some((dir, player, Some(training), curve)))
+    }
+
+    /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
+    fn skills(&mut self, game: &dyn Game, run: &StudyRun) -> Result<Option<SkillModel>, CliError> {
+        let file = self.skill_file(run)?;
+        let is_new = self.force && !self.learned.contains(&file);
+        if is_new || !file.exists() {
+            let demos = self.demos(game, &run.experiment)?;
+            let checkpoint = learn_skills::checkpoint_of(&file);
+            if is_new {
+                learn_skills::remove(&checkpoint)?;
+            }
+            let learned = learn_skills::learn(&run.experiment, demos, self.device, Some(&checkpoint), |_, _| Ok(()))?;
+            let Some(model) = learned else { return Ok(None) };
+            model.save(&file)?;
+            learn_skills::remove(&checkpoint)?;
+            self.learned.insert(file.clone());
+        }
+        Ok(Some(SkillModel::load(&file, self.device)?))
+    }
+
+    fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, CliError> {
+        let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
+        Ok(self.folder.join(name))
+    }
+
+    fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
+        let Experiment { game: name, test, demo_steps, .. } = experiment;
+        let path = experiment::resolve(experiment.recordings()?);
+        let key = (name.clone(), path, test.clone(), experiment.sight(), *demo_steps);
+        match &self.demos {
+            Some((known, dataset)) if *known == key => Ok(dataset.clone()),
+            _ => {
+                let dataset = learn_skills::read_demos(game, experiment, &key.1, self.threads)?;
+                self.demos = Some((key, dataset.clone()));
+                Ok(dataset)
+            }
+        }
+    }
+}
+
+fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, CliError> {
+    let curves = RunCurves::read(run)?;
+    Ok(TrainingResult {
+        steps,
+        steps_to_threshold: steps_to_reach(curves.settled(SUCCESS_RATE), experiment.study.threshold),
+        success: curves.last(SUCCESS_RATE),
+        episodic_return: curves.last(EPISODIC_RETURN),
+    })
+}
+
+/// The success rate of the last 100 training episodes, from the metrics of a run; empty if it was not trained.
+fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
+    Ok(RunCurves::read(run)?.curve(SUCCESS_RATE).to_vec())
+}
+
+fn read_result(path: &Path) -> Result<StudyResult, CliError> {
+    let text = fs::read_to_string(path).map_err(|error| io_error("read", path, &error))?;
+    serde_json::from_str(&text).map_err(|error| io_error("read", path, &error))
+}
+
+fn io_error(action: &str, path: &Path, error: &impl ToString) -> CliError {
+    CliError::Io(format!("cannot {action} {}: {}", path.display(), error.to_string()))
+}

@@ -1,0 +1,221 @@
+//! `playbot train`.
+
+use std::path::{Path, PathBuf};
+
+use playbot_lab::games::Games;
+use playbot_lab::{
+    game::Game,
+    parallel::default_threads,
+    train::{
+        Algorithm, Experiment, Trainer, UpdateReport,
+        checkpoint::Which,
+        checksum::file_checksum,
+        run_dir::{RunDir, RunError, RunInfo},
+        trainer::TrainError,
+    },
+};
+use playbot_learner::{DeviceKind, SkillModel};
+
+use super::{
+    error::{CliError, Outcome},
+    experiment::{ExperimentArgs, option},
+    interrupt,
+    number::at_least_one,
+    progress,
+};
+
+/// Trains a policy, headless, over the experiment's training levels.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot train --skills skills.safetensors --run runs/first
+  playbot train --algorithm ppo --run runs/baseline --steps 200000
+  playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.hidden=[64,64]
+  playbot train --run runs/first --resume")]
+pub struct Args {
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// score-ppo, ppo, score-sac or sac, instead of the experiment's.
+    #[arg(long, conflicts_with = "resume")]
+    algorithm: Option<Algorithm>,
+    /// Skill model, as written by `playbot learn-skills`.
+    #[arg(long, conflicts_with = "resume")]
+    skills: Option<PathBuf>,
+    /// Folder of the run.
+    #[arg(long)]
+    run: PathBuf,
+    /// Go on from the last checkpoint of the run.
+    #[arg(long, conflicts_with_all = ["experiment", "set"])]
+    resume: bool,
+    /// Delete the folder of the run first if it exists.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// Environment steps, instead of the experiment's.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Seed, instead of the experiment's.
+    #[arg(long, conflicts_with = "resume")]
+    seed: Option<u64>,
+    /// Threads; the result does not depend on it.
+    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
+    threads: usize,
+    /// Save a checkpoint every so many updates, instead of the experiment's.
+    #[arg(long)]
+    checkpoint_every: Option<u64>,
+    /// Where to compute: flex or ndarray.
+    #[arg(long, default_value_t)]
+    device: DeviceKind,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let (run, mut trainer) = if args.resume { resume(&args, games)? } else { start(&args, games)? };
+    let finished = drive(&run, &mut trainer, "train", |_| {})?;
+    if finished {
+        tell!("done: test it with `playbot eval --run {}`", args.run.display());
+        Ok(Outcome::Pass)
+    } else {
+        let (steps, wanted) = (trainer.steps(), trainer.experiment().steps);
+        let run = args.run.display();
+        tell!(
+            "stopped and saved after {steps} of {wanted} steps, so the training is incomplete: go on with \
+             `playbot train --run {run} --resume`"
+        );
+        Ok(Outcome::Stopped)
+    }
+}
+
+fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
+    let experiment = args.from.load(
+        games,
+        [
+            option("algorithm", &args.algorithm),
+            option("seed", &args.seed),
+            option("steps", &args.steps),
+            option("checkpoints.every", &args.checkpoint_every),
+        ],
+    )?;
+    let game = games.get(&experiment.game)?;
+    let skills = match &args.skills {
+        Some(path) => Some(SkillModel::load(path, args.device)?),
+        None => None,
+    };
+    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.device, args.threads)?;
+    let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.device, args.force)?;
+    Ok((run, trainer))
+}
+
+fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
+    let (run, saved, _) = RunDir::open_to_write(&args.run)?;
+    let game = games.get(&saved.game)?;
+    let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
+    let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
+    experiment.check()?;
+    let trainer = run.resume(game, &experiment, args.device, args.threads)?;
+    if experiment != saved {
+        run.write_experiment(&experiment)?;
+    }
+    tell!("going on at step {} of {}", trainer.steps(), experiment.steps);
+    Ok((run, trainer))
+}
+
+/// Makes the folder of a run, which says what file its skills are from.
+///
+/// # Errors
+///
+/// It exists and `force` is off, it is in use or no run, or it cannot be written.
+pub fn create_run(
+    path: &Path,
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&Path>,
+    device: DeviceKind,
+    force: bool,
+) -> Result<RunDir, RunError> {
+    let info = run_info(game, experiment, skills, device)?;
+    RunDir::create(path, &experiment.without_study(), &info, force)
+}
+
+/// What the folder of a run says of it.
+///
+/// # Errors
+///
+/// The skill model's file cannot be read.
+pub fn run_info(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&Path>,
+    device: DeviceKind,
+) -> Result<RunInfo, RunError> {
+    let skills = skills.filter(|_| experiment.algorithm.needs_skills());
+    Ok(RunInfo {
+        algorithm: experiment.algorithm,
+        seed: experiment.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        revision: env!("PLAYBOT_REVISION").to_owned(),
+        game_version: game.version(),
+        skills: skills.map(file_checksum).transpose()?,
+        device,
+    })
+}
+
+/// Trains to the end of the experiment or to Ctrl-C, with progress bar, log and checkpoints. Returns whether the end
+/// was reached.
+///
+/// # Errors
+///
+/// Training or saving fails; the last checkpoint is kept.
+pub fn drive(
+    run: &RunDir,
+    trainer: &mut Trainer,
+    title: &str,
+    mut after_update: impl FnMut(&UpdateReport),
+) -> Result<bool, CliError> {
+    interrupt::listen();
+    let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
+    let bar = progress::bar(title, trainer.experiment().steps, "steps");
+    let mut saved = trainer.updates();
+    if run.checkpoint(Which::Last).is_err() {
+        // Whatever goes wrong later, there is something good to go back to.
+        save(run, trainer)?;
+    }
+    while !trainer.is_done() && !interrupt::asked() {
+        bar.set_position(trainer.steps());
+        let report = trainer.update().map_err(|error| stopped_by(run, error))?;
+        run.log(&report, per_update)?;
+        bar.set_position(report.step);
+        bar.set_message(message(&report, per_update));
+        after_update(&report);
+        if report.update.is_multiple_of(every) {
+            save(run, trainer)?;
+            saved = report.update;
+        }
+    }
+    if trainer.updates() > saved {
+        save(run, trainer)?;
+    }
+    bar.finish_and_clear();
+    Ok(trainer.is_done())
+}
+
+fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
+    run.save(trainer).map_err(|error| {
+        let is_first = run.checkpoint(Which::Last).is_err();
+        let (error, run) = (error.into(), run.path().into());
+        if is_first { CliError::NeverSaved { error, run } } else { CliError::NotSaved { error, run } }
+    })
+}
+
+/// The error of a training, with the checkpoint that is left if its numbers ran away.
+fn stopped_by(run: &RunDir, error: TrainError) -> CliError {
+    match (&error, run.checkpoint(Which::Last)) {
+        (TrainError::Learn(learn), Ok(checkpoint)) if learn.is_divergence() => {
+            CliError::Diverged { error: error.into(), step: checkpoint.summary.step, checkpoint: checkpoint.path }
+        }
+        _ => error.into(),
+    }
+}
+
+fn message(report: &UpdateReport, steps_per_update: u64) -> String {
+    let sps = steps_per_update as f64 / (report.timing.collect_s + report.timing.learn_s);
+    let current = report.episodic_return.map_or("-".to_owned(), |value| format!("{value:.2}"));
+    format!("{sps:.0} steps/s, return {current}")
+}

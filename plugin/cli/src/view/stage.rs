@@ -1,0 +1,167 @@
+//! The World in which the episode is played that is shown.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    demo::{file::DemoEpisode, replay::Divergence},
+    policy::Decision,
+    vision::ObservationConfig,
+};
+use playbot_lab::prelude::*;
+use playbot_lab::{eval::Player, game::Game, worlds::build_observing_world};
+
+use crate::error::CliError;
+
+/// What an agent saw and did in one tick.
+pub struct Shot {
+    /// Tick of the episode, from 0.
+    pub tick: u32,
+    /// What it saw, as in [`Observation::image`].
+    pub image: Vec<u8>,
+    /// What it did, in words.
+    pub action: String,
+    /// Return that its policy expected, if it has a critic.
+    pub value: Option<f32>,
+    /// The skill it followed; empty if there is none.
+    pub skill: Vec<f32>,
+    /// What it got for it.
+    pub reward: f32,
+}
+
+/// One agent in one episode.
+pub struct Stage {
+    world: World,
+    agent: Entity,
+    action_names: Vec<String>,
+    level: u64,
+    ticks: u32,
+    over: bool,
+}
+
+#[derive(Resource, Default)]
+struct End(Option<EpisodeEnded>);
+
+impl Stage {
+    /// A level that a player plays.
+    ///
+    /// # Errors
+    ///
+    /// The pictures cannot be made.
+    pub fn playing(
+        game: &dyn Game,
+        mode: &str,
+        sight: &ObservationConfig,
+        level: u64,
+        player: &Player,
+    ) -> Result<Self, CliError> {
+        let mut stage = Self::new(game, mode, sight, level)?;
+        let control = player.seat(game, &mut stage.world, stage.agent);
+        player.install(&mut stage.world);
+        stage.world.entity_mut(stage.agent).insert(control);
+        Ok(stage)
+    }
+
+    /// A recorded episode.
+    ///
+    /// # Errors
+    ///
+    /// The pictures cannot be made.
+    pub fn replaying(
+        game: &dyn Game,
+        mode: &str,
+        sight: &ObservationConfig,
+        episode: DemoEpisode,
+    ) -> Result<Self, CliError> {
+        let mut stage = Self::new(game, mode, sight, episode.level_seed)?;
+        stage.over = episode.is_empty();
+        stage.world.entity_mut(stage.agent).insert((Control::Replay, Replay::new(Arc::new(episode))));
+        Ok(stage)
+    }
+
+    fn new(game: &dyn Game, mode: &str, sight: &ObservationConfig, level: u64) -> Result<Self, CliError> {
+        let (mut world, agents) = build_observing_world(game, mode, sight, 0, 0, 1)?;
+        let agent = agents[0];
+        world.init_resource::<End>();
+        world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(*ended));
+        // The sensor for pictures has taken the place of the vector, which a player may read.
+        let vector = VectorSensor::new(game.observation().names);
+        world.entity_mut(agent).insert((vector, LevelQueue::Always(level)));
+        Ok(Self { world, agent, action_names: game.action_names(), level, ticks: 0, over: false })
+    }
+
+    /// Plays one tick; `None` after the end.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract, or the pictures fail.
+    pub fn next(&mut self) -> Result<Option<Shot>, CliError> {
+        if self.over {
+            return Ok(None);
+        }
+        self.world.tick()?;
+        let shot = self.shot();
+        self.ticks += 1;
+        let replayed = self.world.get::<Replay>(self.agent).is_some_and(Replay::is_finished);
+        self.over = replayed || self.end().is_some();
+        Ok(Some(shot))
+    }
+
+    /// What an agent carries after a tick is still what it acted on.
+    fn shot(&self) -> Shot {
+        let agent = self.world.entity(self.agent);
+        let by_policy = agent.get::<Control>() == Some(&Control::Policy);
+        let decided = agent.get::<Decision>().filter(|_| by_policy);
+        Shot {
+            tick: self.ticks,
+            image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
+            action: agent.get::<Action>().map(|action| self.in_words(&action.0)).unwrap_or_default(),
+            // A policy without a critic says 0 to everything.
+            value: decided.map(|decision| decision.value).filter(|value| *value != 0.0),
+            skill: agent.get::<ActiveSkill>().map(|skill| skill.z.clone()).unwrap_or_default(),
+            reward: agent.get::<Reward>().map_or(0.0, Reward::get),
+        }
+    }
+
+    fn in_words(&self, action: &ActionValue) -> String {
+        match action {
+            ActionValue::Discrete(index) => match self.action_names.get(*index as usize) {
+                Some(name) => name.clone(),
+                None => format!("action {index}"),
+            },
+            ActionValue::Continuous(values) => {
+                values.iter().map(|value| format!("{value:+.2}")).collect::<Vec<_>>().join(" ")
+            }
+        }
+    }
+
+    /// Level that is played.
+    pub fn level(&self) -> u64 {
+        self.level
+    }
+
+    /// Ticks played so far.
+    pub fn ticks(&self) -> u32 {
+        self.ticks
+    }
+
+    /// How the episode ended, once it has.
+    pub fn end(&self) -> Option<EpisodeEnded> {
+        self.world.resource::<End>().0
+    }
+
+    /// Where a recording stopped being the game.
+    pub fn divergence(&self) -> Option<&Divergence> {
+        self.world.get::<Replay>(self.agent)?.divergence()
+    }
+}
+
+/// How an episode ended.
+pub fn end_in_words(ended: EpisodeEnded) -> &'static str {
+    match ended.end {
+        EpisodeEnd::Terminated { success: true } => "won",
+        EpisodeEnd::Terminated { success: false } => "lost",
+        EpisodeEnd::Truncated if ended.success => "reached the goal, time was up",
+        EpisodeEnd::Truncated => "out of time",
+    }
+}

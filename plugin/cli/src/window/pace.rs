@@ -1,0 +1,89 @@
+//! When the clock stands still, and showing the state after each tick.
+
+use std::time::Duration;
+
+use bevy::{
+    app::{RunFixedMainLoop, RunFixedMainLoopSystems},
+    prelude::*,
+    time::TimeSystems,
+};
+use bevy_playbot::{headless::Tick, keyboard::TappedKeys, vision::VisionSystems};
+use playbot_lab::prelude::*;
+
+/// How long the end of an episode stays to be seen.
+const REST: Duration = Duration::from_millis(700);
+
+pub(super) fn build(app: &mut App) {
+    app.init_resource::<Pace>()
+        .init_resource::<OnlyDress>()
+        .add_observer(rest)
+        .add_systems(First, keep_pace.before(TimeSystems))
+        .add_systems(RunFixedMainLoop, show_tick.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop))
+        .configure_sets(ObserveSchedule, (VisionSystems::Look, VisionSystems::Compose).run_if(not(only_dressing)));
+}
+
+/// Whether game time stands still.
+#[derive(Resource, Default)]
+pub(super) struct Pace {
+    paused: bool,
+    /// Time since start at which the rest after an episode is over.
+    rest_until: Duration,
+}
+
+impl Pace {
+    /// Pauses, or goes on.
+    pub fn toggle_pause(&mut self) {
+        self.paused = !self.paused;
+    }
+
+    /// Goes on at once.
+    pub fn go_on(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Whether the person has paused.
+    pub fn is_paused(&self) -> bool {
+        self.paused
+    }
+}
+
+/// The end of an episode is seen for a moment: its level goes when the next tick begins.
+fn rest(_: On<EpisodeEnded>, clock: Res<Time<Real>>, mut pace: ResMut<Pace>) {
+    pace.rest_until = clock.elapsed() + REST;
+}
+
+fn keep_pace(
+    clock: Res<Time<Real>>,
+    pace: Res<Pace>,
+    mut game_time: ResMut<Time<Virtual>>,
+    mut tapped: ResMut<TappedKeys>,
+) {
+    let still = pace.paused || clock.elapsed() < pace.rest_until;
+    match (still, game_time.is_paused()) {
+        (true, false) => game_time.pause(),
+        (false, true) => {
+            game_time.unpause();
+            tapped.clear();
+        }
+        _ => {}
+    }
+}
+
+/// Set while the picture is brought up to date for people only.
+#[derive(Resource, Default)]
+struct OnlyDress(bool);
+
+fn only_dressing(only: Res<OnlyDress>) -> bool {
+    only.0
+}
+
+/// Brings the picture up to the state after the tick. Agents look before they act; people want to see what came of it.
+fn show_tick(world: &mut World, mut shown: Local<Tick>) {
+    let tick = *world.resource::<Tick>();
+    if tick != *shown {
+        *shown = tick;
+        world.resource_mut::<OnlyDress>().0 = true;
+        world.run_schedule(ObserveSchedule);
+        world.resource_mut::<OnlyDress>().0 = false;
+    }
+}

@@ -1,0 +1,46 @@
+//! What came of the last episode, and what follows it.
+
+use bevy::prelude::*;
+use bevy_playbot::episode::EpisodeResult;
+use playbot_lab::prelude::*;
+
+use super::{Playlist, seats::Seats};
+
+pub(super) fn build(app: &mut App) {
+    app.init_resource::<LastEpisode>().add_observer(note_end);
+}
+
+/// The last finished episode.
+#[derive(Resource, Default)]
+pub(super) struct LastEpisode(Option<EpisodeResult>);
+
+impl LastEpisode {
+    /// How it ended, in words.
+    pub fn words(&self) -> Option<String> {
+        let EpisodeResult { level, end, success, ticks, .. } = self.0?;
+        let how = match end {
+            EpisodeEnd::Terminated { success: true } => "won",
+            EpisodeEnd::Terminated { success: false } => "lost",
+            EpisodeEnd::Truncated if success => "reached the goal, time was up",
+            EpisodeEnd::Truncated => "out of time",
+        };
+        Some(format!("level {level} {how} after {ticks} ticks"))
+    }
+}
+
+/// A won level is followed by the next one, any other is played again.
+fn note_end(
+    event: On<EpisodeEnded>,
+    mut last: ResMut<LastEpisode>,
+    mut playlist: ResMut<Playlist>,
+    seats: Res<Seats>,
+    mut queues: Query<&mut LevelQueue>,
+) {
+    last.0 = Some(event.result);
+    if event.success {
+        playlist.advance();
+    }
+    if let Ok(mut queue) = queues.get_mut(seats.agent) {
+        *queue = playlist.queue();
+    }
+}

@@ -1,0 +1,69 @@
+//! A view in space for games that have one, and the key that changes between it and the view from above.
+
+use bevy::{
+    camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, input::InputSystems, prelude::*,
+    transform::helper::TransformHelper,
+};
+
+use super::{camera::Zoom, seats::Seats};
+use playbot_lab::{game::Game, space_view::CameraFocus};
+
+/// From what it follows to the eye at the nearest zoom, metres: so steep that the wall behind an ant does not hide it.
+const BEHIND: Vec3 = Vec3::new(0.0, -3.2, 8.0);
+/// Share of the way to the ant that the eye makes in a second is 1 - exp(-HASTE).
+const HASTE: f32 = 6.0;
+
+pub(super) fn build(app: &mut App, game: &dyn Game) {
+    game.build_space_view(app);
+    app.insert_resource(Solid(true))
+        .insert_resource(ClearColor(Color::srgb(0.62, 0.72, 0.82)))
+        .add_systems(Startup, spawn_camera)
+        .add_systems(PreUpdate, change_view.after(InputSystems))
+        .add_systems(PostUpdate, (choose, follow).before(TransformSystems::Propagate));
+}
+
+/// Whether the view is the one in space.
+#[derive(Resource)]
+struct Solid(bool);
+
+/// The eye in space, and the place it looks at.
+#[derive(Component)]
+struct SolidEye(Option<Vec3>);
+
+fn spawn_camera(mut commands: Commands) {
+    commands.spawn((SolidEye(None), Camera3d::default(), Tonemapping::AcesFitted, Camera { order: 1, ..default() }));
+}
+
+/// V: from above, or in space.
+fn change_view(keys: Res<ButtonInput<KeyCode>>, mut solid: ResMut<Solid>) {
+    if keys.just_pressed(KeyCode::KeyV) {
+        solid.0 = !solid.0;
+    }
+}
+
+/// Only one of the window's cameras draws.
+fn choose(solid: Res<Solid>, mut cameras: Query<(&mut Camera, &RenderTarget, Has<SolidEye>)>) {
+    for (mut camera, target, in_space) in &mut cameras {
+        let wanted = in_space == solid.0;
+        if matches!(target, RenderTarget::Window(_)) && camera.is_active != wanted {
+            camera.is_active = wanted;
+        }
+    }
+}
+
+fn follow(
+    clock: Res<Time<Real>>,
+    seats: Res<Seats>,
+    zoom: Res<Zoom>,
+    focuses: Query<&CameraFocus>,
+    mut set: ParamSet<(TransformHelper, Single<(&mut SolidEye, &mut Transform)>)>,
+) {
+    let Ok(focus) = focuses.get(seats.agent) else { return };
+    let Ok(at) = set.p0().compute_global_transform(focus.0) else { return };
+    let (mut eye, mut transform) = set.p1().into_inner();
+    let at = at.translation();
+    let before = eye.0.filter(|before| before.distance(at) < 3.0).unwrap_or(at);
+    let looks_at = before.lerp(at, (HASTE * clock.delta_secs()).min(1.0));
+    eye.0 = Some(looks_at);
+    *transform = Transform::from_translation(looks_at + BEHIND * zoom.factor()).looking_at(looks_at, Vec3::Z);
+}

@@ -1,0 +1,245 @@
+//! Turning recordings into what the skill model learns from.
+
+use std::{collections::BTreeMap, path::Path, sync::Arc};
+
+use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations, Streams, rng::shuffle};
+
+use super::{
+    replay_observations::{Watched, watch},
+    verify::VerifyError,
+};
+use crate::sensors::GameSensors;
+use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
+use bevy_playbot::demo::file::{DemoEpisode, DemoReader, EpisodeActions, find_demos};
+use bevy_playbot::vision::ObservationConfig;
+
+/// Most memory that the pictures of a data set may take.
+pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
+
+/// Recorded episodes of a game, read and checked, before each action is paired with what was seen.
+///
+/// Recordings hold no pictures and may hold other vectors than the game has now, so an episode is replayed through the
+/// sensor. Vectors that a recording keeps are used as they are.
+#[derive(Debug)]
+pub struct Demonstrations {
+    sight: ObservationConfig,
+    episodes: Vec<Demonstration>,
+}
+
+/// One episode and where it comes from.
+#[derive(Debug)]
+struct Demonstration {
+    file: Arc<Path>,
+    index: usize,
+    mode: Arc<str>,
+    episode: Arc<DemoEpisode>,
+    /// Its file keeps the vectors that the game has now.
+    is_seen: bool,
+}
+
+impl Demonstrations {
+    /// Reads all recordings of a game below a path.
+    ///
+    /// The files may differ in mode; the observation must not depend on it. None may show a level of `held_out`, if there
+    /// is such a split: what is measured there would be no generalisation.
+    ///
+    /// # Errors
+    ///
+    /// [`VerifyError`] for files that cannot be read, belong to another game or version, or show a held-out level, and
+    /// for a game that cannot be seen this way.
+    pub fn read(
+        game: &dyn Game,
+        sight: &ObservationConfig,
+        path: &Path,
+        held_out: Option<&LevelSplit>,
+    ) -> Result<Self, VerifyError> {
+        sight.check(game)?;
+        let names = game.observation().names;
+        let mut episodes = Vec::new();
+        let held_out = held_out.map(|split| HeldOut::new(game, split));
+        for file in find_demos(path)? {
+            let reader = DemoReader::open_for_game(&file, game.name(), game.version(), None)?;
+            let header = reader.header().clone();
+            game.check_mode(&header.mode).map_err(|source| VerifyError::Mode { path: file.clone(), source })?;
+            let is_seen = !sight.is_image() && header.observation_names == names;
+            let (shared, mode) = (Arc::<Path>::from(file.as_path()), Arc::<str>::from(header.mode.as_str()));
+            for (index, episode) in reader.enumerate() {
+                let mut episode = episode?;
+                let level = episode.level_seed;
+                if let Some(hidden) = held_out.as_ref().filter(|hidden| hidden.contains(&header.mode, level)) {
+                    return Err(VerifyError::HeldOut { path: file, level, split: hidden.split().clone() });
+                }
+                if !is_seen {
+                    // Vectors that are not used would only take room.
+                    episode.observations = Vec::new();
+                }
+                let (file, mode, episode) = (shared.clone(), mode.clone(), Arc::new(episode));
+                episodes.push(Demonstration { file, index, mode, episode, is_seen });
+            }
+        }
+        Ok(Self { sight: *sight, episodes })
+    }
+
+    /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
+    /// recordings, always the same ones. More steps keep them and others.
+    pub fn at_most(mut self, steps: u64) -> Self {
+        // By chance, since any rule could fall into step with the recordings, which go through the same levels again and
+        // again.
+        let mut order: Vec<usize> = (0..self.episodes.len()).collect();
+        shuffle(&mut order, &mut Streams::new(0).stream("demonstrations", 0));
+        let mut sum = 0;
+        let kept = order.iter().take_while(|index| {
+            sum += self.episodes[**index].episode.len() as u64;
+            sum <= steps
+        });
+        let kept = kept.count().max(1);
+        let mut keep = vec![false; self.episodes.len()];
+        order.iter().take(kept).for_each(|&index| keep[index] = true);
+        let mut keep = keep.into_iter();
+        self.episodes.retain(|_| keep.next().unwrap_or(false));
+        self
+    }
+
+    /// Steps of all episodes together.
+    pub fn steps(&self) -> u64 {
+        self.episodes.iter().map(|demo| demo.episode.len() as u64).sum()
+    }
+
+    /// Episodes.
+    pub fn episodes(&self) -> usize {
+        self.episodes.len()
+    }
+
+    /// Memory that their pictures will take; 0 for vectors.
+    pub fn picture_bytes(&self) -> u64 {
+        if self.sight.is_image() { self.steps() * self.sight.image.shape().numbers() as u64 } else { 0 }
+    }
+
+    /// Pairs each action with the observation that preceded it, in the order of the recordings, replaying what has to be
+    /// replayed: each distinct demonstration once, on at most `threads` threads. `progress` hears numbers of steps that
+    /// are done, from several threads.
+    ///
+    /// # Errors
+    ///
+    /// [`VerifyError`] if an episode does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
+    pub fn dataset(
+        self,
+        game: &dyn Game,
+        threads: usize,
+        progress: impl Fn(u64) + Sync,
+    ) -> Result<Dataset, VerifyError> {
+        let (steps, bytes) = (self.steps(), self.picture_bytes());
+        if bytes > MAX_PICTURE_BYTES {
+            return Err(VerifyError::TooLarge { steps, sight: self.sight, bytes });
+        }
+        let originals = self.originals();
+        let mut watched = self.watch(game, threads, &originals, &progress)?;
+        let mut episodes = Vec::new();
+        for (i, demo) in self.episodes.iter().enumerate() {
+            let observations = if demo.is_seen {
+                progress(demo.episode.len() as u64);
+                Observations::Vector(demo.episode.observations.clone())
+            } else if let Some(observations) = watched.remove(&i) {
+                observations
+            } else {
+                // An earlier episode is the same.
+                progress(demo.episode.len() as u64);
+                let earlier: &LearnerEpisode = &episodes[originals[i]];
+                earlier.observations.clone()
+            };
+            episodes.push(LearnerEpisode { observations, actions: learner_actions(&demo.episode) });
+        }
+        Ok(Dataset::new(self.sight.obs_kind(game), game.actions(), episodes)?)
+    }
+
+    /// For each episode the index of the first one that is the same game from beginning to end.
+    fn originals(&self) -> Vec<usize> {
+        let mut first = BTreeMap::new();
+        let key = |demo: &Demonstration| (demo.mode.clone(), demo.episode.level_seed, bits(&demo.episode.actions));
+        self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(key(demo)).or_insert(i)).collect()
+    }
+
+    /// Episodes that were left before their first tick.
+    fn nothing_to_see(&self) -> impl Iterator<Item = usize> {
+        self.episodes.iter().enumerate().filter(|(_, demo)| demo.episode.is_empty()).map(|(i, _)| i)
+    }
+
+    /// Replays what no file keeps, mode by mode.
+    fn watch(
+        &self,
+        game: &dyn Game,
+        threads: usize,
+        originals: &[usize],
+        progress: &(impl Fn(u64) + Sync),
+    ) -> Result<BTreeMap<usize, Observations>, VerifyError> {
+        let mut by_mode: BTreeMap<&str, Vec<(usize, Arc<DemoEpisode>)>> = BTreeMap::new();
+        for (i, demo) in self.episodes.iter().enumerate() {
+            if !demo.is_seen && originals[i] == i && !demo.episode.is_empty() {
+                by_mode.entry(&demo.mode).or_default().push((i, demo.episode.clone()));
+            }
+        }
+        let (mut all, kind) = (BTreeMap::new(), self.sight.obs_kind(game));
+        all.extend(self.nothing_to_see().map(|i| (i, Observations::empty(&kind))));
+        for (mode, jobs) in by_mode {
+            for Watched { id, observations, divergence } in watch(game, &self.sight, mode, jobs, threads, progress)? {
+                if let Some(divergence) = divergence {
+                    let Demonstration { file, index, .. } = &self.episodes[id];
+                    return Err(VerifyError::Diverged { path: file.to_path_buf(), episode: *index, divergence });
+                }
+                all.insert(id, observations);
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// Actions as numbers that can be compared.
+fn bits(actions: &EpisodeActions) -> Vec<u32> {
+    match actions {
+        EpisodeActions::Discrete(list) => list.clone(),
+        EpisodeActions::Continuous { values, .. } => values.iter().map(|value| value.to_bits()).collect(),
+    }
+}
+
+fn learner_actions(episode: &DemoEpisode) -> Actions {
+    match &episode.actions {
+        EpisodeActions::Discrete(list) => Actions::Discrete(list.clone()),
+        EpisodeActions::Continuous { dim, values } => Actions::Continuous { dim: *dim, values: values.clone() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_playbot::demo::file::DemoActions;
+
+    #[test]
+    fn what_is_kept_is_drawn_from_all_episodes_and_levels() {
+        let episode = |index: usize| {
+            let mut episode = DemoEpisode::new(index as u64 % 8, DemoActions::Discrete(2));
+            episode.state_hashes = vec![0; 10];
+            episode
+        };
+        let all = || Demonstrations {
+            sight: ObservationConfig::default(),
+            episodes: (0..80)
+                .map(|index| Demonstration {
+                    file: Path::new("a.demo").into(),
+                    index,
+                    mode: "plain".into(),
+                    episode: Arc::new(episode(index)),
+                    is_seen: false,
+                })
+                .collect(),
+        };
+        let kept = |steps| all().at_most(steps).episodes.iter().map(|demo| demo.index).collect::<Vec<_>>();
+        let part = kept(209);
+        assert_eq!(part.len(), 20);
+        let early = part.iter().filter(|index| **index < 40).count();
+        assert!((3..=17).contains(&early), "{part:?}");
+        let levels: std::collections::BTreeSet<usize> = part.iter().map(|index| index % 8).collect();
+        assert!(levels.len() >= 5, "levels follow one another in a rhythm of 8, of which {levels:?} are kept");
+        assert!(kept(150).iter().all(|index| part.contains(index)), "fewer steps are a part of more");
+        assert_eq!((kept(1).len(), kept(800).len(), kept(u64::MAX).len()), (1, 80, 80));
+    }
+}

@@ -1,0 +1,119 @@
+//! Watching recordings: they are played again, many at a time, and what the agents see is kept.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use playbot_learner::{ObsKind, Observations};
+
+use super::verify::VerifyError;
+use crate::sensors::GameSensors;
+use crate::{game::Game, parallel::on_threads, worlds::build_observing_world};
+use bevy_playbot::demo::{
+    file::DemoEpisode,
+    replay::{Divergence, Replay},
+};
+use bevy_playbot::{control::Control, headless::tick_world, observation::Observation, vision::ObservationConfig};
+
+/// Recordings that one World replays at the same time: shares the cost of a tick, and a camera's.
+const SIDE_BY_SIDE: usize = 16;
+
+/// An episode to be watched, with a number to know it by.
+type Job = (usize, Arc<DemoEpisode>);
+
+/// What an agent saw in an episode.
+pub(super) struct Watched {
+    /// Number of the job.
+    pub id: usize,
+    /// The observation before each action.
+    pub observations: Observations,
+    /// Where the episode stopped being the recorded one, if it did.
+    pub divergence: Option<Divergence>,
+}
+
+/// Replays episodes of one mode on at most `threads` threads. What is seen does not depend on their number.
+///
+/// # Errors
+///
+/// [`VerifyError`] if the game breaks its contract or cannot be seen this way.
+pub(super) fn watch(
+    game: &dyn Game,
+    sight: &ObservationConfig,
+    mode: &str,
+    jobs: Vec<Job>,
+    threads: usize,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Vec<Watched>, VerifyError> {
+    let threads = threads.clamp(1, jobs.len().div_ceil(SIDE_BY_SIDE).max(1));
+    let mut shares: Vec<Vec<Job>> = vec![Vec::new(); threads];
+    for (i, job) in jobs.into_iter().enumerate() {
+        shares[i % threads].push(job);
+    }
+    let parts = on_threads(&mut shares, threads, |share| {
+        let jobs = std::mem::take(share);
+        Onlookers::new(game, sight, mode, jobs.len().min(SIDE_BY_SIDE))?.watch(jobs, progress)
+    });
+    let mut all = Vec::new();
+    for part in parts {
+        all.extend(part?);
+    }
+    Ok(all)
+}
+
+/// A World whose agents replay one episode after the other.
+struct Onlookers {
+    world: World,
+    agents: Vec<Entity>,
+    /// The episode that each agent replays.
+    watching: Vec<Option<Watched>>,
+    kind: ObsKind,
+}
+
+impl Onlookers {
+    fn new(game: &dyn Game, sight: &ObservationConfig, mode: &str, count: usize) -> Result<Self, VerifyError> {
+        let (world, agents) = build_observing_world(game, mode, sight, 0, 0, count as u32)?;
+        let watching = agents.iter().map(|_| None).collect();
+        Ok(Self { world, agents, watching, kind: sight.obs_kind(game) })
+    }
+
+    fn watch(mut self, jobs: Vec<Job>, progress: &impl Fn(u64)) -> Result<Vec<Watched>, VerifyError> {
+        let mut jobs = jobs.into_iter();
+        let mut done = Vec::new();
+        loop {
+            for agent in 0..self.agents.len() {
+                if self.watching[agent].is_none() {
+                    self.begin(agent, jobs.next());
+                }
+            }
+            let busy = self.watching.iter().flatten().count();
+            if busy == 0 {
+                return Ok(done);
+            }
+            tick_world(&mut self.world)?;
+            done.extend((0..self.agents.len()).filter_map(|agent| self.note(agent)));
+            progress(busy as u64);
+        }
+    }
+
+    /// Hands an agent the next episode; it stands still if there is none.
+    fn begin(&mut self, agent: usize, job: Option<Job>) {
+        let mut entity = self.world.entity_mut(self.agents[agent]);
+        let Some((id, episode)) = job else {
+            entity.insert(Control::Idle);
+            return;
+        };
+        let observations = Observations::with_capacity(&self.kind, episode.len());
+        Replay::begin(episode, &mut entity);
+        self.watching[agent] = Some(Watched { id, observations, divergence: None });
+    }
+
+    /// Keeps what an agent saw in this tick; gives out the episode if that was its last.
+    fn note(&mut self, agent: usize) -> Option<Watched> {
+        let watched = self.watching[agent].as_mut()?;
+        let entity = self.world.entity(self.agents[agent]);
+        // What an agent carries after a tick is still what it acted on.
+        entity.get::<Observation>()?.push_to(&mut watched.observations);
+        let replay = entity.get::<Replay>().filter(|replay| replay.is_finished())?;
+        watched.divergence = replay.divergence().cloned();
+        self.watching[agent].take()
+    }
+}

@@ -1,0 +1,161 @@
+//! Proving a recording: it is played again, and each tick must come out as recorded.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use bevy::prelude::*;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::dataset::MAX_PICTURE_BYTES;
+use crate::{game::Game, mode::ModeError, split::LevelSplit, worlds::build_world};
+use bevy_playbot::demo::{
+    file::{DemoEpisode, DemoFileError, DemoReader},
+    replay::{Divergence, Replay},
+};
+use bevy_playbot::{
+    fault::Fault,
+    headless::tick_world,
+    vision::{ObservationConfig, VisionError},
+};
+
+/// What a check by replay found.
+#[derive(Clone, Debug, Serialize)]
+pub struct VerifyReport {
+    /// Episodes replayed.
+    pub episodes: u64,
+    /// Ticks replayed.
+    pub ticks: u64,
+    /// First divergence of each episode that diverged: index of the episode, and where.
+    pub divergences: Vec<(u64, String)>,
+}
+
+/// A recording could not be checked.
+#[derive(Debug, Error)]
+pub enum VerifyError {
+    /// The file cannot be read, or belongs to another game.
+    #[error(transparent)]
+    File(#[from] DemoFileError),
+    /// The game broke its contract while it was replayed.
+    #[error("while replaying: {0}")]
+    Fault(#[from] Fault),
+    /// A recording is not of this game any more.
+    #[error("{}: episode {episode} does not replay ({divergence}): record it again", path.display())]
+    Diverged {
+        /// The file.
+        path: PathBuf,
+        /// Index of the episode.
+        episode: usize,
+        /// Where it stops being the recorded game.
+        divergence: Divergence,
+    },
+    /// The recording is of a mode the game does not have.
+    #[error("{}: {source}", path.display())]
+    Mode {
+        /// The file.
+        path: PathBuf,
+        /// The mode, and those there are.
+        source: ModeError,
+    },
+    /// A recording shows a level that is kept for the test.
+    #[error(
+        "{}: level {level} is, or looks like, one of the held-out levels {split}, which nobody may learn from: take \
+         recordings of other levels (`playbot record --hold-out {split}` leaves these out), or hold out others with `test`",
+        path.display()
+    )]
+    HeldOut {
+        /// The file.
+        path: PathBuf,
+        /// The level.
+        level: u64,
+        /// The held-out levels.
+        split: LevelSplit,
+    },
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The pictures need more memory than anybody would expect.
+    #[error(
+        "{steps} steps of {sight} need {:.1} GiB of memory, more than the {:.0} GiB that are allowed: learn from fewer \
+         steps with `demo_steps`, or take smaller pictures, grey ones or a smaller stack (`image`)",
+        gib(*.bytes), gib(MAX_PICTURE_BYTES)
+    )]
+    TooLarge {
+        /// Steps of the recordings.
+        steps: u64,
+        /// What is seen.
+        sight: ObservationConfig,
+        /// Memory of the pictures.
+        bytes: u64,
+    },
+    /// The recordings do not make a data set.
+    #[error(transparent)]
+    Data(#[from] playbot_learner::LearnError),
+}
+
+fn gib(bytes: u64) -> f64 {
+    bytes as f64 / (1u64 << 30) as f64
+}
+
+/// Replays every episode of a file; `progress` hears the number of episodes done.
+///
+/// # Errors
+///
+/// [`VerifyError`] if the file cannot be read to its end. Divergences are no errors: they are the report.
+pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<VerifyReport, VerifyError> {
+    let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
+    let mode = reader.header().mode.clone();
+    game.check_mode(&mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
+    let mut stage = ReplayStage::new(game, &mode);
+    let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
+    for episode in reader {
+        let episode = Arc::new(episode?);
+        if let Some(divergence) = stage.play(episode.clone(), |_, _| {})? {
+            report.divergences.push((report.episodes, divergence.to_string()));
+        }
+        report.episodes += 1;
+        report.ticks += episode.len() as u64;
+        progress(report.episodes);
+    }
+    Ok(report)
+}
+
+/// A World with one agent on which recordings are played.
+pub struct ReplayStage {
+    world: World,
+    agent: Entity,
+}
+
+impl ReplayStage {
+    /// Builds the game in a mode it has.
+    pub fn new(game: &dyn Game, mode: &str) -> Self {
+        let (world, agents) = build_world(game, mode, 0, 0, 1);
+        Self { world, agent: agents[0] }
+    }
+
+    /// Plays one episode and calls `after_tick` with the World and the agent after each tick.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract.
+    pub fn play(
+        &mut self,
+        episode: Arc<DemoEpisode>,
+        mut after_tick: impl FnMut(&World, Entity),
+    ) -> Result<Option<Divergence>, Fault> {
+        if episode.is_empty() {
+            return Ok(None);
+        }
+        Replay::begin(episode, &mut self.world.entity_mut(self.agent));
+        loop {
+            tick_world(&mut self.world)?;
+            after_tick(&self.world, self.agent);
+            let replay = self.world.get::<Replay>(self.agent);
+            if let Some(replay) = replay.filter(|replay| replay.is_finished()) {
+                return Ok(replay.divergence().cloned());
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! Measuring: each level equally often, every episode counted once.
+
+use std::collections::HashMap;
+
+use bevy::prelude::*;
+use playbot_learner::Policy;
+use serde::Serialize;
+use thiserror::Error;
+
+pub use bevy_playbot::episode::EpisodeResult;
+
+use crate::{game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world};
+use bevy_playbot::{
+    agent::Agent,
+    bot::BlindBot,
+    control::Control,
+    episode::{Episode, EpisodeEnded},
+    fault::Fault,
+    headless::tick_world,
+    level::LevelQueue,
+    policy::{ActionDraw, ActivePolicy},
+    skill_prior::SkillPrior,
+    vision::{ObservationConfig, VisionError},
+};
+
+/// Who is measured.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "one per measurement")]
+pub enum Player {
+    /// A learned policy, with its skills if it has any.
+    Policy {
+        /// The policy.
+        policy: Policy,
+        /// Where its skills come from.
+        prior: Option<SkillPrior>,
+        /// How actions are drawn.
+        draw: ActionDraw,
+    },
+    /// A bot that does not look.
+    Blind(BlindBot),
+    /// The game's own demonstrator, without noise.
+    Demonstrator,
+}
+
+/// Nothing could be measured.
+#[derive(Debug, Error)]
+pub enum EvalError {
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
+impl Player {
+    /// Gives a World what the player needs once: networks and the source of skills.
+    pub fn install(&self, world: &mut World) {
+        if let Self::Policy { policy, prior, draw } = self {
+            world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
+            if let Some(prior) = prior {
+                world.insert_resource(prior.clone());
+            }
+        }
+    }
+
+    /// Prepares an agent for the player, and returns the control under which the player then decides for it.
+    pub fn seat(&self, game: &dyn Game, world: &mut World, agent: Entity) -> Control {
+        match self {
+            Self::Policy { .. } => Control::Policy,
+            Self::Blind(bot) => {
+                world.entity_mut(agent).insert(bot.clone());
+                Control::Bot
+            }
+            Self::Demonstrator => {
+                game.arm_demonstrator(world, agent, 0.0);
+                Control::Bot
+            }
+        }
+    }
+}
+
+/// How to measure.
+#[derive(Clone, Debug)]
+pub struct EvalPlan {
+    /// Levels.
+    pub split: LevelSplit,
+    /// What a learned policy sees. Bots are left with vectors, which are cheaper.
+    pub sight: ObservationConfig,
+    /// Episodes on each level.
+    pub episodes_per_level: u32,
+    /// Seed of the players' random streams.
+    pub seed: u64,
+    /// Arenas, spread evenly over the Worlds.
+    pub arenas: u32,
+    /// Worlds: part of the plan, as in training.
+    pub worlds: u32,
+    /// Threads: not part of the result.
+    pub threads: usize,
+}
+
+/// The summary of a measurement: one row of a result table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EvalSummary {
+    /// Name of the player.
+    pub method: String,
+    /// Levels, as `mode:first..last`.
+    pub split: String,
+    /// Episodes.
+    pub episodes: u64,
+    /// Mean return.
+    pub return_mean: f64,
+    /// Standard error of the mean over episodes, taken as independent.
+    pub return_se: f64,
+    /// Share of episodes that reached the level's aim.
+    pub success: f64,
+    /// Mean length, ticks.
+    pub length_mean: f64,
+    /// Share of all ticks whose action was clipped to the game's range.
+    pub clipped: f64,
+}
+
+/// One measured episode, and where it led.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trail {
+    /// The episode.
+    pub result: EpisodeResult,
+    /// Where the agent was after each tick, on the game's [`FloorPlan`](crate::floor_plan::FloorPlan). Empty if the
+    /// game does not say.
+    pub places: Vec<Vec2>,
+}
+
+#[derive(Resource, Default)]
+struct Results(Vec<(Entity, EpisodeResult)>);
+
+fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
+    results.0.push((event.entity, event.result));
+}
+
+/// Plays every level of the plan and returns all episodes, sorted by level. `progress` hears each finished episode; it
+/// is called from several threads.
+///
+/// # Errors
+///
+/// The game broke its contract, or cannot be seen this way.
+pub fn evaluate(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<EpisodeResult>, EvalError> {
+    let trails = play(game, player, plan, false, progress)?;
+    Ok(trails.into_iter().map(|trail| trail.result).collect())
+}
+
+/// [`evaluate`], and where every episode led. The results are the same.
+///
+/// # Errors
+///
+/// The game broke its contract, or cannot be seen this way.
+pub fn evaluate_with_trails(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Trail>, EvalError> {
+    play(game, player, plan, true, progress)
+}
+
+fn play(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    follow: bool,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Trail>, EvalError> {
+    let worlds: Result<Vec<_>, _> = (0..plan.worlds).map(|world| stage(game, player, plan, world)).collect();
+    let mut worlds = worlds?;
+    let followed = follow.then_some(game);
+    let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, followed, &progress));
+    let mut trails = Vec::new();
+    for part in parts {
+        trails.extend(part?);
+    }
+    trails.sort_by_key(|trail| trail.result.level);
+    Ok(trails)
+}
+
+/// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
+fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) -> Result<World, VisionError> {
+    let per_world = (plan.arenas / plan.worlds).max(1);
+    let total = (per_world * plan.worlds) as usize;
+    let first = world_index * per_world;
+    let sight = if matches!(player, Player::Policy { .. }) { plan.sight } else { ObservationConfig::default() };
+    let (mut world, agents) = build_observing_world(game, &plan.split.mode, &sight, plan.seed, first, per_world)?;
+    world.init_resource::<Results>();
+    world.add_observer(note_result);
+    let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
+    for (offset, &agent) in agents.iter().enumerate() {
+        let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
+        world.entity_mut(agent).insert(LevelQueue::list(levels));
+        let control = player.seat(game, &mut world, agent);
+        world.entity_mut(agent).insert(control);
+    }
+    player.install(&mut world);
+    Ok(world)
+}
+
+/// Ticks until every agent has played its list. With a game, notes where each agent is after each tick.
+fn play_out(
+    world: &mut World,
+    followed: Option<&dyn Game>,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Vec<Trail>, Fault> {
+    let mut agents = world.query_filtered::<&Control, With<Agent>>();
+    let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
+    let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
+    let mut trails = Vec::new();
+    while agents.iter(world).any(|control| control.is_active()) {
+        tick_world(world)?;
+        let ended = std::mem::take(&mut world.resource_mut::<Results>().0);
+        for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {
+            let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
+            let is_seen = is_playing || ended.iter().any(|(entity, _)| *entity == agent);
+            if let Some(place) = is_seen.then(|| game.whereabouts(world, agent)).flatten() {
+                places.entry(agent).or_default().push(place);
+            }
+        }
+        if !ended.is_empty() {
+            progress(ended.len() as u64);
+        }
+        let trail = |(agent, result)| Trail { result, places: places.remove(&agent).unwrap_or_default() };
+        trails.extend(ended.into_iter().map(trail));
+    }
+    Ok(trails)
+}
+
+/// Sums up the episodes of one player on one split.
+pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) -> EvalSummary {
+    let n = results.len() as f64;
+    let mean = |value: &dyn Fn(&EpisodeResult) -> f64| results.iter().map(value).sum::<f64>() / n;
+    let return_mean = mean(&|result| result.total_reward);
+    let squares = results.iter().map(|result| (result.total_reward - return_mean).powi(2)).sum::<f64>();
+    EvalSummary {
+        method: method.to_owned(),
+        split: split.to_string(),
+        episodes: results.len() as u64,
+        return_mean,
+        return_se: if n > 1.0 { (squares / (n - 1.0) / n).sqrt() } else { 0.0 },
+        success: mean(&|result| f64::from(u8::from(result.success))),
+        length_mean: mean(&|result| f64::from(result.ticks)),
+        clipped: mean(&|result| f64::from(result.clipped)) / mean(&|result| f64::from(result.ticks)).max(1.0),
+    }
+}

@@ -1,0 +1,172 @@
+//! What the plugin needs to know of a game in order to build it headless, many arenas at a time.
+
+use bevy::prelude::*;
+
+use crate::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
+    mode::ModeError,
+};
+use bevy_playbot::{
+    action::ActionSpace,
+    bot::BlindBot,
+    key_bindings::KeyBindings,
+    observation::{Observation, ObservationSpace},
+    policy_file::GameCard,
+    unknown_name::UnknownName,
+    vision::Picture,
+};
+
+/// A game that can be trained on and tested without a window.
+///
+/// The plugin itself knows no game: the trainer, the evaluation and the replay are handed one of these.
+pub trait Game: Send + Sync {
+    /// Name in files and on the command line.
+    fn name(&self) -> &'static str;
+
+    /// Version of the rules; raise it whenever an old recording would no longer replay.
+    fn version(&self) -> u32;
+
+    /// Modes, such as difficulties. At least one. Where modes take options, these are the names in front of them.
+    fn modes(&self) -> &'static [&'static str];
+
+    /// Checks that there is such a mode: one of [`modes`](Self::modes), unless the game reads options behind the name.
+    ///
+    /// # Errors
+    ///
+    /// [`ModeError`] with what is valid.
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        let valid = self.modes();
+        if valid.contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, valid).into()) }
+    }
+
+    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that whoever has
+    /// learned it has seen it for all of them. The mode itself, unless the game reads options that change rules only.
+    fn family(&self, mode: &str) -> String {
+        mode.to_owned()
+    }
+
+    /// A hash of the places of a level, where different seeds may happen to draw the same ones. `None` where they cannot, or
+    /// where the places are the mode's own.
+    fn fingerprint(&self, _mode: &str, _level: u64) -> Option<u64> {
+        None
+    }
+
+    /// Fixed ticks per second of game time.
+    fn tick_hz(&self) -> f64;
+
+    /// Actions of every agent.
+    fn actions(&self) -> ActionSpace;
+
+    /// Names of the discrete choices, or of the dimensions of continuous actions, for people; may be empty.
+    fn action_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The keys with which a person plays; `None` if nobody can.
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        None
+    }
+
+    /// Observation of every agent.
+    fn observation(&self) -> ObservationSpace;
+
+    /// How the game is drawn for agents that see pictures; `None` if it cannot be drawn.
+    fn picture(&self) -> Option<Picture> {
+        None
+    }
+
+    /// Adds what is drawn to an app, after [`build`](Self::build): sprites, tiles and transforms for everything that the
+    /// game spawns, brought up to date in [`VisionSystems::Dress`](bevy_playbot::vision::VisionSystems::Dress). Needs a
+    /// [`picture`](Self::picture).
+    fn build_picture(&self, _app: &mut App) {}
+
+    /// Adds the game's plugins to a headless app, in a mode that [`check_mode`](Self::check_mode) takes.
+    fn build(&self, app: &mut App, mode: &str);
+
+    /// Adds one arena with one agent, which must carry [`Agent`](bevy_playbot::agent::Agent) with this number and its sensor,
+    /// under [`Control::Idle`](bevy_playbot::control::Control::Idle).
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity;
+
+    /// A level from above, for pictures of where agents went; `None` if it has no such picture.
+    fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
+        None
+    }
+
+    /// Where an agent is on its [`floor_plan`](Self::floor_plan); `None` where there is no plan, or no level is played.
+    fn whereabouts(&self, _world: &World, _agent: Entity) -> Option<Vec2> {
+        None
+    }
+
+    /// Bots that every learner is compared with, by name.
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        vec![("random", BlindBot::Uniform)]
+    }
+
+    /// The seeing bot that demonstrates the game, if there is one: its name.
+    fn demonstrator(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by a
+    /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
+    fn arm_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
+
+    /// The experiment of the game that serves where none is named: the path it has below the game's sources, and its text.
+    /// `None` for the plainest one, see [`default_experiment`](crate::train::default_experiment::default_experiment).
+    fn experiment(&self) -> Option<(&'static str, &'static str)> {
+        None
+    }
+
+    /// What is measured of it when its speed is; by default random actions and PPO, on state vectors, in its first mode.
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        let modes = self.modes().first();
+        modes.map_or_else(Vec::new, |mode| vec![Benchmark::simulate("vector", mode), Benchmark::train("vector", mode)])
+    }
+
+    /// Shows a level.
+    ///
+    /// # Errors
+    ///
+    /// There is no such level, or the game cannot show any.
+    fn show_level(&self, _request: &LevelRequest) -> Result<LevelView, InspectError> {
+        Err(InspectError::Usage(format!("`{}` has no levels to show", self.name())))
+    }
+
+    /// Names of the numbers that a trace prints after each step; by default those of the observation.
+    fn trace_columns(&self) -> Vec<String> {
+        self.observation().names
+    }
+
+    /// These numbers of an agent.
+    fn trace_row(&self, world: &World, agent: Entity) -> Vec<f32> {
+        world.get::<Observation>(agent).map_or_else(Vec::new, |observation| observation.vector.clone())
+    }
+
+    /// The game's own way of playing given actions and printing the state after each, with what is to be said about it at
+    /// the end, if anything. `None` where [`trace_actions`](crate::inspect::trace_actions) does.
+    fn trace(&self, _request: &TraceRequest, _print: Print) -> Option<Result<Option<String>, InspectError>> {
+        None
+    }
+
+    /// Whether windows can show it in space, too.
+    fn has_space_view(&self) -> bool {
+        false
+    }
+
+    /// Adds the view in space to a window's app, with a [`CameraFocus`](crate::space_view::CameraFocus) on agents.
+    fn build_space_view(&self, _app: &mut App) {}
+
+    /// What the game says of itself to policy files.
+    fn card(&self) -> GameCard {
+        GameCard {
+            name: self.name(),
+            version: self.version(),
+            observations: self.observation().names,
+            actions: self.actions(),
+            action_names: self.action_names(),
+            has_picture: self.picture().is_some(),
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! The one file that a game ships with, made from a trained policy.
+
+use std::path::Path;
+
+use playbot_learner::{FileError, Observations, Policy, PolicyCard, PolicyFile, SkillSource};
+use thiserror::Error;
+
+use crate::{game::Game, split::LevelSplit, train::collect::Collector};
+use bevy_playbot::{
+    fault::Fault,
+    policy_file::policy_observation,
+    skill_prior::SkillPrior,
+    vision::{ObservationConfig, UnknownObservation, VisionError},
+};
+
+/// Arenas and ticks of the short play from which a file's examples are taken.
+const EXAMPLE_ARENAS: u32 = 4;
+const EXAMPLE_TICKS: usize = 32;
+/// Every so many of its rows becomes an example.
+const EXAMPLE_STRIDE: usize = 9;
+
+/// A policy could not be exported.
+#[derive(Debug, Error)]
+pub enum ExportError {
+    /// The game broke its contract while the examples were played.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The file does not say what its policy sees.
+    #[error(transparent)]
+    ObservationConfig(#[from] UnknownObservation),
+    /// The pictures cannot be made.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The file could not be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// A policy for this game that sees it so, with the card filled in from both.
+pub fn policy_file(
+    game: &dyn Game,
+    sight: &ObservationConfig,
+    policy: Policy,
+    skills: Option<SkillSource>,
+    (algorithm, training, code): (String, String, String),
+) -> PolicyFile {
+    let card = PolicyCard {
+        game: game.name().to_owned(),
+        game_version: game.version(),
+        observations: if sight.is_image() { Vec::new() } else { game.observation().names },
+        picture: sight.card(),
+        actions: game.action_names(),
+        algorithm,
+        training,
+        code,
+    };
+    PolicyFile { card, policy, skills }
+}
+
+/// Writes a policy file. Its examples come from a short play on `levels`.
+///
+/// # Errors
+///
+/// [`ExportError`].
+pub fn export_policy(
+    game: &dyn Game,
+    file: &PolicyFile,
+    levels: &LevelSplit,
+    seed: u64,
+    path: &Path,
+) -> Result<(), ExportError> {
+    let prior = file.skills.as_ref().map(SkillPrior::from);
+    let latent = file.policy.latent();
+    let mut collector = Collector::new(game, levels, &policy_observation(file)?, seed, 0, EXAMPLE_ARENAS, prior)?;
+    let (rollout, _) = collector.collect(&file.policy, latent, EXAMPLE_TICKS)?;
+    let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
+    let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
+    let n = rows.len();
+    for row in rows {
+        obs.push(rollout.obs.row(row, rollout.obs_kind.numbers())).map_err(|error| Fault(error.to_string()))?;
+        z.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
+    }
+    Ok(file.save(path, &obs, &z, n)?)
+}

@@ -1,0 +1,87 @@
+//! Sensors for the agents of a game, by what an experiment says that they see.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    observation::VectorSensor,
+    raster::{RasterPlugin, RasterSensor},
+    vision::{ObservationConfig, ObservationKind, VisionError},
+};
+use playbot_learner::ObsKind;
+
+use crate::game::Game;
+
+/// What an [`ObservationConfig`] means for a certain game.
+pub trait GameSensors {
+    /// The form of an observation: its length, or the shape of its pictures.
+    fn obs_kind(&self, game: &dyn Game) -> ObsKind;
+
+    /// Checks the sizes, that the game can be drawn, and that this build has the sensor.
+    ///
+    /// # Errors
+    ///
+    /// See [`VisionError`].
+    fn check(&self, game: &dyn Game) -> Result<(), VisionError>;
+
+    /// Adds what the sensors need to an app, before it is finished.
+    ///
+    /// # Errors
+    ///
+    /// See [`VisionError`].
+    fn build(&self, game: &dyn Game, app: &mut App) -> Result<(), VisionError>;
+
+    /// Gives an agent the sensor. One that sees pictures needs no vector, which costs time to fill.
+    fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity);
+}
+
+impl GameSensors for ObservationConfig {
+    fn obs_kind(&self, game: &dyn Game) -> ObsKind {
+        match self.kind {
+            ObservationKind::Vector => ObsKind::Vector(game.observation().len()),
+            ObservationKind::Raster | ObservationKind::Camera => self.image.obs_kind(),
+        }
+    }
+
+    fn check(&self, game: &dyn Game) -> Result<(), VisionError> {
+        if self.kind == ObservationKind::Vector {
+            return Ok(());
+        }
+        self.image.check()?;
+        if game.picture().is_none() {
+            return Err(VisionError::NoPicture { game: game.name() });
+        }
+        if self.kind == ObservationKind::Camera && !cfg!(feature = "camera") {
+            return Err(VisionError::NoCamera);
+        }
+        Ok(())
+    }
+
+    fn build(&self, game: &dyn Game, app: &mut App) -> Result<(), VisionError> {
+        self.check(game)?;
+        match self.kind {
+            ObservationKind::Vector => return Ok(()),
+            ObservationKind::Raster => app.add_plugins(RasterPlugin),
+            #[cfg(feature = "camera")]
+            ObservationKind::Camera => app.add_plugins(bevy_playbot::camera::CameraSensorPlugin::for_app(app)?),
+            #[cfg(not(feature = "camera"))]
+            ObservationKind::Camera => return Err(VisionError::NoCamera),
+        };
+        game.build_picture(app);
+        Ok(())
+    }
+
+    fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity) {
+        let Some(picture) = game.picture() else { return };
+        let mut entity = world.entity_mut(agent);
+        match self.kind {
+            ObservationKind::Vector => return,
+            ObservationKind::Raster => entity.insert(RasterSensor::following(agent, picture.width, self.image)),
+            #[cfg(feature = "camera")]
+            ObservationKind::Camera => {
+                entity.insert(bevy_playbot::camera::CameraSensor::following(agent, picture.width, self.image))
+            }
+            #[cfg(not(feature = "camera"))]
+            ObservationKind::Camera => return,
+        };
+        entity.remove::<VectorSensor>();
+    }
+}

@@ -1,0 +1,273 @@
+//! The checkpoints of a run: how one is written, which are kept, which is the last and which the best.
+//!
+//! ```text
+//! checkpoints/step-000000081920/learner.safetensors   weights, moments, normalisers, generators
+//! checkpoints/step-000000081920/arenas.json           level queues and running episodes
+//! checkpoints/step-000000081920/summary.json          how good the policy was
+//! ```
+//!
+//! A folder called `step-…` is whole: it is filled under another name first.
+
+use std::{
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::run_dir::{RunError, damaged, io_error, write_atomically};
+pub use super::which_checkpoint::Which;
+
+const PREFIX: &str = "step-";
+const SUMMARY: &str = "summary.json";
+const UNFINISHED: &str = "unfinished";
+
+/// When checkpoints are written and how many stay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CheckpointConfig {
+    /// Updates between two checkpoints; there is always one at the start and one at the end.
+    pub every: u64,
+    /// How many of the latest stay; the best one stays besides.
+    pub keep: usize,
+}
+
+impl Default for CheckpointConfig {
+    fn default() -> Self {
+        Self { every: 10, keep: 3 }
+    }
+}
+
+/// How good the policy of a checkpoint was in training.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CheckpointSummary {
+    /// Environment steps done.
+    pub step: u64,
+    /// Mean return of the last 100 training episodes; `None` before as many have ended.
+    pub episodic_return: Option<f64>,
+    /// Success rate of the last 100 training episodes; `None` before as many have ended.
+    pub success_rate: Option<f64>,
+}
+
+/// One whole checkpoint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// Its folder.
+    pub path: PathBuf,
+    /// How good it was.
+    pub summary: CheckpointSummary,
+}
+
+impl Checkpoint {
+    /// The learner's file.
+    pub fn learner_file(&self) -> PathBuf {
+        self.path.join("learner.safetensors")
+    }
+
+    /// The file of the arenas.
+    pub fn arenas_file(&self) -> PathBuf {
+        self.path.join("arenas.json")
+    }
+}
+
+/// All whole checkpoints of the run in folder `run`, the oldest first. One whose summary cannot be read is passed over
+/// with a warning.
+///
+/// # Errors
+///
+/// [`RunError`] if the folder cannot be read.
+pub fn list(run: &Path) -> Result<Vec<Checkpoint>, RunError> {
+    let folder = folder(run);
+    let entries = match fs::read_dir(&folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.map_err(io_error("read", &folder))?,
+    };
+    let mut checkpoints = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(io_error("read", &folder))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if name.strip_prefix(PREFIX).is_some_and(|step| step.parse::<u64>().is_ok()) {
+            match read_summary(&path.join(SUMMARY)) {
+                Ok(summary) => checkpoints.push(Checkpoint { path, summary }),
+                Err(error) => tracing::warn!("a checkpoint is passed over: {error}"),
+            }
+        }
+    }
+    checkpoints.sort_by_key(|checkpoint| checkpoint.summary.step);
+    Ok(checkpoints)
+}
+
+/// The checkpoint that is meant, out of those of [`list`].
+///
+/// # Errors
+///
+/// [`RunError::NoCheckpoint`] if there is none, or none at that step.
+pub fn choose(run: &Path, which: Which) -> Result<Checkpoint, RunError> {
+    let mut all = list(run)?;
+    let index = match which {
+        Which::Last => all.len().checked_sub(1),
+        Which::Best => best(&all),
+        Which::Step(step) => all.iter().position(|checkpoint| checkpoint.summary.step == step),
+    };
+    let steps = all.iter().map(|checkpoint| checkpoint.summary.step).collect();
+    match index {
+        Some(index) => Ok(all.swap_remove(index)),
+        None => Err(RunError::NoCheckpoint { path: run.into(), steps }),
+    }
+}
+
+/// Writes a checkpoint: `fill` puts the large files into the folder it is given. Then only the last `keep` and the best
+/// stay.
+///
+/// # Errors
+///
+/// [`RunError`]; all earlier checkpoints are still there then.
+pub(super) fn write(
+    run: &Path,
+    summary: CheckpointSummary,
+    keep: usize,
+    fill: impl FnOnce(&Checkpoint) -> Result<(), RunError>,
+) -> Result<(), RunError> {
+    let folder = folder(run);
+    let fresh = Checkpoint { path: folder.join(UNFINISHED), summary };
+    let path = folder.join(format!("{PREFIX}{:012}", summary.step));
+    remove_if_there(&fresh.path)?;
+    fs::create_dir_all(&fresh.path).map_err(io_error("create", &fresh.path))?;
+    let filled =
+        fill(&fresh).and_then(|()| write_atomically(&fresh.path.join(SUMMARY), json!(summary).to_string().as_bytes()));
+    if filled.is_err() {
+        // Gives back the space; the first error is the one to report.
+        let _ = remove_if_there(&fresh.path);
+        return filled;
+    }
+    put_aside(&path)?;
+    fs::rename(&fresh.path, &path).map_err(io_error("move", &fresh.path))?;
+    // Makes the new name durable where folders can be opened; elsewhere the rename is all there is.
+    if let Ok(folder) = File::open(&folder) {
+        let _ = folder.sync_all();
+    }
+    prune(run, keep)
+}
+
+/// Takes the checkpoints after `step` out of the list: a training that had to go back so far could not read them.
+pub(super) fn set_aside_after(run: &Path, step: u64) -> Result<(), RunError> {
+    for checkpoint in list(run)?.iter().filter(|checkpoint| checkpoint.summary.step > step) {
+        put_aside(&checkpoint.path)?;
+    }
+    Ok(())
+}
+
+/// Moves a checkpoint, if there is one, where no one looks for it but a person.
+fn put_aside(path: &Path) -> Result<(), RunError> {
+    if !path.exists() {
+        return Ok(());
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let aside = path.with_file_name(format!("damaged-{name}"));
+    remove_if_there(&aside)?;
+    fs::rename(path, &aside).map_err(io_error("move", path))
+}
+
+/// Removes all but the last `keep` (at least one) and the best.
+fn prune(run: &Path, keep: usize) -> Result<(), RunError> {
+    let all = list(run)?;
+    let best = best(&all);
+    let old = all.len().saturating_sub(keep.max(1));
+    for (index, checkpoint) in all.iter().enumerate().take(old) {
+        if Some(index) != best {
+            remove_if_there(&checkpoint.path)?;
+        }
+    }
+    Ok(())
+}
+
+/// Index of the checkpoint with the highest return, the latest of equals.
+fn best(all: &[Checkpoint]) -> Option<usize> {
+    let value = |index: &usize| all[*index].summary.episodic_return.unwrap_or(f64::NEG_INFINITY);
+    (0..all.len()).max_by(|a, b| value(a).total_cmp(&value(b)))
+}
+
+fn folder(run: &Path) -> PathBuf {
+    run.join("checkpoints")
+}
+
+fn read_summary(path: &Path) -> Result<CheckpointSummary, RunError> {
+    let text = fs::read_to_string(path).map_err(io_error("read", path))?;
+    serde_json::from_str(&text).map_err(|error| damaged(path, &error))
+}
+
+fn remove_if_there(folder: &Path) -> Result<(), RunError> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", folder)(error)),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn save(run: &Path, step: u64, episodic_return: f64, keep: usize) -> Result<(), RunError> {
+        let summary = CheckpointSummary { step, episodic_return: Some(episodic_return), success_rate: None };
+        write(run, summary, keep, |checkpoint| write_atomically(&checkpoint.learner_file(), b"weights"))
+    }
+
+    fn steps(run: &Path) -> Vec<u64> {
+        list(run).expect("readable").iter().map(|checkpoint| checkpoint.summary.step).collect()
+    }
+
+    #[test]
+    fn the_last_and_the_best_stay() {
+        let run = tempfile::tempdir().expect("a folder");
+        for (step, value) in [(10, 1.0), (20, 9.0), (30, 2.0), (40, 3.0), (50, 4.0)] {
+            save(run.path(), step, value, 2).expect("writable");
+        }
+        assert_eq!(steps(run.path()), [20, 40, 50]);
+        let chosen = |which| choose(run.path(), which).map(|checkpoint| checkpoint.summary.step);
+        assert_eq!(chosen(Which::Last).expect("there"), 50);
+        assert_eq!(chosen(Which::Best).expect("there"), 20);
+        assert_eq!(chosen(Which::Step(40)).expect("there"), 40);
+        let missing = chosen(Which::Step(30)).expect_err("pruned").to_string();
+        assert!(missing.contains("20, 40, 50"), "{missing}");
+    }
+
+    #[test]
+    fn a_checkpoint_that_fails_leaves_the_old_one_and_no_rubbish() {
+        let run = tempfile::tempdir().expect("a folder");
+        save(run.path(), 10, 1.0, 1).expect("writable");
+        let summary = CheckpointSummary { step: 20, ..CheckpointSummary::default() };
+        let failed = write(run.path(), summary, 1, |checkpoint| {
+            write_atomically(&checkpoint.learner_file(), b"half")?;
+            Err(io_error("write", &checkpoint.arenas_file())(io::Error::from(io::ErrorKind::StorageFull)))
+        });
+        assert!(failed.is_err());
+        assert_eq!(steps(run.path()), [10]);
+        assert_eq!(fs::read_dir(folder(run.path())).expect("there").count(), 1);
+    }
+
+    #[test]
+    fn a_half_written_checkpoint_is_not_seen() {
+        let run = tempfile::tempdir().expect("a folder");
+        let half = folder(run.path()).join(UNFINISHED);
+        fs::create_dir_all(&half).expect("writable");
+        fs::write(half.join("learner.safetensors"), b"half").expect("writable");
+        assert!(matches!(choose(run.path(), Which::Last), Err(RunError::NoCheckpoint { .. })));
+        save(run.path(), 10, 1.0, 1).expect("writable");
+        assert_eq!(steps(run.path()), [10]);
+    }
+
+    #[test]
+    fn what_could_not_be_read_is_neither_the_last_nor_the_best() {
+        let run = tempfile::tempdir().expect("a folder");
+        for (step, value) in [(10, 1.0), (20, 2.0), (30, 9.0)] {
+            save(run.path(), step, value, 3).expect("writable");
+        }
+        set_aside_after(run.path(), 20).expect("movable");
+        assert_eq!(steps(run.path()), [10, 20]);
+        save(run.path(), 25, 1.5, 1).expect("writable");
+        assert_eq!(steps(run.path()), [20, 25], "the best and the last of those that can be read");
+        assert!(folder(run.path()).join("damaged-step-000000000030").exists());
+    }
+}

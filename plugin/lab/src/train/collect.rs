@@ -1,0 +1,314 @@
+//! One World that plays with the current policy and keeps what the learner needs.
+
+use bevy::prelude::*;
+use playbot_learner::{Actions, LearnError, ObsKind, Observations, Policy, Rollout, RolloutStep};
+
+use crate::sensors::GameSensors;
+use crate::{game::Game, split::LevelSplit, train::arena_state::ActionLog, worlds::build_observing_world};
+use bevy_playbot::{
+    action::Action,
+    agent::{Agent, AgentOrder},
+    control::Control,
+    demo::recorder,
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    fault::{Fault, Faults},
+    headless::tick_world,
+    level::LevelQueue,
+    observation::Observation,
+    policy::{ActionDraw, ActivePolicy, AgentStreams, Decision},
+    reward::Reward,
+    skill_prior::{ActiveSkill, SkillPrior, draw_skills},
+    systems::{ObserveSchedule, PlaybotSystems},
+    vision::{ObservationConfig, VisionError},
+};
+
+/// A World of arenas that fills rollouts.
+pub struct Collector {
+    world: World,
+    agents: Vec<Entity>,
+}
+
+/// Rows of the rollout that is being filled.
+#[derive(Resource)]
+struct Collecting {
+    rollout: Rollout,
+    kind: ObsKind,
+}
+
+/// Episodes that ended during the rollout, in the order of ticks and agents.
+#[derive(Resource, Default)]
+struct Finished(Vec<EpisodeEnded>);
+
+fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {
+    finished.0.push(*event);
+}
+
+impl Collector {
+    /// Agents `first..first + count` on the levels of a split, with skills if there is a prior.
+    ///
+    /// # Errors
+    ///
+    /// The game cannot be seen this way.
+    pub fn new(
+        game: &dyn Game,
+        split: &LevelSplit,
+        sight: &ObservationConfig,
+        seed: u64,
+        first: u32,
+        count: u32,
+        prior: Option<SkillPrior>,
+    ) -> Result<Self, VisionError> {
+        let (mut world, agents) = build_observing_world(game, &split.mode, sight, seed, first, count)?;
+        let kind = sight.obs_kind(game);
+        world.init_resource::<Finished>();
+        world.add_observer(note_finished);
+        world.insert_resource(Collecting { rollout: Rollout::new(0, kind, 0, &game.actions()), kind });
+        if let Some(prior) = prior {
+            world.insert_resource(prior);
+        }
+        world.schedule_scope(FixedPostUpdate, |_, schedule| {
+            schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
+        });
+        for (&agent, index) in agents.iter().zip(first..) {
+            world.entity_mut(agent).insert((
+                AgentStreams::new(seed, index),
+                Control::Policy,
+                LevelQueue::Uniform { first: split.first, last: split.last },
+                ActionLog::default(),
+            ));
+        }
+        Ok(Self { world, agents })
+    }
+
+    /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for none.
+    ///
+    /// Returns the rollout, `[steps, agents]`, and the episodes that ended in it.
+    ///
+    /// # Errors
+    ///
+    /// The first breach of contract of the game, with agent, level and tick.
+    pub fn collect(
+        &mut self,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let world = &mut self.world;
+        world.insert_resource(ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample });
+        let kind = world.resource::<Collecting>().kind;
+        let empty = Rollout::new(self.agents.len(), kind, latent, &policy.action_space());
+        world.resource_mut::<Collecting>().rollout = empty.clone();
+        for _ in 0..steps {
+            tick_world(world)?;
+        }
+        let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
+        peek(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
+        world.resource_mut::<Faults>().take()?;
+        Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
+    }
+
+    /// The World, for saving and restoring its arenas.
+    pub(crate) fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// The agents, in the order of their numbers.
+    pub fn agents(&self) -> &[Entity] {
+        &self.agents
+    }
+}
+
+/// Adds the states in which the rollout stopped, with the skills that will be active there, and their values. Agents
+/// between two episodes have no such state; theirs is 0 and is never used, since their last row ended an episode.
+fn peek(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
+    world.run_schedule(ObserveSchedule);
+    if world.contains_resource::<SkillPrior>()
+        && let Err(error) = world.run_system_cached(draw_skills)
+    {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    let running: Vec<_> = (0..entities.len())
+        .filter(|&row| world.get::<Episode>(entities[row]).is_some_and(Episode::is_running))
+        .collect();
+    let kind = rollout.obs_kind;
+    let (mut skills, mut observations) = (Vec::new(), Observations::empty(&kind));
+    for &row in &running {
+        push_state(world, entities[row], &mut skills, &mut observations);
+    }
+    let values = policy.values(&skills, &observations, running.len())?;
+    let latent = rollout.latent;
+    rollout.next_values = vec![0.0; entities.len()];
+    rollout.ends.next_obs = Observations::zeros(&kind, entities.len());
+    rollout.ends.next_z = vec![0.0; entities.len() * latent];
+    for (i, (&row, value)) in running.iter().zip(values).enumerate() {
+        rollout.next_values[row] = value;
+        rollout.ends.next_obs.set_row(row, observations.row(i, kind.numbers()))?;
+        rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
+    }
+    Ok(())
+}
+
+fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
+    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
+        skills.extend_from_slice(&skill.z);
+        observation.push_to(observations);
+    }
+}
+
+/// One tick of all agents, before it becomes part of the rollout.
+struct Rows {
+    obs: Observations,
+    z: Vec<f32>,
+    actions: Actions,
+    log_probs: Vec<f32>,
+    values: Vec<f32>,
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+}
+
+impl Rows {
+    fn new(policy: &Policy, kind: &ObsKind, agents: usize) -> Self {
+        let empty = Vec::new;
+        Self {
+            obs: Observations::with_capacity(kind, agents),
+            z: empty(),
+            actions: Actions::empty(&policy.action_space()),
+            log_probs: empty(),
+            values: empty(),
+            rewards: empty(),
+            terminated: Vec::new(),
+            truncated: Vec::new(),
+        }
+    }
+
+    fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
+        RolloutStep {
+            obs: self.obs.as_slice(),
+            z: &self.z,
+            actions: &self.actions,
+            log_probs: &self.log_probs,
+            values: &self.values,
+            rewards: &self.rewards,
+            terminated: &self.terminated,
+            truncated: &self.truncated,
+            final_values,
+        }
+    }
+}
+
+/// Appends one row per agent to the rollout.
+fn collect_tick(world: &mut World) {
+    let mut query = world.query_filtered::<(
+        &Observation,
+        &ActiveSkill,
+        &Action,
+        &Decision,
+        &Reward,
+        &Episode,
+        &mut ActionLog,
+    ), With<Agent>>();
+    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    let Some(policy) = world.get_resource::<ActivePolicy>().map(|active| active.policy.clone()) else {
+        // Arenas are being restored, not played.
+        return;
+    };
+    let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
+    let kind = collecting.kind;
+    let cut = cut_episodes(world, &entities, &policy, &kind).unwrap_or_else(|error| {
+        world.resource_mut::<Faults>().report(error.to_string());
+        CutEpisodes::new(Vec::new(), &kind)
+    });
+    let mut final_values = vec![0.0; entities.len()];
+    for (&row, &value) in cut.agents.iter().zip(&cut.values) {
+        final_values[row] = value;
+    }
+    let mut rows = Rows::new(&policy, &kind, entities.len());
+    for &entity in &entities {
+        let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
+            continue;
+        };
+        observation.push_to(&mut rows.obs);
+        rows.z.extend_from_slice(&skill.z);
+        if let Err(error) = rows.actions.push(&action.0) {
+            return world.resource_mut::<Faults>().report(error.to_string());
+        }
+        rows.log_probs.push(decision.log_prob);
+        rows.values.push(decision.value);
+        rows.rewards.push(reward.get());
+        rows.terminated.push(matches!(episode.end(), Some(EpisodeEnd::Terminated { .. })));
+        rows.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
+        log.note(episode, &action.0);
+    }
+    if let Err(error) = push_tick(&mut collecting.rollout, &rows, &final_values, &cut) {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+    world.insert_resource(collecting);
+}
+
+fn push_tick(rollout: &mut Rollout, rows: &Rows, final_values: &[f32], cut: &CutEpisodes) -> Result<(), LearnError> {
+    rollout.push_step(rows.as_step(final_values))?;
+    let (width, latent) = (rollout.obs_kind.numbers(), rollout.latent);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
+        rollout.push_cut(row, cut.obs.row(i, width), z)?;
+    }
+    Ok(())
+}
+
+/// The last states of the episodes that ran out of time in one tick.
+struct CutEpisodes {
+    agents: Vec<usize>,
+    obs: Observations,
+    z: Vec<f32>,
+    values: Vec<f32>,
+}
+
+impl CutEpisodes {
+    fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
+        Self { agents, obs: Observations::empty(kind), z: Vec::new(), values: Vec::new() }
+    }
+}
+
+/// The last state of each episode that ran out of time in this tick, with its value.
+///
+/// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
+/// episode.
+fn cut_episodes(
+    world: &mut World,
+    entities: &[Entity],
+    policy: &Policy,
+    kind: &ObsKind,
+) -> Result<CutEpisodes, LearnError> {
+    let agents: Vec<_> = (0..entities.len())
+        .filter(|&row| {
+            world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
+        })
+        .collect();
+    let mut cut = CutEpisodes::new(agents, kind);
+    if cut.agents.is_empty() {
+        return Ok(cut);
+    }
+    let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
+    world.run_schedule(ObserveSchedule);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let skill_from = cut.z.len();
+        push_state(world, entities[row], &mut cut.z, &mut cut.obs);
+        let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
+        if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
+            let last = cut.obs.row(i, kind.numbers());
+            let mean = prior.prior.sample(last, 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
+            cut.z.truncate(skill_from);
+            cut.z.extend(mean);
+        }
+    }
+    cut.values = policy.values(&cut.z, &cut.obs, cut.agents.len())?;
+    // The row that is being written belongs to the state before the action.
+    for (&entity, before) in entities.iter().zip(before) {
+        if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
+            *observation = before;
+        }
+    }
+    Ok(cut)
+}

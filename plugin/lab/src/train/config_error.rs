@@ -1,0 +1,156 @@
+//! What is wrong with an experiment, in words that say where and what to do.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::{config::ExperimentError, config_keys::Keys, ron_keys::word};
+use bevy_playbot::unknown_name::nearest;
+
+/// An experiment cannot be used.
+#[derive(Debug, Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The text is not an experiment.
+    #[error("{}:{line}:{column}: {message}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong, and the nearest valid key where a key is unknown.
+        message: String,
+    },
+    /// A text `key=value` does not fit.
+    #[error("`{set}`: {message}")]
+    Set {
+        /// The text.
+        set: String,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// What `key=value` changes does not go with the rest, which was sound before.
+    #[error("`{}`: {source}", sets.join("`, `"))]
+    Sets {
+        /// The texts, those that are to blame if it can be told.
+        sets: Vec<String>,
+        /// Why.
+        source: Box<ExperimentError>,
+    },
+    /// The values do not go together.
+    #[error("{}: {source}", path.display())]
+    Values {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: ExperimentError,
+    },
+}
+
+/// What to say about a key that does not exist: the nearest one, in its own section or anywhere; otherwise all keys of
+/// its section.
+pub(super) fn unknown_key(key: &str) -> String {
+    if Keys::all().is_section(key) {
+        return format!("`{key}` is a section: write {key}: (key: value); its keys: {}", list(key));
+    }
+    let (section, name) = key.rsplit_once('.').unwrap_or(("", key));
+    match neighbour(section, name) {
+        Some(near) => format!("unknown key `{key}`; did you mean `{near}`?"),
+        None if section.is_empty() => format!("unknown key `{key}`; valid keys: {}", list("")),
+        None if Keys::all().is_section(section) => {
+            format!("unknown key `{key}`; valid keys in `{section}`: {}", list(section))
+        }
+        None if Keys::all().text(section).is_some() => format!("unknown key `{key}`: `{section}` has no keys"),
+        None => format!("unknown key `{key}`; valid sections and keys: {}", list("")),
+    }
+}
+
+/// The key nearest to `name`: the same name elsewhere, otherwise one like it in this section, otherwise one in a section
+/// whose name is near.
+fn neighbour(section: &str, name: &str) -> Option<String> {
+    let join = |section: &str, name: &str| if section.is_empty() { name.into() } else { format!("{section}.{name}") };
+    let near_section = nearest(section, &names(""));
+    let same_name = |path: &&str| path.rsplit('.').next() == Some(name);
+    // Of several, the one whose section looks like this one.
+    let of_near_section = |path: &&str| near_section.is_some_and(|near| **path == join(near, name));
+    let elsewhere = || Keys::all().paths().filter(same_name);
+    if let Some(elsewhere) = elsewhere().find(of_near_section).or_else(|| elsewhere().next()) {
+        return Some(elsewhere.to_owned());
+    }
+    if let Some(near) = nearest(name, &names(section)) {
+        return Some(join(section, near));
+    }
+    let near = near_section?;
+    Some(join(near, nearest(name, &names(near))?))
+}
+
+/// Names of keys and sections directly in a section; "" is the experiment itself.
+fn names(section: &str) -> Vec<&'static str> {
+    let prefix = if section.is_empty() { String::new() } else { format!("{section}.") };
+    let inside = Keys::all().paths().filter_map(|path| path.strip_prefix(&prefix));
+    let mut names: Vec<&str> = inside.map(|rest| rest.split('.').next().unwrap_or(rest)).collect();
+    names.dedup();
+    names
+}
+
+fn list(section: &str) -> String {
+    names(section).join(", ")
+}
+
+/// What to say about a value that the reader refused. `valid_names` are the names of which the key takes one.
+pub(super) fn type_message(
+    error: &ron::Error,
+    key: &str,
+    text: &str,
+    valid_names: impl Fn() -> Option<&'static [&'static str]>,
+) -> String {
+    match error {
+        // A type with its own reading, such as a range of levels, says best what it wants.
+        ron::Error::Message(message) => format!("`{key}`: {message}"),
+        ron::Error::NoSuchStructField { expected, found, .. } => match nearest(found, expected) {
+            Some(near) => format!("unknown key `{found}` in `{key}`; did you mean `{near}`?"),
+            None => format!("unknown key `{found}` in `{key}`; valid keys: {}", expected.join(", ")),
+        },
+        ron::Error::MissingStructField { field, .. } => format!("`{field}` is missing in `{key}`"),
+        ron::Error::NoSuchEnumVariant { expected, found, .. } => one_of(key, found, expected),
+        other => match valid_names() {
+            Some(names) if !names.contains(&word(text)) => one_of(key, text, names),
+            _ => format!("`{key}` must be {}, not {text} ({other})", kind(Keys::all().text(key))),
+        },
+    }
+}
+
+/// What to say about a text that is no value at all.
+pub(super) fn no_value(key: &str, text: &str, error: &ron::Error) -> String {
+    format!("`{key}` must be {}; `{text}` is not a value ({error})", kind(Keys::all().text(key)))
+}
+
+fn one_of(key: &str, found: &str, names: &[&str]) -> String {
+    let hint = nearest(found, names).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+    format!("`{key}` cannot be `{found}`{hint}; valid: {}", names.join(", "))
+}
+
+/// The kind of value that an example is, in words.
+fn kind(example: Option<&str>) -> String {
+    let example = example.unwrap_or_default();
+    match example.chars().next() {
+        Some('"') => "text in quotes".to_owned(),
+        Some('[') => "a list in square brackets".to_owned(),
+        Some('(') => format!("values in round brackets such as {example}"),
+        Some('0'..='9' | '-') if example.contains(['.', 'e']) => format!("a number such as {example}"),
+        Some('0'..='9') => format!("a whole number such as {example}"),
+        _ if matches!(example, "true" | "false") => "true or false".to_owned(),
+        _ if example == "None" => "None or Some(value)".to_owned(),
+        _ if example.contains('(') => format!("something such as {example}"),
+        _ => format!("a name such as {example}"),
+    }
+}

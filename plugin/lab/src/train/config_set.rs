@@ -1,0 +1,188 @@
+//! `--set key=value`: an experiment with single values changed.
+
+use super::{
+    config::Experiment,
+    config_error::{ConfigError, no_value, unknown_key},
+    config_keys::{Keys, Origin, Value, check_syntax},
+};
+
+impl Experiment {
+    /// This experiment with each `key=value` put into it, in order. A key in a section has its path, such as
+    /// `ppo.lr=0.0003`; values are written as in a file, and texts may lack their quotes: `train=hard:0..31`. A whole
+    /// section is changed key by key: `ppo=(lr: 0.0003, epochs: 4)`.
+    ///
+    /// Whether the values go together is for [`check`](Self::check) to say.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError::Set`] with the text that does not fit: no `=`, an unknown key, or a value of the wrong type.
+    pub fn with_set<S: AsRef<str>>(&self, sets: &[S]) -> Result<Self, ConfigError> {
+        sets.iter().try_fold(self.clone(), |experiment, set| put(&experiment, set.as_ref()))
+    }
+}
+
+fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
+    let origin = Origin::Set(set.to_owned());
+    let refuse = |message: String| origin.error((1, 1), message);
+    let Some((key, text)) = set.split_once('=') else {
+        return Err(refuse("write key=value, such as ppo.lr=0.0003".to_owned()));
+    };
+    let (key, text) = (key.trim(), text.trim());
+    if key == "base" {
+        return Err(refuse("`base` names what a file is built on: write it into an experiment file".to_owned()));
+    }
+    let mut keys = Keys::of_experiment(experiment, &origin)?;
+    if Keys::all().is_section(key) && text.starts_with('(') {
+        let section = Keys::of_set(key, text, &origin)?;
+        section.check_names()?;
+        return keys.overlaid(&section).parse(&origin);
+    }
+    let Some(example) = Keys::all().text(key) else {
+        return Err(refuse(unknown_key(key)));
+    };
+    if text == "None" {
+        // Text may lack its quotes, but a key that can do without a value has none.
+        let mut without = keys.clone();
+        without.put(key.to_owned(), Value { text: text.to_owned(), origin: origin.clone() });
+        if let Ok(experiment) = without.parse(&origin) {
+            return Ok(experiment);
+        }
+    }
+    let text = if example.starts_with('"') && !text.starts_with('"') {
+        ron::to_string(text).map_err(|error| refuse(error.to_string()))?
+    } else {
+        text.to_owned()
+    };
+    check_syntax(&text).map_err(|error| refuse(no_value(key, &text, &error.code)))?;
+    keys.put(key.to_owned(), Value { text, origin: origin.clone() });
+    keys.parse(&origin)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use playbot_learner::{
+        AlphaKind, EntropyCoef, StdKind,
+        nn::{Activation, CnnKind},
+    };
+
+    use super::*;
+    use crate::train::{Algorithm, config_file::parse_experiment};
+    use bevy_playbot::vision::{ImageOptions, ObservationKind};
+
+    fn experiment() -> Experiment {
+        let text = r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos/coinrun", steps: 1000,
+            ppo: (gamma: 0.5, epochs: 7))"#;
+        parse_experiment(text, Path::new("x.ron")).expect("valid")
+    }
+
+    fn error(set: &str) -> String {
+        experiment().with_set(&[set]).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn values_of_every_kind_are_set_and_nothing_else_is() {
+        let sets = [
+            "score.kl=false",
+            "arenas=32",
+            "score.kl_coef = 0.3",
+            "ppo.lr=1",
+            "ppo.hidden=[64,64]",
+            "ppo.activation=Tanh",
+            "score.alpha=Off",
+            "skills.prior_std=Vector",
+            "ppo.total_updates=Some(3)",
+            "sac.entropy=Fixed(0.5)",
+            "sac.log_std=(-4, 1)",
+            "train=hard:0..31",
+            "test=\"hard:70..80\"",
+            "demos=my recordings/a",
+            "demo_steps=5000",
+            "observation=Raster",
+            "image.stack=4",
+            "image=(grayscale: true, width: 84)",
+            "ppo.cnn=Nature(feature: 64)",
+            "algorithm=bc",
+            "seeds=[4, 5]",
+            "variants=[(name: \"a\", set: [\"score.kl=true\"])]",
+        ];
+        let mut expected = experiment();
+        expected.score.kl = false;
+        expected.arenas = 32;
+        expected.score.kl_coef = 0.3;
+        expected.ppo.lr = 1.0;
+        expected.ppo.hidden = vec![64, 64];
+        expected.ppo.activation = Activation::Tanh;
+        expected.score.alpha = AlphaKind::Off;
+        expected.skills.prior_std = StdKind::Vector;
+        expected.ppo.total_updates = Some(3);
+        expected.sac.entropy = EntropyCoef::Fixed(0.5);
+        expected.sac.log_std = (-4.0, 1.0);
+        expected.train = "hard:0..31".parse().expect("a split");
+        expected.test = "hard:70..80".parse().expect("a split");
+        expected.demos = Some("my recordings/a".into());
+        expected.demo_steps = Some(5000);
+        expected.observation = ObservationKind::Raster;
+        expected.image = ImageOptions { stack: 4, grayscale: true, width: 84, ..ImageOptions::default() };
+        expected.ppo.cnn = CnnKind::Nature { feature: 64 };
+        expected.algorithm = Algorithm::BehaviourCloning;
+        expected.seeds = vec![4, 5];
+        expected.variants = vec![crate::train::config::Variant { name: "a".into(), set: vec!["score.kl=true".into()] }];
+        let changed = experiment().with_set(&sets).expect("valid");
+        assert_eq!(changed, expected);
+        let back = changed.with_set(&["ppo.total_updates=None"]).expect("valid");
+        assert_eq!(back.ppo.total_updates, None);
+        let without = changed.with_set(&["demos=None"]).expect("not all need some");
+        assert_eq!(without.demos, None);
+        assert_eq!(without.with_set(&["demos=None/a"]).expect("a path").demos, Some("None/a".into()));
+        assert_eq!(back.with_set(&["ppo.total_updates=9"]).expect("Some is understood").ppo.total_updates, Some(9));
+    }
+
+    #[test]
+    fn a_section_is_changed_key_by_key_and_the_last_one_wins() {
+        let changed = experiment().with_set(&["ppo=(lr: 0.25, epochs: 2)", "ppo.lr=0.5"]).expect("valid");
+        assert_eq!((changed.ppo.lr, changed.ppo.epochs, changed.ppo.gamma), (0.5, 2, 0.5));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named_with_what_was_given() {
+        for (set, words) in [
+            ("ppo.lr", "write key=value"),
+            ("ppo.gama=1", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
+            ("kl_coef=1", "did you mean `score.kl_coef`?"),
+            ("image.stak=2", "did you mean `image.stack`?"),
+            ("stack=2", "did you mean `image.stack`?"),
+            ("imag.width=32", "did you mean `image.width`?"),
+            ("image=(stack: 2, gray: true)", "unknown key `image.gray`; did you mean `image.grayscale`?"),
+            ("image.stack=-1", "`image.stack` must be a whole number such as 1, not -1"),
+            ("observation=raster", "did you mean `Raster`?"),
+            ("ppo.cnn=Natur", "did you mean `Nature`?"),
+            ("pop.lr=1", "did you mean `ppo.lr`?"),
+            ("ppo.qqq=1", "valid keys in `ppo`: activation"),
+            ("steps.more=1", "`steps` has no keys"),
+            ("ppo=3", "`ppo` is a section"),
+            ("ppo=(gama: 1)", "did you mean `ppo.gamma`?"),
+            ("ppo.lr=fast", "`ppo.lr` must be a number such as 0.0005, not fast"),
+            ("ppo.lr=", "`ppo.lr` must be a number"),
+            ("arenas=-3", "`arenas` must be a whole number such as 64, not -3"),
+            ("score.kl=yes", "`score.kl` must be true or false, not yes"),
+            ("ppo.hidden=[64,a]", "`ppo.hidden` must be a list in square brackets, not [64,a]"),
+            ("ppo.activation=Rellu", "did you mean `Relu`?"),
+            ("sac.entropy=Fixd(0.2)", "did you mean `Fixed`?"),
+            ("sac.entropy=Fixed(high)", "`sac.entropy` must be something such as Auto("),
+            ("sac.entropy=Auto(initail: 1.0)", "unknown key `initail` in `sac.entropy`; did you mean `initial`?"),
+            ("sac.log_std=3", "values in round brackets such as (-5.0, 2.0), not 3"),
+            ("ppo.total_updates=soon", "`ppo.total_updates` must be None or Some(value), not soon"),
+            ("train=hard", "`hard` is not a range of levels"),
+            ("algorithm=score", "unknown algorithm `score`"),
+            ("base=[]", "experiment file"),
+            // Nothing that would reach beyond the value.
+            ("ppo.lr=0.1, gamma: 0.9", "is not a value"),
+            ("ppo.lr=0.1), score: (kl: false", "is not a value"),
+        ] {
+            let text = error(set);
+            assert!(text.starts_with(&format!("`{set}`: ")) && text.contains(words), "{text}");
+        }
+    }
+}

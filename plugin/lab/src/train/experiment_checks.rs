@@ -1,0 +1,278 @@
+//! Checks of an experiment that single values cannot do.
+
+use std::path::Path;
+
+use playbot_learner::ActionSpace;
+
+use super::{
+    config::Experiment,
+    experiment_error::{ExperimentError, refuse, settings},
+};
+use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
+
+impl Experiment {
+    /// Checks what single values cannot say.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the key to change.
+    pub fn check(&self) -> Result<(), ExperimentError> {
+        if self.train.overlaps(&self.test) {
+            return Err(ExperimentError::Overlap { train: self.train.clone(), test: self.test.clone() });
+        }
+        if self.arenas == 0 {
+            return refuse("arenas", 0, "somebody has to play");
+        }
+        if self.worlds == 0 {
+            return refuse("worlds", 0, "the arenas must be somewhere");
+        }
+        if self.steps == 0 {
+            return refuse("steps", 0, "train for at least one step");
+        }
+        if self.demo_steps == Some(0) {
+            return refuse("demo_steps", 0, "skills are learned from at least one step; `None` takes all");
+        }
+        if self.eval.episodes_per_level == 0 {
+            return refuse("eval.episodes_per_level", 0, "a verdict needs at least one episode");
+        }
+        if self.checkpoints.every == 0 {
+            return refuse("checkpoints.every", 0, "is a number of updates, at least one");
+        }
+        if self.checkpoints.keep == 0 {
+            return refuse("checkpoints.keep", 0, "at least the latest checkpoint must stay");
+        }
+        if !(0.0..=1.0).contains(&self.study.threshold) {
+            return refuse("study.threshold", self.study.threshold, "a success rate lies in 0..1");
+        }
+        self.image.check().map_err(|error| ExperimentError::Settings(format!("image: {error}")))?;
+        self.skills.validate().map_err(settings)?;
+        self.score.validate().map_err(settings)?;
+        self.sac.validate().map_err(settings)?;
+        self.ppo_config().validate().map_err(settings)?;
+        if self.algorithm.needs_skills() {
+            self.recordings()?;
+        }
+        self.check_normalisers()?;
+        self.check_batches()
+    }
+
+    /// Checks that the game has the modes, and that no held-out level is trained on, be it by another name
+    /// ([`Game::family`], [`Game::fingerprint`]).
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the levels.
+    pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        self.check_train(game)?;
+        self.check_test(game)?;
+        match HeldOut::new(game, &self.test).first_of(&self.train) {
+            Some(level) => {
+                let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
+                Err(ExperimentError::Leak { train, level, test })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that the game has the mode of the training levels.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Mode`].
+    pub fn check_train(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_mode("train", &self.train, game)
+    }
+
+    /// Checks that the game has the mode of the held-out levels.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Mode`].
+    pub fn check_test(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_mode("test", &self.test, game)
+    }
+
+    /// Checks what goes with the game's actions, before hours are spent on skills.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the key to change.
+    pub fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
+        self.skills.check_space(space).map_err(settings)?;
+        if !(self.algorithm.needs_skills() && self.algorithm.is_trained()) {
+            return Ok(());
+        }
+        self.score.check_space(space).map_err(settings)?;
+        let squashed = self.algorithm.is_sac() && matches!(space, ActionSpace::Continuous(_));
+        if squashed && self.score.init_from_decoder {
+            let why = "SAC squashes continuous actions, so its policy cannot start as a copy of the decoder; set it to \
+                       false (the penalty still ties the two together)";
+            return refuse("score.init_from_decoder", true, why);
+        }
+        Ok(())
+    }
+
+    /// The demonstrations.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::NoDemos`] if none are named.
+    pub fn recordings(&self) -> Result<&Path, ExperimentError> {
+        self.demos.as_deref().ok_or(ExperimentError::NoDemos)
+    }
+
+    /// Found out here, since the learner only says so once its skills are learned.
+    fn check_normalisers(&self) -> Result<(), ExperimentError> {
+        if self.skills.norm_obs && self.sight().is_image() {
+            return refuse("skills.norm_obs", true, "is for vectors; the pixels of images are divided by 255 instead");
+        }
+        let (key, running) = match self.algorithm.is_sac() {
+            true => ("sac.norm_obs", self.sac.norm_obs),
+            false => ("ppo.norm_obs", self.ppo.norm_obs),
+        };
+        if !(running && self.algorithm.needs_skills() && self.algorithm.is_trained()) {
+            return Ok(());
+        }
+        if self.skills.norm_obs {
+            return refuse(
+                key,
+                true,
+                "with `skills.norm_obs` the policy sees through the frozen normaliser of its skills",
+            );
+        }
+        if self.score.init_from_decoder {
+            let why = "a policy that starts as a copy of the decoder must see what the decoder saw; set \
+                       `skills.norm_obs` instead, which normalises for both";
+            return refuse(key, true, why);
+        }
+        Ok(())
+    }
+
+    fn check_batches(&self) -> Result<(), ExperimentError> {
+        let (arenas, worlds) = (u64::from(self.arenas), u64::from(self.worlds));
+        if !arenas.is_multiple_of(worlds) {
+            let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
+            return refuse("worlds", worlds, why);
+        }
+        let (batch, minibatches) = (arenas * self.ppo.num_steps as u64, self.ppo.minibatches as u64);
+        if !self.algorithm.is_sac() && !batch.is_multiple_of(minibatches) {
+            let (steps, near) = (self.ppo.num_steps, nearest_divisor(batch, minibatches));
+            let why = format!("must divide `arenas` × `ppo.num_steps` = {arenas} × {steps} = {batch}; {near} does");
+            return refuse("ppo.minibatches", minibatches, why);
+        }
+        Ok(())
+    }
+}
+
+fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result<(), ExperimentError> {
+    let example = game.modes().first().copied().unwrap_or_default();
+    game.check_mode(&levels.mode).map_err(|source| ExperimentError::Mode {
+        key,
+        levels: Box::new(levels.clone()),
+        source: Box::new(source),
+        example,
+    })
+}
+
+/// The divisor of `n` nearest to `wanted`, the larger one of two.
+fn nearest_divisor(n: u64, wanted: u64) -> u64 {
+    let distance = |divisor: &u64| (divisor.abs_diff(wanted), u64::MAX - divisor);
+    let small = (1..).take_while(|d| d * d <= n).filter(|d| n.is_multiple_of(*d));
+    small.flat_map(|d| [d, n / d]).min_by_key(distance).unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::train::Algorithm;
+    use crate::train::config_file::parse_experiment;
+
+    fn check(changes: &str) -> Result<(), String> {
+        let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, {changes})"#);
+        parse_experiment(&text, Path::new("x.ron")).expect("valid").check().map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn only_those_who_learn_skills_need_demonstrations() {
+        for algorithm in Algorithm::ALL {
+            let without = check(&format!(r#"algorithm: "{algorithm}""#));
+            assert_eq!(without, check(&format!(r#"algorithm: "{algorithm}", demos: None"#)));
+            match algorithm.needs_skills() {
+                true => {
+                    assert!(without.expect_err("nothing to learn from").contains("`demos` is missing"), "{algorithm}")
+                }
+                false => assert_eq!(without, Ok(())),
+            }
+            let score = "score: (init_from_decoder: false)";
+            assert_eq!(check(&format!(r#"algorithm: "{algorithm}", demos: "d", {score}"#)), Ok(()));
+        }
+    }
+
+    #[test]
+    fn nobody_plays_nowhere() {
+        // Not with the learning rate that cannot fall over no updates.
+        let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("nobody");
+        assert!(text.starts_with("`arenas` is 0"), "{text}");
+        let text = check(r#"algorithm: "ppo", worlds: 0"#).expect_err("nowhere");
+        assert!(text.starts_with("`worlds` is 0"), "{text}");
+    }
+
+    #[test]
+    fn one_normaliser_at_a_time() {
+        let frozen = r#"demos: "d", skills: (norm_obs: true)"#;
+        assert_eq!(check(frozen), Ok(()));
+        for (changes, words) in [
+            (r#"observation: Raster"#, "`skills.norm_obs` is true: is for vectors"),
+            (r#"ppo: (norm_obs: true)"#, "`ppo.norm_obs` is true: with `skills.norm_obs`"),
+            (
+                r#"ppo: (norm_obs: true), score: (init_from_decoder: false)"#,
+                "`ppo.norm_obs` is true: with `skills.norm_obs`",
+            ),
+            (r#"algorithm: "score-sac", sac: (norm_obs: true)"#, "`sac.norm_obs` is true: with `skills.norm_obs`"),
+        ] {
+            let text = check(&format!("{frozen}, {changes}")).expect_err(changes);
+            assert!(text.starts_with(words), "{text}");
+        }
+        let text = check(r#"demos: "d", ppo: (norm_obs: true)"#).expect_err("the decoder sees raw ones");
+        assert!(text.starts_with("`ppo.norm_obs` is true") && text.contains("set `skills.norm_obs`"), "{text}");
+        // Those without a tie may do as they like, and the other family's key says nothing.
+        for changes in [
+            r#"algorithm: "ppo", ppo: (norm_obs: true)"#,
+            r#"algorithm: "bc", ppo: (norm_obs: true)"#,
+            r#"sac: (norm_obs: true)"#,
+        ] {
+            assert_eq!(check(&format!("{frozen}, {changes}")), Ok(()), "{changes}");
+        }
+        assert_eq!(check(r#"demos: "d", ppo: (norm_obs: true), score: (init_from_decoder: false)"#), Ok(()));
+    }
+
+    #[test]
+    fn actions_are_checked_before_skills_are_learned() {
+        let check = |changes: &str, space| {
+            let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, demos: "d", {changes})"#);
+            let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
+            experiment.check_actions(space).map_err(|error| error.to_string())
+        };
+        for (changes, words) in [
+            ("skills: (action_noise: 0.2)", "action_noise"),
+            ("score: (penalty: LegacyCoinrun)", "LegacyCoinrun is for discrete actions only"),
+            (r#"algorithm: "score-sac""#, "`score.init_from_decoder` is true: SAC squashes"),
+        ] {
+            let text = check(changes, ActionSpace::Continuous(8)).expect_err(changes);
+            assert!(text.contains(words), "{text}");
+            assert_eq!(check(changes, ActionSpace::Discrete(3)), Ok(()), "{changes}");
+        }
+        let untied = r#"algorithm: "sac", score: (penalty: LegacyCoinrun)"#;
+        assert_eq!(check(untied, ActionSpace::Continuous(8)), Ok(()));
+    }
+
+    #[test]
+    fn the_nearest_divisor_is_one() {
+        assert_eq!(nearest_divisor(8192, 7), 8);
+        assert_eq!(nearest_divisor(64, 3), 4, "2 and 4 are equally near");
+        assert_eq!(nearest_divisor(60, 0), 1);
+        assert_eq!(nearest_divisor(7, 1000), 7);
+    }
+}

@@ -1,0 +1,268 @@
+//! The folder of a run: configuration, metrics, checkpoint.
+//!
+//! ```text
+//! runs/<id>/experiment.ron     the experiment with all defaults filled in
+//! runs/<id>/run.json           algorithm, seed, version
+//! runs/<id>/metrics.jsonl      one line per update; the same bytes for the same seed
+//! runs/<id>/timing.jsonl       seconds and steps per second of each update
+//! runs/<id>/tensorboard/       both, as an event file for TensorBoard
+//! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`](super::checkpoint)
+//! runs/<id>/run.lock           locked while somebody trains, see [`RunLock`]
+//! ```
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use playbot_learner::DeviceKind;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::{
+    arena_state::{ArenaState, restore_arenas, save_arenas},
+    checkpoint::{self, Checkpoint, Which},
+    config::{Algorithm, Experiment},
+    config_file::read_experiment,
+    learner::Learner,
+    metrics_log::MetricsLog,
+    replaced_run::ReplacedRun,
+    run_lock::RunLock,
+    trainer::{self, Progress, TrainError, Trainer, UpdateReport},
+};
+use crate::game::Game;
+
+pub(super) use super::run_error::{damaged, io_error};
+pub use super::{
+    replaced_run::{check_replaceable, is_unborn},
+    run_error::RunError,
+};
+
+/// Writes a file under a temporary name, flushes it to the disk and renames it: the old content or the new, never half.
+///
+/// # Errors
+///
+/// [`RunError::Io`].
+pub fn write_atomically(path: &Path, content: &[u8]) -> Result<(), RunError> {
+    playbot_learner::write_atomically(path, content).map_err(io_error("write", path))
+}
+
+/// What `run.json` says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunInfo {
+    /// The algorithm.
+    pub algorithm: Algorithm,
+    /// The seed.
+    pub seed: u64,
+    /// Version of this crate.
+    pub version: String,
+    /// Revision of the code, where it is known.
+    pub revision: String,
+    /// Version of the game's rules.
+    pub game_version: u32,
+    /// [Checksum](super::checksum::file_checksum) of the skill model's file, if the algorithm needs one.
+    #[serde(default)]
+    pub skills: Option<String>,
+    /// What it was started on; the usual one where a run does not say.
+    #[serde(default)]
+    pub device: DeviceKind,
+}
+
+/// The saved state of a training besides the learner.
+#[derive(Serialize, Deserialize)]
+struct TrainState {
+    progress: Progress,
+    arenas: Vec<Vec<ArenaState>>,
+}
+
+/// An open folder of a run.
+pub struct RunDir {
+    path: PathBuf,
+    /// Held by who writes.
+    _lock: Option<RunLock>,
+}
+
+impl RunDir {
+    /// Makes the folder, locks it, and writes what the run is.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Exists`] unless `force`, which replaces a run; what is no run is left alone with
+    /// [`RunError::NotARun`], and what is in use with [`RunError::Busy`]. [`RunError::Io`] if it cannot be written.
+    pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
+        if path.exists() {
+            if !force {
+                return Err(RunError::Exists(path.into()));
+            }
+            check_replaceable(path)?;
+        }
+        fs::create_dir_all(path).map_err(io_error("create", path))?;
+        Self::begin(RunLock::take(path)?, experiment, info)
+    }
+
+    /// Writes what the run is into a folder that is locked. A run that lies there is moved aside and removed once the new
+    /// one is written; it comes back if that fails.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::NotARun`] for a folder with something else; [`RunError::Io`] if it cannot be written.
+    pub fn begin(lock: RunLock, experiment: &Experiment, info: &RunInfo) -> Result<Self, RunError> {
+        let path = lock.folder().to_owned();
+        check_replaceable(&path)?;
+        let run = Self { path: path.clone(), _lock: Some(lock) };
+        let aside = ReplacedRun::put_aside(&path)?;
+        let written = run.write_experiment(experiment).and_then(|()| {
+            let text = json!(info).to_string();
+            write_atomically(&path.join("run.json"), text.as_bytes())
+        });
+        match written {
+            Ok(()) => aside.remove(),
+            Err(error) => {
+                aside.put_back();
+                return Err(error);
+            }
+        }
+        Ok(run)
+    }
+
+    /// Opens the folder of a run that exists, to read.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if its files are missing or damaged.
+    pub fn open(path: &Path) -> Result<(Self, Experiment, RunInfo), RunError> {
+        let experiment = read_experiment(&path.join("experiment.ron"))?;
+        let info_path = path.join("run.json");
+        let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;
+        let info = serde_json::from_str(&text).map_err(|error| damaged(&info_path, &error))?;
+        Ok((Self { path: path.into(), _lock: None }, experiment, info))
+    }
+
+    /// [`open`](Self::open), to go on with it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open`](Self::open), and [`RunError::Busy`].
+    pub fn open_to_write(path: &Path) -> Result<(Self, Experiment, RunInfo), RunError> {
+        // A folder that is no run gets no lock file.
+        Self::open(path)?;
+        Self::open_with(RunLock::take(path)?)
+    }
+
+    /// [`open`](Self::open) in a folder that is locked, to go on with it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open`](Self::open).
+    pub fn open_with(lock: RunLock) -> Result<(Self, Experiment, RunInfo), RunError> {
+        let (run, experiment, info) = Self::open(lock.folder())?;
+        Ok((Self { _lock: Some(lock), ..run }, experiment, info))
+    }
+
+    /// Writes the experiment anew, after its steps were raised.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Io`].
+    pub fn write_experiment(&self, experiment: &Experiment) -> Result<(), RunError> {
+        let text = experiment.to_ron().map_err(|error| damaged(&self.path, &error))?;
+        write_atomically(&self.path.join("experiment.ron"), text.as_bytes())
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A checkpoint of the run: the policy, its prior and all that training needs.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::NoCheckpoint`].
+    pub fn checkpoint(&self, which: Which) -> Result<Checkpoint, RunError> {
+        checkpoint::choose(&self.path, which)
+    }
+
+    /// Its metrics.
+    pub fn metrics_log(&self) -> MetricsLog {
+        MetricsLog::new(&self.path)
+    }
+
+    /// Appends an update to the metrics.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Io`].
+    pub fn log(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
+        self.metrics_log().append(report, steps_per_update)
+    }
+
+    /// Saves learner and arenas as a new checkpoint; the latest and the best of the earlier ones stay.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`]; the earlier checkpoints are still there.
+    pub fn save(&self, trainer: &mut Trainer) -> Result<(), RunError> {
+        let keep = trainer.experiment().checkpoints.keep;
+        checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
+            trainer.learner.save(&fresh.learner_file())?;
+            let state = TrainState {
+                progress: trainer.progress.clone(),
+                arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
+            };
+            write_atomically(&fresh.arenas_file(), json!(state).to_string().as_bytes())
+        })
+    }
+
+    /// Brings a training back from its last checkpoint, and drops metrics that were logged after it. A checkpoint that
+    /// cannot be read, say after a fault of the disk, is passed over with a warning for the one before it.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if there is no checkpoint, none can be read, or it does not fit the game.
+    pub fn resume(
+        &self,
+        game: &dyn Game,
+        experiment: &Experiment,
+        device: DeviceKind,
+        threads: usize,
+    ) -> Result<Trainer, RunError> {
+        trainer::check(game, experiment)?;
+        let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
+        learner.set_length(experiment);
+        let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
+        for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
+            restore_arenas(collector, saved).map_err(TrainError::from)?;
+        }
+        trainer.progress = state.progress;
+        checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;
+        self.metrics_log().rewind(trainer.progress.steps)?;
+        Ok(trainer)
+    }
+
+    fn last_readable(&self, algorithm: Algorithm, device: DeviceKind) -> Result<(Learner, TrainState), RunError> {
+        let mut first_error = None;
+        for checkpoint in checkpoint::list(&self.path)?.iter().rev() {
+            match read_checkpoint(checkpoint, algorithm, device) {
+                Ok(read) => return Ok(read),
+                Err(error) => {
+                    tracing::warn!("checkpoint of step {} cannot be read: {error}", checkpoint.summary.step);
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+        Err(first_error.unwrap_or(RunError::NoCheckpoint { path: self.path.clone(), steps: Vec::new() }))
+    }
+}
+
+fn read_checkpoint(
+    checkpoint: &Checkpoint,
+    algorithm: Algorithm,
+    device: DeviceKind,
+) -> Result<(Learner, TrainState), RunError> {
+    let learner = Learner::load(algorithm, &checkpoint.learner_file(), device)?;
+    let path = checkpoint.arenas_file();
+    let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
+    let state = serde_json::from_str(&text).map_err(|error| damaged(&path, &error))?;
+    Ok((learner, state))
+}

@@ -1,0 +1,78 @@
+//! What can go wrong with the folder of a run.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use playbot_learner::FileError;
+use thiserror::Error;
+
+use super::{config_file::ConfigError, trainer::TrainError};
+
+/// A run's folder cannot be used.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The folder exists already.
+    #[error("{} exists already: choose another --run, go on with --resume, or overwrite with --force", .0.display())]
+    Exists(PathBuf),
+    /// The folder to overwrite is something else.
+    #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
+    NotARun(PathBuf),
+    /// Another process trains in the folder.
+    #[error(
+        "{} is in use by another process that trains there: wait for it or stop it, or choose another folder", .0.display()
+    )]
+    Busy(PathBuf),
+    /// There is no such checkpoint.
+    #[error("{} has no such checkpoint; it has {}", path.display(), list_steps(steps))]
+    NoCheckpoint {
+        /// The folder of the run.
+        path: PathBuf,
+        /// Environment steps of those that it has.
+        steps: Vec<u64>,
+    },
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A file of the run is damaged.
+    #[error("{}: {message}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The learner's file cannot be read or written.
+    #[error(transparent)]
+    Learner(#[from] FileError),
+    /// The saved experiment cannot be read.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The saved training does not fit the game.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+}
+
+fn list_steps(steps: &[u64]) -> String {
+    if steps.is_empty() {
+        return "none".to_owned();
+    }
+    let steps: Vec<_> = steps.iter().map(u64::to_string).collect();
+    format!("those of the steps {}", steps.join(", "))
+}
+
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
+    move |source| RunError::Io { action, path: path.into(), source }
+}
+
+pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {
+    RunError::Damaged { path: path.into(), message: error.to_string() }
+}

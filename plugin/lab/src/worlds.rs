@@ -1,0 +1,73 @@
+//! Worlds of a game: headless, with as many agents as wanted, ready to be ticked on any thread.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    headless::{headless_app, into_world, set_tick_rate},
+    policy::PlaybotSeed,
+    vision::{ObservationConfig, VisionError},
+};
+
+use crate::{game::Game, sensors::GameSensors, stage_clock};
+
+/// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see vectors.
+///
+/// Returns the World and its agents in the order of their numbers.
+pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u32) -> (World, Vec<Entity>) {
+    build_observing_world(game, mode, &ObservationConfig::default(), seed, first, count)
+        .expect("nothing can be wrong with a vector")
+}
+
+/// [`build_world`] with agents that see vectors or pictures.
+///
+/// # Errors
+///
+/// The pictures cannot be made: see [`VisionError`].
+pub fn build_observing_world(
+    game: &dyn Game,
+    mode: &str,
+    sight: &ObservationConfig,
+    seed: u64,
+    first: u32,
+    count: u32,
+) -> Result<(World, Vec<Entity>), VisionError> {
+    let mut app = headless_app();
+    set_tick_rate(&mut app, game.tick_hz());
+    add_game(game, &mut app, mode, sight, seed)?;
+    let mut world = into_world(app);
+    let agents = spawn_agents(game, &mut world, sight, first, count);
+    Ok((world, agents))
+}
+
+/// Adds a game and the sensors of its agents to an app that has the [`PlaybotPlugin`](bevy_playbot::plugin::PlaybotPlugin),
+/// with a window or without.
+///
+/// # Errors
+///
+/// The pictures cannot be made: see [`VisionError`].
+pub fn add_game(
+    game: &dyn Game,
+    app: &mut App,
+    mode: &str,
+    sight: &ObservationConfig,
+    seed: u64,
+) -> Result<(), VisionError> {
+    app.insert_resource(PlaybotSeed(seed));
+    stage_clock::add_readings(app);
+    game.build(app, mode);
+    sight.build(game, app)
+}
+
+/// Adds agents `first..first + count` with their sensors, all idle, and returns them in the order of their numbers.
+pub fn spawn_agents(
+    game: &dyn Game,
+    world: &mut World,
+    sight: &ObservationConfig,
+    first: u32,
+    count: u32,
+) -> Vec<Entity> {
+    let agents: Vec<_> = (first..first + count).map(|index| game.spawn_agent(world, index)).collect();
+    for &agent in &agents {
+        sight.equip(game, world, agent);
+    }
+    agents
+}

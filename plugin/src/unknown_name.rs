@@ -1,0 +1,47 @@
+//! Names that do not exist, and the nearest that does.
+
+use thiserror::Error;
+
+/// The name is none of those that exist.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[error("unknown {what} `{name}`{}; {}", hint(.near), choice(.valid))]
+pub struct UnknownName {
+    /// What was named: `game`, `mode`, `method`.
+    pub what: &'static str,
+    /// The name that was given.
+    pub name: String,
+    /// The valid name nearest to it.
+    pub near: Option<String>,
+    /// All valid names.
+    pub valid: Vec<String>,
+}
+
+fn hint(near: &Option<String>) -> String {
+    near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+}
+
+fn choice(valid: &[String]) -> String {
+    if valid.is_empty() { "there is none here".to_owned() } else { format!("valid: {}", valid.join(", ")) }
+}
+
+impl UnknownName {
+    /// The error for `name`, which is not among `valid`.
+    pub fn new(what: &'static str, name: &str, valid: &[&str]) -> Self {
+        Self {
+            what,
+            name: name.to_owned(),
+            near: nearest(name, valid).map(str::to_owned),
+            valid: valid.iter().map(|name| (*name).to_owned()).collect(),
+        }
+    }
+}
+
+/// The candidate most like `name`, if one is like it at all.
+pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    candidates
+        .iter()
+        .map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}

@@ -1,0 +1,90 @@
+//! What the agents of an experiment see, and the sensors it takes.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+
+use super::ImageOptions;
+use crate::unknown_name::UnknownName;
+
+/// What agents see. Written as its [`name`](Self::name) on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ObservationKind {
+    /// The game's vector of numbers.
+    #[default]
+    Vector,
+    /// Pictures drawn on the CPU.
+    Raster,
+    /// Pictures from a Bevy camera; needs the feature `camera` and a GPU or software Vulkan.
+    Camera,
+}
+
+impl ObservationKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Vector, Self::Raster, Self::Camera];
+
+    /// Name on the command line and in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vector => "vector",
+            Self::Raster => "raster",
+            Self::Camera => "camera",
+        }
+    }
+}
+
+impl fmt::Display for ObservationKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for ObservationKind {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
+        found.ok_or_else(|| UnknownName::new("observation", name, &Self::ALL.map(Self::name)))
+    }
+}
+
+/// What agents see, with the form of the pictures.
+///
+/// Policies and skill models from pictures carry it in their files: images of one shape can still show other things.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObservationConfig {
+    /// Vector or pictures.
+    pub kind: ObservationKind,
+    /// Size and form of the pictures.
+    pub image: ImageOptions,
+}
+
+/// How a game is drawn for agents that see pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// World units from the left to the right edge of what an agent sees, centred on the agent.
+    pub width: f32,
+}
+
+impl fmt::Display for ObservationConfig {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.is_image() {
+            return f.write_str("vectors");
+        }
+        let ImageOptions { width, height, stack, grayscale, paint_velocity } = self.image;
+        let colours = if grayscale { "grey" } else { "colour" };
+        write!(f, "{width}×{height} {colours} pictures of the {}", self.kind)?;
+        if stack > 1 {
+            write!(f, ", {stack} in a stack")?;
+        }
+        if paint_velocity { write!(f, ", with painted velocity") } else { Ok(()) }
+    }
+}
+
+impl ObservationConfig {
+    /// Whether agents see pictures.
+    pub fn is_image(&self) -> bool {
+        self.kind != ObservationKind::Vector
+    }
+}
