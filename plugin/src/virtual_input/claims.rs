@@ -16,7 +16,7 @@ pub(super) fn is_virtual(control: Control) -> bool {
 
 /// What only one agent of a World can have.
 #[derive(Clone, Copy, PartialEq)]
-enum Claim {
+pub(super) enum Claim {
     Button(VirtualButton),
     Axis(VirtualAxis),
 }

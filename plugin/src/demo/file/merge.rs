@@ -172,7 +172,7 @@ mod tests {
         let out = folder.path().join("all.demo");
         let twice = merge_demos(&[&one, &folder.path().join("./one.demo")], &out).expect_err("twice");
         assert!(matches!(twice.fault, DemoFault::NamedTwice), "{twice}");
-        let nothing = merge_demos::<&Path>(&[], &out).expect_err("nothing");
+        let nothing = merge_demos(&[] as &[&Path], &out).expect_err("nothing");
         assert!(matches!(nothing.fault, DemoFault::NothingToMerge), "{nothing}");
         let exists = merge_demos(&[&one], &one).expect_err("exists");
         assert!(matches!(exists.fault, DemoFault::Exists), "{exists}");
