@@ -7,7 +7,9 @@ use crate::{agent::Agent, control::Control, episode::Episode, fault::Faults};
 
 /// The action of this tick, written in [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide) by whoever
 /// holds the [`Control`] and read by the game in `FixedUpdate`.
-#[derive(Component, Clone, Debug, PartialEq)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub struct Action(pub ActionValue);
 
 impl Default for Action {
@@ -37,6 +39,11 @@ impl Action {
 /// Whether nothing can be done in this space.
 pub fn has_no_actions(space: &ActionSpace) -> bool {
     matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
+}
+
+/// Gives every agent an action.
+pub(crate) fn plugin(app: &mut App) {
+    app.register_required_components::<Agent, Action>().register_type::<Action>();
 }
 
 /// Why an action does not belong to its space, or `None` if it does.

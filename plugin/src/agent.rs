@@ -4,36 +4,19 @@ use bevy::prelude::*;
 use playbot_learner::ActionSpace;
 
 use crate::{
-    action::{Action, has_no_actions},
-    control::Control,
-    episode::{Episode, EpisodeCount},
-    fault::Faults,
-    level::LevelQueue,
-    observation::Observation,
-    policy::{AgentStreams, Decision},
-    reward::Reward,
-    skill_prior::ActiveSkill,
-    state_hash::StateHash,
+    action::has_no_actions, control::Control, fault::Faults, level::LevelQueue, reward::Reward, state_hash::StateHash,
 };
 
 /// An entity that acts in the game.
 ///
-/// Everything the plugin keeps per agent comes along as required components; add a
-/// [`VectorSensor`](crate::observation::VectorSensor) for what it sees and set its [`Control`].
-#[derive(Component, Clone, Debug, PartialEq)]
-#[require(
-    Action,
-    ActiveSkill,
-    AgentStreams,
-    Control,
-    Decision,
-    Episode,
-    EpisodeCount,
-    LevelQueue,
-    Observation,
-    Reward,
-    StateHash
-)]
+/// Everything else that is kept per agent comes along as required components; each part of the
+/// [`PlaybotPlugin`](crate::plugin::PlaybotPlugin) registers what it adds: action, episode, observation, random streams,
+/// policy and skill. Add a [`VectorSensor`](crate::observation::VectorSensor) for what the agent sees and set its
+/// [`Control`].
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+#[require(Control, LevelQueue, Reward, StateHash)]
 pub struct Agent {
     /// Number of the agent, unique in its World. Random streams and the order of batches come from it, so that a run
     /// does not depend on the order in which entities were stored.
@@ -50,7 +33,8 @@ impl Agent {
 }
 
 /// All agents of the World in the order of their numbers: the row order of every batch.
-#[derive(Resource, Default, Debug)]
+#[derive(Resource, Default, Debug, Reflect)]
+#[reflect(Resource)]
 pub struct AgentOrder(Vec<Entity>);
 
 impl AgentOrder {
@@ -94,11 +78,12 @@ pub(crate) fn check_agents(
     }
 }
 
-/// Keeps [`AgentOrder`] true when agents come or go.
+/// Keeps [`AgentOrder`] true when agents come or go, and reports numbers that two of them share.
 pub(crate) fn order_agents(
     mut order: ResMut<AgentOrder>,
     agents: Query<(Entity, &Agent)>,
     added: Query<(), Added<Agent>>,
+    mut faults: ResMut<Faults>,
 ) {
     let unchanged = added.is_empty() && order.0.len() == agents.iter().len();
     if unchanged {
@@ -106,5 +91,15 @@ pub(crate) fn order_agents(
     }
     let mut sorted: Vec<_> = agents.iter().map(|(entity, agent)| (agent.index, entity)).collect();
     sorted.sort();
+    for pair in sorted.windows(2) {
+        if let &[(index, one), (other_index, other)] = pair
+            && index == other_index
+        {
+            faults.report(format!(
+                "two agents have the number {index}: {one} and {other}; give each agent of a World a number of its own in \
+                 `Agent::new`"
+            ));
+        }
+    }
     order.0 = sorted.into_iter().map(|(_, entity)| entity).collect();
 }

@@ -4,10 +4,12 @@ use bevy::prelude::*;
 use playbot_learner::{Action as ActionValue, ActionSpace};
 use rand::RngExt;
 
-use crate::{action::Action, agent::Agent, control::Control, episode::Episode, policy::AgentStreams};
+use crate::{action::Action, agent::Agent, control::Control, episode::Episode, streams::AgentStreams};
 
 /// A scripted bot without eyes. Acts while the agent's control is [`Control::Bot`].
-#[derive(Component, Clone, Debug, PartialEq)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub enum BlindBot {
     /// The same action in every tick.
     Constant(ActionValue),

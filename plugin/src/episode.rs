@@ -8,9 +8,8 @@ use crate::{
     control::Control,
     fault::Faults,
     level::LevelQueue,
-    policy::AgentStreams,
     reward::Reward,
-    skill_prior::ActiveSkill,
+    streams::AgentStreams,
 };
 
 /// How an episode ended.
@@ -38,7 +37,8 @@ impl EpisodeEnd {
 }
 
 /// The running episode of an agent.
-#[derive(Component, Clone, Debug, Default)]
+#[derive(Component, Clone, Debug, Default, Reflect)]
+#[reflect(Component)]
 pub struct Episode {
     /// Level that is played.
     pub level: u64,
@@ -52,7 +52,7 @@ pub struct Episode {
     reached: bool,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
 enum EpisodeState {
     #[default]
     Waiting,
@@ -142,11 +142,9 @@ pub struct StartEpisode {
     pub level: u64,
 }
 
-/// An episode has ended: triggered by the plugin after the tick was recorded and before the next level starts.
-#[derive(EntityEvent, Clone, Copy, Debug)]
-pub struct EpisodeEnded {
-    /// The agent.
-    pub entity: Entity,
+/// A finished episode: what it was and what came of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Reflect)]
+pub struct EpisodeResult {
     /// Level that was played.
     pub level: u64,
     /// How it ended.
@@ -161,8 +159,21 @@ pub struct EpisodeEnded {
     pub total_reward: f64,
 }
 
+/// An episode has ended: triggered by the plugin after the tick was recorded and before the next level starts.
+///
+/// The fields of its [`EpisodeResult`] can be read directly: `event.success`.
+#[derive(EntityEvent, Deref, Clone, Copy, Debug)]
+pub struct EpisodeEnded {
+    /// The agent.
+    pub entity: Entity,
+    /// What came of it.
+    #[deref]
+    pub result: EpisodeResult,
+}
+
 /// Totals of an agent over all its finished episodes.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component)]
 pub struct EpisodeCount {
     /// Finished episodes.
     pub finished: u64,
@@ -170,15 +181,23 @@ pub struct EpisodeCount {
     pub successes: u64,
 }
 
+/// Gives every agent an episode.
+pub(crate) fn plugin(app: &mut App) {
+    app.register_required_components::<Agent, Episode>()
+        .register_required_components::<Agent, EpisodeCount>()
+        .register_type::<Episode>()
+        .register_type::<EpisodeCount>()
+        .register_type::<EpisodeEnd>()
+        .register_type::<EpisodeResult>();
+}
+
 /// Starts an episode for every agent that waits for one and is not idle.
 pub(crate) fn begin_episodes(
-    mut agents: Query<
-        (Entity, &mut Control, &mut Episode, &mut ActiveSkill, &mut LevelQueue, &mut AgentStreams),
-        With<Agent>,
-    >,
+    mut agents: Query<(Entity, &Agent, &mut Control, &mut Episode, &mut LevelQueue, &mut AgentStreams, &mut Reward)>,
+    mut faults: ResMut<Faults>,
     mut commands: Commands,
 ) {
-    for (entity, mut control, mut episode, mut skill, mut queue, mut streams) in &mut agents {
+    for (entity, agent, mut control, mut episode, mut queue, mut streams, mut reward) in &mut agents {
         if episode.is_running() || episode.is_loading() || !control.is_active() {
             continue;
         }
@@ -186,15 +205,22 @@ pub(crate) fn begin_episodes(
             *control = Control::Idle;
             continue;
         };
-        skill.ticks_left = 0;
+        let late = reward.start_episode();
+        if late != 0.0 {
+            faults.report(format!(
+                "agent {}, level {}, after tick {}: a reward of {late} was paid when the episode had ended; pay it no later \
+                 than in the tick that ends it, before `PlaybotSystems::Judge`",
+                agent.index, episode.level, episode.tick
+            ));
+        }
         *episode = Episode { level, state: EpisodeState::Running, ..default() };
         commands.trigger(StartEpisode { entity, level });
     }
 }
 
 /// Counts the tick and its reward.
-pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &Reward, &mut Episode)>, mut faults: ResMut<Faults>) {
-    for (agent, control, reward, mut episode) in &mut agents {
+pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &mut Reward, &mut Episode)>, mut faults: ResMut<Faults>) {
+    for (agent, control, mut reward, mut episode) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;
         }
@@ -209,29 +235,31 @@ pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &Reward, &mut Episode)>
         }
         episode.tick += 1;
         episode.total_reward += f64::from(reward.get());
+        reward.close();
     }
 }
 
 /// Announces ended episodes and frees their agents for the next level.
 pub(crate) fn end_episodes(
     order: Res<AgentOrder>,
-    mut agents: Query<(&mut Episode, &mut EpisodeCount)>,
+    mut agents: Query<(&mut Episode, &mut EpisodeCount, &mut Reward)>,
     mut commands: Commands,
 ) {
     for &entity in order.entities() {
-        let Ok((mut episode, mut count)) = agents.get_mut(entity) else { continue };
+        let Ok((mut episode, mut count, mut reward)) = agents.get_mut(entity) else { continue };
         let Some(end) = episode.end() else { continue };
         count.finished += 1;
         count.successes += u64::from(episode.is_success());
-        commands.trigger(EpisodeEnded {
-            entity,
+        let result = EpisodeResult {
             level: episode.level,
             end,
             success: episode.is_success(),
             ticks: episode.tick,
             clipped: episode.clipped,
             total_reward: episode.total_reward,
-        });
+        };
+        commands.trigger(EpisodeEnded { entity, result });
+        reward.end_episode();
         episode.abandon();
     }
 }

@@ -1,28 +1,81 @@
-//! Breaches of contract by the game, collected where they happen and returned from
-//! [`PlaybotAppExt::tick`](crate::headless::PlaybotAppExt::tick) instead of a panic.
+//! Breaches of contract by the game: said out loud where they happen instead of a panic.
+//!
+//! Under [`tick`](crate::headless::PlaybotAppExt::tick) the first fault of a tick is returned as an error. In an app that
+//! runs by itself each fault is logged as an error and triggers a [`FaultOccurred`] in the same frame.
 
 use bevy::prelude::*;
 use thiserror::Error;
 
-/// Faults of the current tick; the first one is what the caller gets to see.
-#[derive(Resource, Default, Debug)]
+/// Faults that nobody has heard of yet.
+#[derive(Resource, Default, Debug, Reflect)]
+#[reflect(Resource)]
 pub struct Faults {
-    first: Option<String>,
+    waiting: Vec<String>,
+    /// Whether the caller of this tick gets the fault, so that nobody else has to be told.
+    has_caller: bool,
 }
 
 /// The game broke its contract with the plugin.
-#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[derive(Debug, Error, Clone, PartialEq, Eq, Reflect)]
 #[error("{0}")]
 pub struct Fault(pub String);
+
+/// The game broke its contract, in an app that nobody ticks by hand. Triggered in [`FaultSystems`].
+///
+/// ```
+/// use bevy::{prelude::*, time::TimePlugin};
+/// use bevy_playbot::{fault::{FaultOccurred, Faults}, prelude::*};
+///
+/// #[derive(Resource, Default)]
+/// struct Heard(Vec<String>);
+///
+/// let mut app = App::new();
+/// app.add_plugins((TimePlugin, PlaybotPlugin))
+///     .init_resource::<Heard>()
+///     .add_observer(|event: On<FaultOccurred>, mut heard: ResMut<Heard>| heard.0.push(event.fault.to_string()))
+///     .add_systems(Update, |mut faults: ResMut<Faults>| faults.report("agent 0: something is wrong".into()));
+/// app.update();
+/// assert_eq!(app.world().resource::<Heard>().0, ["agent 0: something is wrong"]);
+/// ```
+#[derive(Event, Debug, Clone, PartialEq, Eq, Reflect)]
+pub struct FaultOccurred {
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+/// In `Last`: faults are announced. Systems before it may still [`take`](Faults::take) them.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct FaultSystems;
 
 impl Faults {
     /// Notes a fault: say which agent, which level, which tick and what.
     pub fn report(&mut self, what: String) {
-        self.first.get_or_insert(what);
+        self.waiting.push(what);
     }
 
-    /// Takes the first fault, if any.
+    /// Takes the faults, if any, and gives out the first: the others may well follow from it.
     pub fn take(&mut self) -> Result<(), Fault> {
-        self.first.take().map_or(Ok(()), |what| Err(Fault(what)))
+        std::mem::take(&mut self.waiting).into_iter().next().map_or(Ok(()), |what| Err(Fault(what)))
+    }
+
+    /// From here on a caller takes the faults, or no longer.
+    pub(crate) fn set_caller(&mut self, has_caller: bool) {
+        self.has_caller = has_caller;
+    }
+
+    /// Whether a caller ticks this World by hand and takes its faults.
+    pub(crate) fn has_caller(&self) -> bool {
+        self.has_caller
+    }
+}
+
+/// Tells everybody about the faults of this frame, where no caller is told.
+pub(crate) fn announce_faults(mut faults: ResMut<Faults>, mut commands: Commands) {
+    if faults.has_caller || faults.waiting.is_empty() {
+        return;
+    }
+    for what in std::mem::take(&mut faults.waiting) {
+        tracing::error!("{what}");
+        commands.trigger(FaultOccurred { fault: Fault(what) });
     }
 }

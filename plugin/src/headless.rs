@@ -20,7 +20,8 @@ use crate::{
 };
 
 /// Number of fixed ticks since the World began.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
 pub struct Tick(pub u64);
 
 pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
@@ -101,8 +102,15 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
 /// Frames of a level that is being made ready in which the clock is not waited for.
 const QUICK_FRAMES: u32 = 60;
 
-/// Runs frames up to and with the next tick.
+/// Runs frames up to and with the next tick; faults are for the caller, not for the log.
 fn run_frames(world: &mut World) -> Result<(), Fault> {
+    world.resource_mut::<Faults>().set_caller(true);
+    let done = run_to_next_tick(world);
+    world.resource_mut::<Faults>().set_caller(false);
+    done
+}
+
+fn run_to_next_tick(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
     system_errors::clear();
     for frame in 1.. {

@@ -32,7 +32,9 @@ impl KeyAxis {
 ///
 /// Works on agents under [`Control::Human`](crate::control::Control::Human) in an app with
 /// [`KeyboardPlugin`](crate::keyboard::KeyboardPlugin).
-#[derive(Component, Clone)]
+#[derive(Component, Clone, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct KeyBindings {
     axes: Vec<KeyAxis>,
     action: Arc<dyn Fn(&[i8]) -> ActionValue + Send + Sync>,

@@ -21,7 +21,8 @@ use crate::{
 pub struct KeyboardPlugin;
 
 /// Keys that were pressed since the last tick, whether or not they are still held.
-#[derive(Resource, Clone, Debug, Default)]
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
 pub struct TappedKeys(Vec<KeyCode>);
 
 impl TappedKeys {

@@ -6,7 +6,9 @@ use bevy::prelude::*;
 use rand::{Rng, RngExt};
 
 /// Source of level numbers for one agent.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub enum LevelQueue {
     /// The same level for ever.
     Always(u64),

@@ -97,21 +97,26 @@ pub mod observation;
 pub mod panics;
 pub mod placement;
 pub mod plugin;
+pub mod plugins;
 pub mod policy;
 pub mod policy_file;
 pub mod prelude;
 pub mod raster;
+mod reflect;
 pub mod reward;
 pub mod skill_prior;
 pub mod state_hash;
 pub mod system_errors;
+pub mod streams;
 pub mod systems;
+pub mod takeover;
 pub mod test_app;
 pub mod unknown_name;
 pub mod virtual_input;
 pub mod vision;
 
 pub use plugin::PlaybotPlugin;
+pub use plugins::PlaybotPlugins;
 
 /// What the README shows is compiled.
 #[cfg(doctest)]

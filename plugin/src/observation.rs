@@ -36,7 +36,9 @@ impl ObservationSpace {
 /// The game fills a named vector: its names are the contract, and each tick is checked against it.
 ///
 /// Fill [`Observation`] in a system of [`ObserveSchedule`](crate::systems::ObserveSchedule).
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct VectorSensor {
     space: Arc<ObservationSpace>,
 }
@@ -59,7 +61,8 @@ impl VectorSensor {
 }
 
 /// The observation of the current tick.
-#[derive(Component, Clone, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component)]
 pub struct Observation {
     /// Values in the order of the sensor's names; empty without a [`VectorSensor`].
     pub vector: Vec<f32>,
@@ -82,6 +85,13 @@ impl Observation {
             Observations::Image(pixels) => pixels.extend_from_slice(&self.image),
         }
     }
+}
+
+/// Gives every agent an observation.
+pub(crate) fn plugin(app: &mut App) {
+    app.register_required_components::<Agent, Observation>()
+        .register_type::<Observation>()
+        .register_type::<VectorSensor>();
 }
 
 /// Empties a batch for observations of a kind, and keeps its memory where it can.

@@ -4,10 +4,10 @@ use bevy::{ecs::schedule::ScheduleLabel, input::InputSystems, prelude::*};
 
 use crate::{
     action, agent, bot, demo, episode,
-    fault::Faults,
+    fault::{FaultSystems, Faults, announce_faults},
     headless, observation,
     placement::{self, FrameGate, TickPlacement, TickSchedules},
-    policy, reward, skill_prior,
+    policy, reflect, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -25,8 +25,10 @@ impl Plugin for PlaybotPlugin {
         app.init_resource::<agent::AgentOrder>()
             .init_resource::<Faults>()
             .init_resource::<headless::Tick>()
-            .init_resource::<policy::PlaybotSeed>()
-            .init_schedule(ObserveSchedule);
+            .add_plugins((action::plugin, episode::plugin, observation::plugin))
+            .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin, reflect::plugin))
+            .init_schedule(ObserveSchedule)
+            .add_systems(Last, announce_faults.in_set(FaultSystems).after(PlaybotSystems::Reset));
         let schedules = TickSchedules::new(self.placement);
         app.insert_resource(schedules)
             .configure_sets(
@@ -77,7 +79,14 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
         schedule,
         (
-            (policy::seed_streams, agent::check_agents, agent::order_agents, reward::clear_rewards, episode::begin_episodes)
+            (
+                streams::seed_streams,
+                agent::check_agents,
+                agent::order_agents,
+                reward::clear_rewards,
+                episode::begin_episodes,
+                skill_prior::end_skills,
+            )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
             (run_observe_schedule, observation::check_observations, observation::check_images)

@@ -1,9 +1,9 @@
 //! Agents that are driven by a learned policy.
 
 use bevy::prelude::*;
-use playbot_learner::{ObsKind, Observations, Policy, Streams};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use playbot_learner::{ObsKind, Observations, Policy};
+
+pub use crate::streams::{AgentStreams, PlaybotSeed};
 
 use crate::{
     action::Action,
@@ -16,54 +16,8 @@ use crate::{
     vision::ImageSensor,
 };
 
-/// Seed from which all streams of random numbers of this World come.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PlaybotSeed(pub u64);
-
-/// An agent's own streams of random numbers: which other agents share its World changes nothing for it.
-#[derive(Component, Clone, Debug)]
-pub struct AgentStreams {
-    /// For the choice of levels.
-    pub level: ChaCha8Rng,
-    /// For the draw of actions.
-    pub action: ChaCha8Rng,
-    /// For the draw of skills.
-    pub skill: ChaCha8Rng,
-    seeded: bool,
-}
-
-impl Default for AgentStreams {
-    fn default() -> Self {
-        let unseeded = ChaCha8Rng::seed_from_u64(0);
-        Self { level: unseeded.clone(), action: unseeded.clone(), skill: unseeded, seeded: false }
-    }
-}
-
-impl AgentStreams {
-    /// The streams of agent `index` under `seed`.
-    pub fn new(seed: u64, index: u32) -> Self {
-        let streams = Streams::new(seed);
-        let stream = |name| streams.stream(name, u64::from(index));
-        Self { level: stream("level"), action: stream("action"), skill: stream("skill"), seeded: true }
-    }
-
-    /// Streams in the middle of their run, as a checkpoint keeps them.
-    pub fn restored(level: ChaCha8Rng, action: ChaCha8Rng, skill: ChaCha8Rng) -> Self {
-        Self { level, action, skill, seeded: true }
-    }
-}
-
-/// Gives agents their streams, unless they brought their own.
-pub(crate) fn seed_streams(seed: Res<PlaybotSeed>, mut added: Query<(&Agent, &mut AgentStreams), Added<Agent>>) {
-    for (agent, mut streams) in &mut added {
-        if !streams.seeded {
-            *streams = AgentStreams::new(seed.0, agent.index);
-        }
-    }
-}
-
 /// How an action is taken from the policy's distribution.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 pub enum ActionDraw {
     /// A random draw.
     #[default]
@@ -73,7 +27,9 @@ pub enum ActionDraw {
 }
 
 /// The policy that drives every agent under [`Control::Policy`].
-#[derive(Resource, Clone)]
+#[derive(Resource, Clone, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
 pub struct ActivePolicy {
     /// Actor and critic.
     pub policy: Policy,
@@ -82,12 +38,21 @@ pub struct ActivePolicy {
 }
 
 /// What the policy thought when it chose the action of this tick.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component)]
 pub struct Decision {
     /// Natural logarithm of the action's probability (density for continuous actions).
     pub log_prob: f32,
     /// Value estimate of the observed state.
     pub value: f32,
+}
+
+/// What a policy adds to every agent.
+pub(crate) fn plugin(app: &mut App) {
+    app.register_required_components::<Agent, Decision>()
+        .register_type::<ActivePolicy>()
+        .register_type::<ActionDraw>()
+        .register_type::<Decision>();
 }
 
 /// Reused memory of [`run_policy`]: the rows of one batch.

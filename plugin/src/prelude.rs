@@ -16,6 +16,7 @@ pub use crate::{
     observation::{Observation, ObservationSpace, VectorSensor},
     placement::TickPlacement,
     plugin::PlaybotPlugin,
+    plugins::PlaybotPlugins,
     policy::{ActionDraw, ActivePolicy, PlaybotSeed},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior},

@@ -9,13 +9,16 @@ use crate::{
     episode::Episode,
     fault::Faults,
     observation::Observation,
-    policy::{AgentStreams, in_words, seen_as},
+    policy::{in_words, seen_as},
+    streams::AgentStreams,
     vision::ImageSensor,
 };
 
 /// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every `horizon` fixed ticks
 /// (the paper's T), each agent on its own count.
-#[derive(Resource, Clone)]
+#[derive(Resource, Clone, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
 pub struct SkillPrior {
     /// Distribution of skills: learned, or standard normal.
     pub prior: Prior,
@@ -32,12 +35,29 @@ impl From<&SkillSource> for SkillPrior {
 }
 
 /// The skill an agent is following.
-#[derive(Component, Clone, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component)]
 pub struct ActiveSkill {
     /// The skill as the policy sees it; empty without a [`SkillPrior`].
     pub z: Vec<f32>,
     /// Ticks until the next draw, this one included; 0 asks for a draw.
     pub ticks_left: u32,
+}
+
+/// What skills add to every agent.
+pub(crate) fn plugin(app: &mut App) {
+    app.register_required_components::<Agent, ActiveSkill>()
+        .register_type::<SkillPrior>()
+        .register_type::<ActiveSkill>();
+}
+
+/// No skill outlives its episode: the first tick of the next one draws anew, whoever plays it.
+pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
+    for (episode, mut skill) in &mut agents {
+        if episode.is_running() && episode.tick == 0 && skill.ticks_left > 0 {
+            skill.ticks_left = 0;
+        }
+    }
 }
 
 /// Draws for the agents whose skill has run out, in one batch.

@@ -5,7 +5,8 @@ use bevy::prelude::*;
 /// Hash of everything that decides how the agent's arena goes on, written by the game after its own step.
 ///
 /// A game that leaves it at zero can be recorded and replayed, but a replay then proves nothing.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
 pub struct StateHash(pub u64);
 
 /// Start value and factor of 64-bit FNV-1a.

@@ -7,12 +7,14 @@ use playbot_learner::Policy;
 use serde::Serialize;
 use thiserror::Error;
 
+pub use bevy_playbot::episode::EpisodeResult;
+
 use crate::{arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world};
 use bevy_playbot::{
     agent::Agent,
     bot::BlindBot,
     control::Control,
-    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    episode::{Episode, EpisodeEnded},
     fault::Fault,
     headless::tick_world,
     level::LevelQueue,
@@ -97,23 +99,6 @@ pub struct EvalPlan {
     pub threads: usize,
 }
 
-/// One measured episode.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct EpisodeResult {
-    /// The level.
-    pub level: u64,
-    /// How it ended.
-    pub end: EpisodeEnd,
-    /// Whether the level's aim was reached, at the end or before it.
-    pub success: bool,
-    /// Length, ticks.
-    pub ticks: u32,
-    /// Ticks whose action was clipped to the game's range.
-    pub clipped: u32,
-    /// Sum of rewards.
-    pub total_reward: f64,
-}
-
 /// The summary of a measurement: one row of a result table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EvalSummary {
@@ -149,15 +134,7 @@ pub struct Trail {
 struct Results(Vec<(Entity, EpisodeResult)>);
 
 fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
-    let result = EpisodeResult {
-        level: event.level,
-        end: event.end,
-        success: event.success,
-        ticks: event.ticks,
-        clipped: event.clipped,
-        total_reward: event.total_reward,
-    };
-    results.0.push((event.entity, result));
+    results.0.push((event.entity, event.result));
 }
 
 /// Plays every level of the plan and returns all episodes, sorted by level. `progress` hears each finished episode; it

@@ -15,7 +15,8 @@ const DEPTH: f32 = 1000.0;
 /// Marks the one camera that all sensors share which follow a target.
 ///
 /// A game that looks for its own camera with `Single<&Camera2d>` adds `Without<SensorCamera>`.
-#[derive(Component, Clone, Copy, Debug, Default)]
+#[derive(Component, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Component)]
 pub struct SensorCamera;
 
 /// A camera that sees everything and draws nothing by itself: what it would draw is dealt out to the eyes.

@@ -22,7 +22,8 @@ use super::{CameraError, eye::Stamp};
 const ROW: u32 = 256;
 
 /// Makes frames come back this many looks late, which must be reported: for tests. 0 by default.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
 pub struct ReadbackDelay(pub u32);
 
 /// A texture to copy.

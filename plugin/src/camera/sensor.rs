@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use crate::vision::{ImageOptions, ImageSensor};
 
 /// Where a [`CameraSensor`] looks from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 pub enum CameraSource {
     /// Straight down on the 2D scene around an entity.
     Following {
@@ -24,7 +24,8 @@ pub enum CameraSource {
 ///
 /// One that follows a target sees the 2D scene on render layer 0, in front of the World's `ClearColor`: sprites, tile
 /// layers, 2D meshes. Colours come back as the bytes of the images they are from.
-#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component)]
 #[require(ImageSensor)]
 pub struct CameraSensor {
     /// Where it looks from.

@@ -23,7 +23,8 @@ pub struct TileLayerPlugin;
 ///
 /// Sensors raise it to half of what they see, which is as much as can come into view of an agent in the grid, and not
 /// so much that it would cover the arena next door.
-#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Resource)]
 pub struct TileBorder(pub f32);
 
 impl Default for TileBorder {

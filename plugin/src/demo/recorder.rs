@@ -17,8 +17,10 @@ use crate::{
 /// Where finished episodes go. Insert it, and add [`Recording`] to the agents that shall be recorded.
 ///
 /// Each episode is on disk as soon as it has ended.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
 pub struct Recorder {
+    #[reflect(ignore)]
     writer: DemoWriter,
     keep_observations: bool,
     steps: u64,
@@ -63,8 +65,10 @@ impl Recorder {
 }
 
 /// The episode of this agent as recorded so far.
-#[derive(Component, Default, Debug)]
+#[derive(Component, Default, Debug, Reflect)]
+#[reflect(Component)]
 pub struct Recording {
+    #[reflect(ignore)]
     episode: Option<DemoEpisode>,
 }
 

@@ -11,13 +11,15 @@ use crate::{
     control::Control,
     episode::{Episode, EpisodeEnd},
     level::LevelQueue,
-    policy::AgentStreams,
     reward::Reward,
     state_hash::StateHash,
+    streams::AgentStreams,
 };
 
 /// The recorded episode that drives an agent under [`Control::Replay`].
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct Replay {
     episode: Arc<DemoEpisode>,
     divergence: Option<Divergence>,

@@ -5,7 +5,8 @@ use bevy::prelude::*;
 use crate::vision::{ImageOptions, ImageSensor};
 
 /// Draws what lies around an entity, as a [`CameraSensor`](crate::camera) would show it, without a GPU.
-#[derive(Component, Clone, Copy, Debug)]
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
 #[require(ImageSensor)]
 pub struct RasterSensor {
     /// The entity in the middle of the picture.

@@ -5,7 +5,8 @@ use bevy::prelude::*;
 use crate::{agent::Agent, episode::EpisodeEnded, fault::Faults};
 
 /// Counts the episodes of an agent in which each picture was of a single colour: it saw nothing.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
 pub struct BlankEpisodes {
     /// Finished episodes in which nothing was to be seen.
     pub episodes: u64,

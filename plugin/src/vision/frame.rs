@@ -6,7 +6,8 @@ use bevy::prelude::*;
 ///
 /// Filled by a sensor; the options of [`ImageSensor`](super::ImageSensor) (grey, painted velocity, stack) are applied
 /// when the observation is made of it.
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
 pub struct Frame {
     /// `[height, width]` pixels of `[red, green, blue, 255]`.
     pub pixels: Vec<[u8; 4]>,

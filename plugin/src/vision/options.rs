@@ -108,6 +108,8 @@ impl ImageOptions {
 }
 
 /// Marks an agent whose policy reads pictures of this size and form. Comes with every sensor that makes pictures.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 #[require(Frame, BlankEpisodes, PictureStack)]
 pub struct ImageSensor(pub ImageOptions);

@@ -10,6 +10,7 @@ use bevy::prelude::*;
 /// stage's `Transform` must keep arenas further apart than an agent sees.
 ///
 /// A target that is on no stage is drawn with everything else that is on none, in world coordinates.
-#[derive(Component, Clone, Copy, Debug, Default)]
+#[derive(Component, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Component)]
 #[require(Transform, Visibility)]
 pub struct Stage;

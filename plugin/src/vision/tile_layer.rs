@@ -11,7 +11,8 @@ use bevy::prelude::*;
 /// A grid without cells is a ground that is the same everywhere: its `outside`. Cameras draw what is outside as far as
 /// can be seen from the grid (see their `TileBorder`), so a game whose agents leave it must move the layer along, by whole
 /// cells.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component)]
 #[require(Transform, Visibility)]
 pub struct TileLayer {
     /// The strip of tiles.

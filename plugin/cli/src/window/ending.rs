@@ -3,14 +3,17 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy::{prelude::*, window::WindowCloseRequested};
-use bevy_playbot::{demo::recorder::flush_unfinished, fault::Faults};
+use bevy_playbot::{
+    demo::recorder::flush_unfinished,
+    fault::{FaultSystems, Faults},
+};
 
 use super::WindowError;
 
 pub(super) fn build(app: &mut App, stop: fn() -> bool) {
     app.insert_resource(Ending { asked: false, ended: false, stop })
         .init_resource::<Verdict>()
-        .add_systems(Last, (hear_close, end).chain());
+        .add_systems(Last, (hear_close, end).chain().before(FaultSystems));
 }
 
 /// Whether the window is to end.

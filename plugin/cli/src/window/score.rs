@@ -1,6 +1,7 @@
 //! What came of the last episode, and what follows it.
 
 use bevy::prelude::*;
+use bevy_playbot::episode::EpisodeResult;
 use playbot_lab::prelude::*;
 
 use super::{Playlist, seats::Seats};
@@ -11,12 +12,12 @@ pub(super) fn build(app: &mut App) {
 
 /// The last finished episode.
 #[derive(Resource, Default)]
-pub(super) struct LastEpisode(Option<EpisodeEnded>);
+pub(super) struct LastEpisode(Option<EpisodeResult>);
 
 impl LastEpisode {
     /// How it ended, in words.
     pub fn words(&self) -> Option<String> {
-        let EpisodeEnded { level, end, success, ticks, .. } = self.0?;
+        let EpisodeResult { level, end, success, ticks, .. } = self.0?;
         let how = match end {
             EpisodeEnd::Terminated { success: true } => "won",
             EpisodeEnd::Terminated { success: false } => "lost",
@@ -35,7 +36,7 @@ fn note_end(
     seats: Res<Seats>,
     mut queues: Query<&mut LevelQueue>,
 ) {
-    last.0 = Some(*event);
+    last.0 = Some(event.result);
     if event.success {
         playlist.advance();
     }

@@ -22,7 +22,9 @@ use bevy_playbot::{
 };
 
 /// Actions of the running episode.
-#[derive(Component, Clone, Debug, Default)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub struct ActionLog(Vec<ActionValue>);
 
 impl ActionLog {

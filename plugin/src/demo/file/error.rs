@@ -182,6 +182,24 @@ pub enum DemoFault {
         /// Its value in the new recording.
         wanted: String,
     },
+    /// The file cannot be merged with another one because it was recorded under other conditions.
+    #[error("cannot be merged: `{field}` is {found}, but {expected} in {}", first.display())]
+    MergeDiffers {
+        /// The first header field that differs.
+        field: &'static str,
+        /// Its value in this file.
+        found: String,
+        /// Its value in the first file.
+        expected: String,
+        /// The first file.
+        first: PathBuf,
+    },
+    /// The file was named before among those to merge.
+    #[error("named twice: its episodes would be in the merged file twice")]
+    NamedTwice,
+    /// No recording was named.
+    #[error("there is nothing to merge: name the recordings that shall be in it")]
+    NothingToMerge,
     /// The file exists already.
     #[error("exists already; nothing was written")]
     Exists,

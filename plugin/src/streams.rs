@@ -1,0 +1,65 @@
+//! Random numbers: one seed for a World, streams of its own for each agent.
+
+use bevy::prelude::*;
+use playbot_learner::Streams;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::agent::Agent;
+
+/// Gives every agent its streams.
+pub(crate) fn plugin(app: &mut App) {
+    app.init_resource::<PlaybotSeed>()
+        .register_required_components::<Agent, AgentStreams>()
+        .register_type::<PlaybotSeed>()
+        .register_type::<AgentStreams>();
+}
+
+/// Seed from which all streams of random numbers of this World come.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
+pub struct PlaybotSeed(pub u64);
+
+/// An agent's own streams of random numbers: which other agents share its World changes nothing for it.
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct AgentStreams {
+    /// For the choice of levels.
+    pub level: ChaCha8Rng,
+    /// For the draw of actions.
+    pub action: ChaCha8Rng,
+    /// For the draw of skills.
+    pub skill: ChaCha8Rng,
+    seeded: bool,
+}
+
+impl Default for AgentStreams {
+    fn default() -> Self {
+        let unseeded = ChaCha8Rng::seed_from_u64(0);
+        Self { level: unseeded.clone(), action: unseeded.clone(), skill: unseeded, seeded: false }
+    }
+}
+
+impl AgentStreams {
+    /// The streams of agent `index` under `seed`.
+    pub fn new(seed: u64, index: u32) -> Self {
+        let streams = Streams::new(seed);
+        let stream = |name| streams.stream(name, u64::from(index));
+        Self { level: stream("level"), action: stream("action"), skill: stream("skill"), seeded: true }
+    }
+
+    /// Streams in the middle of their run, as a checkpoint keeps them.
+    pub fn restored(level: ChaCha8Rng, action: ChaCha8Rng, skill: ChaCha8Rng) -> Self {
+        Self { level, action, skill, seeded: true }
+    }
+}
+
+/// Gives agents their streams, unless they brought their own.
+pub(crate) fn seed_streams(seed: Res<PlaybotSeed>, mut added: Query<(&Agent, &mut AgentStreams), Added<Agent>>) {
+    for (agent, mut streams) in &mut added {
+        if !streams.seeded {
+            *streams = AgentStreams::new(seed.0, agent.index);
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! Taking over a shipped build: recording testers, letting a policy play, replaying a recording, without another program.
+//!
+//! A game with [`PlaybotPlugins`](crate::plugins::PlaybotPlugins) looks at the environment variable `PLAYBOT` when it
+//! starts:
+//!
+//! ```text
+//! PLAYBOT=record:ada.demo ./game       record every episode of the agents that play
+//! PLAYBOT=policy:walker.policy ./game  a policy plays instead
+//! PLAYBOT=replay:ada.demo ./game       a recording plays instead
+//! ```
+//!
+//! F9, or the key of [`TakeoverPlugin::key`], stops it and starts it again; without `PLAYBOT` it starts a recording named
+//! for the game. A recording that exists is continued, and those of many testers are joined by
+//! [`merge_demos`](crate::demo::file::merge_demos). `PLAYBOT_NAME` says who plays.
+//!
+//! What cannot be done is a [`FaultOccurred`](crate::fault::FaultOccurred), and the game goes on as it was. Where somebody
+//! ticks the World by hand, as training does, nobody takes over.
+//!
+//! ```
+//! use bevy_playbot::takeover::TakeoverRequest;
+//!
+//! let request: TakeoverRequest = "record:ada.demo".parse().expect("valid");
+//! assert_eq!(request, TakeoverRequest::Record("ada.demo".into()));
+//! let error = "rekord:ada.demo".parse::<TakeoverRequest>().expect_err("no such way").to_string();
+//! assert!(error.contains("did you mean `record`?"));
+//! ```
+
+mod error;
+mod identity;
+mod play_policy;
+mod play_replay;
+mod plugin;
+mod record;
+mod request;
+mod seats;
+
+pub use error::TakeoverError;
+pub use identity::GameIdentity;
+pub use plugin::{Takeover, TakeoverPlugin};
+pub use request::{RequestError, TakeoverRequest};

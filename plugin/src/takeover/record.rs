@@ -1,0 +1,59 @@
+//! `record:FILE`.
+
+use std::path::Path;
+
+use bevy::prelude::*;
+
+use super::{error::TakeoverError, identity::GameIdentity, seats::playing_agents};
+use crate::{
+    agent::Agent,
+    demo::{
+        file::{DemoHeader, DemoWriter},
+        recorder::{Recorder, Recording, demo_actions, flush_unfinished},
+    },
+};
+
+/// Who plays, if the environment does not say.
+const SOMEBODY: &str = "player";
+
+/// Begins to record the agents that play. What they play right now began too early: their next episode is the first.
+pub(super) fn start(world: &mut World, path: &Path) -> Result<(), TakeoverError> {
+    if world.contains_resource::<Recorder>() {
+        return Err(TakeoverError::Recording { path: path.to_owned() });
+    }
+    let agents = playing_agents(world);
+    let Some(actions) = agents.first().and_then(|&agent| world.get::<Agent>(agent)).map(|agent| agent.actions) else {
+        return Ok(());
+    };
+    let game = world.resource::<GameIdentity>();
+    let header = DemoHeader {
+        demonstrator: std::env::var("PLAYBOT_NAME").unwrap_or_else(|_| SOMEBODY.to_owned()),
+        ..DemoHeader::new(&game.name, game.version, &game.mode, tick_hz(world), demo_actions(&actions))
+    };
+    let writer = if path.exists() { DemoWriter::append(path, &header)? } else { DemoWriter::create(path, header)? };
+    world.insert_resource(Recorder::new(writer));
+    for agent in agents {
+        // A file holds actions of one kind.
+        if world.get::<Agent>(agent).is_some_and(|agent| agent.actions == actions) {
+            world.entity_mut(agent).insert(Recording::default());
+        }
+    }
+    Ok(())
+}
+
+/// Ends the recording: what was played of running episodes is kept, as aborted.
+pub(super) fn stop(world: &mut World) -> Result<(), TakeoverError> {
+    let flushed = flush_unfinished(world);
+    world.remove_resource::<Recorder>();
+    let mut recorded = world.query_filtered::<Entity, With<Recording>>();
+    for agent in recorded.iter(world).collect::<Vec<_>>() {
+        world.entity_mut(agent).remove::<Recording>();
+    }
+    Ok(flushed?)
+}
+
+/// Ticks per second of game time. A step has whole nanoseconds, so that its inverse is not quite what was asked for.
+fn tick_hz(world: &World) -> f64 {
+    let step = world.get_resource::<Time<Fixed>>().map_or(1.0 / 60.0, |time| time.timestep().as_secs_f64());
+    (1000.0 / step).round() / 1000.0
+}

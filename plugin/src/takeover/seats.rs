@@ -1,0 +1,55 @@
+//! Who played before, so that the seat can be given back.
+
+use bevy::prelude::*;
+
+use crate::{
+    agent::AgentOrder, control::Control, episode::Episode, level::LevelQueue, skill_prior::ActiveSkill,
+    streams::AgentStreams,
+};
+
+/// What an agent had before somebody took over.
+#[derive(Clone, Debug)]
+pub(super) struct Seat {
+    pub agent: Entity,
+    control: Control,
+    levels: LevelQueue,
+    streams: AgentStreams,
+}
+
+/// Agents that somebody plays, lowest number first.
+pub(super) fn playing_agents(world: &World) -> Vec<Entity> {
+    let agents = world.resource::<AgentOrder>().entities().iter().copied();
+    agents.filter(|&agent| world.get::<Control>(agent).is_some_and(|control| control.is_active())).collect()
+}
+
+impl Seat {
+    /// Notes who plays an agent.
+    pub fn of(world: &World, agent: Entity) -> Option<Self> {
+        let control = *world.get::<Control>(agent)?;
+        let (levels, streams) = (world.get::<LevelQueue>(agent)?.clone(), world.get::<AgentStreams>(agent)?.clone());
+        Some(Self { agent, control, levels, streams })
+    }
+
+    /// Gives the seat back in the middle of the episode.
+    pub fn give_back(self, world: &mut World) {
+        if let Ok(mut agent) = world.get_entity_mut(self.agent) {
+            agent.insert(self.control);
+        }
+    }
+
+    /// Gives the seat back with a new episode: what was played of the last one was not this player's.
+    pub fn give_back_anew(self, world: &mut World) {
+        let Ok(mut agent) = world.get_entity_mut(self.agent) else { return };
+        if let Some(mut episode) = agent.get_mut::<Episode>() {
+            episode.abandon();
+        }
+        agent.insert((self.control, self.levels, self.streams));
+    }
+}
+
+/// A skill that was drawn for another state says nothing about this one.
+pub(super) fn forget_skill(world: &mut World, agent: Entity) {
+    if let Some(mut skill) = world.get_mut::<ActiveSkill>(agent) {
+        skill.ticks_left = 0;
+    }
+}
