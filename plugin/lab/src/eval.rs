@@ -7,7 +7,9 @@ use playbot_learner::Policy;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::{arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world};
+use crate::{
+    arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world,
+};
 use bevy_playbot::{
     agent::Agent,
     bot::BlindBot,
