@@ -42,16 +42,15 @@ impl HeadlessPlugins {
 impl PluginGroup for HeadlessPlugins {
     fn build(self) -> PluginGroupBuilder {
         let window = Window { resolution: WindowResolution::new(1280, 720), ..default() };
-        let plugins = DefaultPlugins
-            .build()
-            .disable::<PanicHandlerPlugin>()
-            .disable::<TerminalCtrlCHandlerPlugin>()
-            .set(WindowPlugin {
-                primary_window: Some(window),
-                exit_condition: ExitCondition::DontExit,
-                close_when_requested: false,
-                ..default()
-            });
+        let plugins =
+            DefaultPlugins.build().disable::<PanicHandlerPlugin>().disable::<TerminalCtrlCHandlerPlugin>().set(
+                WindowPlugin {
+                    primary_window: Some(window),
+                    exit_condition: ExitCondition::DontExit,
+                    close_when_requested: false,
+                    ..default()
+                },
+            );
         without_screen(plugins, self.draws).add(NoScreenPlugin)
     }
 }
@@ -62,11 +61,7 @@ fn without_screen(plugins: PluginGroupBuilder, draws: bool) -> PluginGroupBuilde
     let render_creation = if draws { crate::camera::drawing() } else { crate::camera::not_drawing() };
     let renderer = RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
     let plugins = without_event_loop(plugins.set(renderer));
-    if plugins.contains::<PipelinedRenderingPlugin>() {
-        plugins.disable::<PipelinedRenderingPlugin>()
-    } else {
-        plugins
-    }
+    if plugins.contains::<PipelinedRenderingPlugin>() { plugins.disable::<PipelinedRenderingPlugin>() } else { plugins }
 }
 
 #[cfg(not(feature = "camera"))]

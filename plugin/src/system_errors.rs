@@ -97,7 +97,9 @@ fn in_words(context: &str, param: &str, message: &str) -> String {
     }
     let of_messages = ["MessageReader<", "MessageWriter<"].iter().find_map(|kind| param.strip_prefix(kind));
     match of_messages.and_then(|rest| rest.split_once(">::")).map(|(kind, _)| kind) {
-        Some(kind) => format!("{context} needs messages of the type `{kind}`, which nobody has added: `add_message` brings them"),
+        Some(kind) => {
+            format!("{context} needs messages of the type `{kind}`, which nobody has added: `add_message` brings them")
+        }
         None => format!("{context} has a parameter `{param}` that does not work: {message}"),
     }
 }

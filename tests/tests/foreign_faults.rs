@@ -23,7 +23,15 @@ fn fault(game: &ForeignGame, ticks: u64) -> String {
 
 fn plan() -> EvalPlan {
     let split = "default:0..3".parse().expect("a split");
-    EvalPlan { split, sight: ObservationConfig::default(), episodes_per_level: 1, seed: 1, arenas: 2, worlds: 1, threads: 1 }
+    EvalPlan {
+        split,
+        sight: ObservationConfig::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 2,
+        worlds: 1,
+        threads: 1,
+    }
 }
 
 #[test]
@@ -32,7 +40,8 @@ fn a_game_without_actions_is_refused() {
     assert!(fault(&mute, 1).contains("`mute` has no actions: say what an agent can do, for instance with `.keys`"));
     let error = evaluate(&mute, &Player::Blind(BlindBot::Uniform), &plan(), |_| {}).expect_err("no actions");
     assert!(error.to_string().contains("has no actions"), "{error}");
-    let experiment = r#"(game: "mute", train: "default:0..3", test: "default:4..7", demos: "x", steps: 9000, algorithm: "ppo")"#;
+    let experiment =
+        r#"(game: "mute", train: "default:0..3", test: "default:4..7", demos: "x", steps: 9000, algorithm: "ppo")"#;
     let experiment = parse_experiment(experiment, std::path::Path::new("x.ron")).expect("valid");
     let error = Trainer::new(&mute, &experiment, None, DeviceKind::Flex, 1).err().expect("no actions");
     assert!(error.to_string().contains("has no actions"), "{error}");
@@ -135,7 +144,9 @@ fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
             .reward(|_score: Res<Score>| 0.0)
     };
     let text = fault(&bomb(), 100);
-    for part in ["agent 0, level 3, tick 4", "the paddle has left the field", "foreign_faults.rs", "which replays to it"] {
+    for part in
+        ["agent 0, level 3, tick 4", "the paddle has left the field", "foreign_faults.rs", "which replays to it"]
+    {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
     let path = text.split("are in ").nth(1).and_then(|rest| rest.split(", which").next()).expect("a path");

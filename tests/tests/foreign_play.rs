@@ -44,8 +44,15 @@ fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>, noise: f64) {
 
 fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32, f64)> {
     let split: LevelSplit = "default:0..7".parse().expect("a split");
-    let plan =
-        EvalPlan { split, sight: ObservationConfig::default(), episodes_per_level: 1, seed: 1, arenas: 4, worlds: 2, threads };
+    let plan = EvalPlan {
+        split,
+        sight: ObservationConfig::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 4,
+        worlds: 2,
+        threads,
+    };
     let results = evaluate(game, &player, &plan, |_| {}).expect("can be played");
     assert_eq!(results.len(), 8);
     let summary = summarize("player", &plan.split, &results);

@@ -91,10 +91,7 @@ pub(super) fn requests(world: &mut World) -> Asked {
 }
 
 /// The game's own camera: of the active ones, the one that draws first.
-fn own_camera(
-    world: &World,
-    cameras: &QueryState<(Entity, &'static Camera), Without<SensorCamera>>,
-) -> Option<Entity> {
+fn own_camera(world: &World, cameras: &QueryState<(Entity, &'static Camera), Without<SensorCamera>>) -> Option<Entity> {
     let active = cameras.iter_manual(world).filter(|(_, camera)| camera.is_active);
     active.min_by_key(|(entity, camera)| (camera.order, *entity)).map(|(entity, _)| entity)
 }

@@ -92,10 +92,7 @@ fn see(
     [paddle.translation.x / 8.0, apple.translation.x / 8.0, apple.translation.y / 9.0]
 }
 
-fn follow(
-    paddle: Single<&Transform, With<Paddle>>,
-    apple: Single<&Transform, (With<Apple>, Without<Paddle>)>,
-) -> u32 {
+fn follow(paddle: Single<&Transform, With<Paddle>>, apple: Single<&Transform, (With<Apple>, Without<Paddle>)>) -> u32 {
     match apple.translation.x - paddle.translation.x {
         ahead if ahead > 0.3 => 2,
         ahead if ahead < -0.3 => 1,

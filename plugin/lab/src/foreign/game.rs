@@ -5,13 +5,8 @@ use std::sync::Arc;
 use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use super::{
-    demonstrator::ForeignBot,
-    factory::SystemFactory,
-    input::Input,
-    install::ForeignPlugin,
-    paths::ObservedPath,
-    restart_kind::Restart,
-    runtime::Sensor,
+    demonstrator::ForeignBot, factory::SystemFactory, input::Input, install::ForeignPlugin, paths::ObservedPath,
+    restart_kind::Restart, runtime::Sensor,
 };
 use crate::game::Game;
 use bevy_playbot::{
@@ -124,10 +119,14 @@ impl Game for ForeignGame {
     fn problem(&self) -> Option<String> {
         let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
         if has_no_actions(&input.space()) {
-            return Some(format!("the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"));
+            return Some(format!(
+                "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
+            ));
         }
         if observe.is_none() && paths.is_empty() && !has_camera {
-            return Some(format!("nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"));
+            return Some(format!(
+                "nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"
+            ));
         }
         if observe.is_some() && names.is_empty() {
             return Some(format!("`.observe` of the game `{name}` names no values"));

@@ -3,12 +3,7 @@
 use bevy::prelude::*;
 
 use super::runtime::{playing_agent, with_foreign};
-use bevy_playbot::{
-    action::ActionSpace,
-    control::Control,
-    key_bindings::KeyBindings,
-    virtual_input::VirtualInput,
-};
+use bevy_playbot::{action::ActionSpace, control::Control, key_bindings::KeyBindings, virtual_input::VirtualInput};
 
 /// The way from an action into the game.
 #[derive(Clone, Default)]

@@ -1,10 +1,6 @@
 //! Adding a foreign game to an app.
 
-use bevy::{
-    app::MainScheduleOrder,
-    ecs::schedule::ScheduleLabel,
-    prelude::*,
-};
+use bevy::{app::MainScheduleOrder, ecs::schedule::ScheduleLabel, prelude::*};
 
 use super::{
     demonstrator,

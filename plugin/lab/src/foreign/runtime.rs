@@ -83,12 +83,11 @@ impl Foreign {
             },
             Restart::Startup => None,
         };
-        let part =
-            |(system, is_delta): &(super::factory::SystemFactory<f32>, bool)| RewardPart {
-                system: system.make(),
-                is_delta: *is_delta,
-                last: None,
-            };
+        let part = |(system, is_delta): &(super::factory::SystemFactory<f32>, bool)| RewardPart {
+            system: system.make(),
+            is_delta: *is_delta,
+            last: None,
+        };
         Self {
             sensor: description.sensor(),
             rewards: description.rewards.iter().map(part).collect(),

@@ -19,9 +19,11 @@ fn observe(world: &mut World) {
     let values = with_foreign(world, agent, |world, foreign| {
         let values = match &mut foreign.sensor {
             Sensor::System(system) => system.demand(world)?,
-            Sensor::Paths(paths) => {
-                paths.iter_mut().map(|path| path.read(world)).collect::<Result<_, _>>().map_err(|error| error.to_string())?
-            }
+            Sensor::Paths(paths) => paths
+                .iter_mut()
+                .map(|path| path.read(world))
+                .collect::<Result<_, _>>()
+                .map_err(|error| error.to_string())?,
             Sensor::Nothing => Vec::new(),
         };
         if values.len() == expected {
