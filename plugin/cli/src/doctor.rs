@@ -54,6 +54,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mode = args.mode.unwrap_or_else(|| game.modes().first().copied().unwrap_or_default().to_owned());
     let options = DoctorOptions {
         ticks: u32::try_from(args.ticks).map_err(|_| CliError::Usage("--ticks has too many digits".to_owned()))?,
+        several_arenas: game.arenas_per_world().is_none_or(|most| most > 1),
         seed: args.seed,
         ignored: args.ignore,
         ..DoctorOptions::new(mode)

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use bevy_playbot::demo::{
-    file::{DemoHeader, DemoWriter},
-    recorder::{Recorder, Recording, demo_actions, flush_unfinished},
+    file::DemoWriter,
+    recorder::{Recorder, Recording, flush_unfinished},
 };
 use playbot_lab::games::Games;
 use playbot_lab::prelude::*;

@@ -5,7 +5,6 @@ use std::path::Path;
 use bevy_playbot::{
     demo::{
         file::{DemoHeader, DemoSummary},
-        recorder::demo_actions,
     },
     vision::ObservationConfig,
 };
