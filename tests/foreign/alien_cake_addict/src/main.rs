@@ -18,15 +18,16 @@ fn main() -> ExitCode {
     playbot_cli::main(&[&ForeignGame::new("alien_cake_addict", 1, game)
         .hz(20.0)
         .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
-        .observe(["i", "j", "cake_i", "cake_j", "cake"], |game: Res<Game>| {
-            let (at, cake) = (&game.player, &game.bonus);
-            [at.i, at.j, cake.i, cake.j, usize::from(cake.entity.is_some())].map(|it| it as f32 / 10.0)
+        .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
+            [g.player.i, g.player.j, g.bonus.i, g.bonus.j, usize::from(g.bonus.entity.is_some())].map(|n| n as f32)
         })
         .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
         .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
         .time_limit(1200)
         .restart(Restart::state(GameState::Playing))
         .level(refresh)
+        // Not the transforms: cakes swell with the time since the program began, which no restart sets back.
+        .state_hash(|game: Res<Game>| game.score as u64)
         .demonstrator("glutton", |game: Res<Game>| {
             let (at, cake) = (&game.player, &game.bonus);
             [at.i < cake.i, at.i > cake.i, at.j < cake.j, at.j > cake.j].iter().position(|go| *go).unwrap_or(4) as u32

@@ -24,7 +24,9 @@ pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
         .as_array()
         .into_iter()
         .flatten()
-        .find(|package| package["name"] == "bevy" && package["version"].as_str().is_some_and(|v| v.starts_with("0.19.")))
+        .find(|package| {
+            package["name"] == "bevy" && package["version"].as_str().is_some_and(|v| v.starts_with("0.19."))
+        })
         .and_then(|package| package["manifest_path"].as_str())
         .ok_or("there is no package bevy 0.19 in this workspace")?;
     let folder = PathBuf::from(manifest).parent().map(PathBuf::from);
