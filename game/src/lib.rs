@@ -5,13 +5,12 @@
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
-//! - [`antview`]: what ants look like.
 //! - [`sighted`]: the mazes for agents that see walls and goal.
 //! - [`registry`]: all of them, for the program `playbot`.
 
 pub mod ant;
 pub mod antmaze;
-pub mod antview;
+mod arena_grid;
 pub mod coinrun;
 pub mod maze;
 pub mod maze2d;

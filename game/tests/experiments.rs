@@ -14,7 +14,7 @@ use playbot_lab::{
 use serde_json::Value;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/experiments")
 }
 
 fn read(name: &str) -> Experiment {

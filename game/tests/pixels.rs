@@ -93,7 +93,7 @@ fn the_program_learns_from_pixels_and_knows_its_eyes_again() {
 
 #[test]
 fn the_experiments_of_the_repository_are_sound() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/experiments");
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).expect("there").flatten() {
         let experiment = read_experiment(&entry.path()).unwrap_or_else(|error| panic!("{error}"));

@@ -13,7 +13,7 @@ use playbot_lab::{
     policy_export::{export_policy, policy_file},
     worlds::build_world,
 };
-use playbot_learner::{ActionSpace, DeviceKind, FileError, PolicySpec, PpoConfig, PpoLearner};
+use playbot_learner::{ActionSpace, DeviceKind, FileError, Learner, PolicySpec, PpoConfig, PpoLearner};
 use serde_json::Value;
 
 fn learner(obs_dim: usize) -> PpoLearner {

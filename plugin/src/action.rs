@@ -61,7 +61,7 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
 
 /// Reports actions that do not belong to their agent's space, with agent and tick, and stops those agents: a game need
 /// not be able to bear what its agents cannot do.
-pub(crate) fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
+pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
     for (agent, action, episode, mut control) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;

@@ -42,6 +42,46 @@ impl AgentOrder {
     }
 }
 
+/// Most agents that the World of a game can hold.
+#[derive(Resource, Clone, Copy, Debug, Reflect)]
+#[reflect(Resource)]
+pub struct AgentLimit {
+    /// Name of the game.
+    pub game: &'static str,
+    /// The number.
+    pub most: u32,
+}
+
+/// Whether nothing can be done in this space.
+pub fn has_no_actions(space: &ActionSpace) -> bool {
+    matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
+}
+
+/// Reports agents that cannot do anything, and more of them than the game bears, and stops those.
+pub(crate) fn check_agents(
+    limit: Option<Res<AgentLimit>>,
+    mut agents: Query<(Ref<Agent>, &mut Control)>,
+    mut faults: ResMut<Faults>,
+) {
+    if let Some(limit) = limit.filter(|limit| agents.iter().len() > limit.most as usize) {
+        faults.report(format!(
+            "a World of the game `{}` has room for {} agent{}, since they would share its player and its resources, but it has {}: build more Worlds",
+            limit.game,
+            limit.most,
+            if limit.most == 1 { "" } else { "s" },
+            agents.iter().len()
+        ));
+        agents.iter_mut().for_each(|(_, mut control)| *control = Control::Idle);
+        return;
+    }
+    for (agent, mut control) in &mut agents {
+        if agent.is_added() && has_no_actions(&agent.actions) {
+            faults.report(format!("agent {} has no actions: say what it can do", agent.index));
+            *control = Control::Idle;
+        }
+    }
+}
+
 /// Keeps [`AgentOrder`] true when agents come or go, and reports numbers that two of them share.
 pub(crate) fn order_agents(
     mut order: ResMut<AgentOrder>,

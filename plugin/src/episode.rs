@@ -25,6 +25,11 @@ pub enum EpisodeEnd {
 }
 
 impl EpisodeEnd {
+    /// The game is over, and won.
+    pub const WON: Self = Self::Terminated { success: true };
+    /// The game is over, and lost.
+    pub const LOST: Self = Self::Terminated { success: false };
+
     /// Whether the game is over because the level's aim was reached.
     pub fn is_success(self) -> bool {
         matches!(self, Self::Terminated { success: true })
@@ -51,6 +56,7 @@ pub struct Episode {
 enum EpisodeState {
     #[default]
     Waiting,
+    Loading,
     Running,
     Ended(EpisodeEnd),
 }
@@ -97,7 +103,28 @@ impl Episode {
 
     /// Whether a level is being played, the tick of its end included.
     pub fn is_running(&self) -> bool {
-        self.state != EpisodeState::Waiting
+        matches!(self.state, EpisodeState::Running | EpisodeState::Ended(_))
+    }
+
+    /// The level takes some frames to be built: to be called by the game's observer of [`StartEpisode`]. Until it is
+    /// [`ready`](Self::ready) nothing is observed, decided, judged, recorded or counted for this agent.
+    pub fn wait(&mut self) {
+        if self.state == EpisodeState::Running {
+            self.state = EpisodeState::Loading;
+        }
+    }
+
+    /// The level is there: the episode's first observation may be made. To be called in
+    /// [`PlaybotSystems::Load`](crate::systems::PlaybotSystems::Load).
+    pub fn ready(&mut self) {
+        if self.is_loading() {
+            self.state = EpisodeState::Running;
+        }
+    }
+
+    /// Whether the level is still being built.
+    pub fn is_loading(&self) -> bool {
+        self.state == EpisodeState::Loading
     }
 
     /// Leaves the level at once, without a result; the next one starts with the next tick.
@@ -171,7 +198,7 @@ pub(crate) fn begin_episodes(
     mut commands: Commands,
 ) {
     for (entity, agent, mut control, mut episode, mut queue, mut streams, mut reward) in &mut agents {
-        if episode.is_running() || !control.is_active() {
+        if episode.is_running() || episode.is_loading() || !control.is_active() {
             continue;
         }
         let Some(level) = queue.next_level(&mut streams.level) else {

@@ -3,14 +3,20 @@
 use std::time::Duration;
 
 use bevy::{
+    app::PluginGroupBuilder,
     ecs::schedule::{Schedules, SingleThreadedExecutor},
     prelude::*,
     time::{TimePlugin, TimeUpdateStrategy},
 };
 
 use crate::{
+    control::Control,
+    episode::Episode,
     fault::{Fault, Faults},
+    panics,
+    placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
+    system_errors,
 };
 
 /// Number of fixed ticks since the World began.
@@ -28,7 +34,7 @@ pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
 /// game behaves as it does in a window.
 pub fn headless_app() -> App {
     let mut app = App::new();
-    app.add_plugins((TimePlugin, PlaybotPlugin));
+    app.add_plugins((TimePlugin, PlaybotPlugin::default()));
     set_tick_rate(&mut app, 60.0);
     app
 }
@@ -51,7 +57,25 @@ pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
     step
 }
 
+/// An app with all that Bevy brings, except a screen, for games in which a frame is a tick:
+/// [`HeadlessPlugins`](crate::headless_plugins::HeadlessPlugins), with or without a renderer, and [`PlaybotPlugin`] under [`TickPlacement::Frame`].
+pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
+    let mut app = App::new();
+    app.add_plugins((plugins, PlaybotPlugin { placement: TickPlacement::Frame }));
+    set_frame_rate(&mut app, hz);
+    app
+}
+
+/// Gives every frame the same length, however long it takes: `hz` frames are a second of game time. With a window, it is
+/// for the window to draw no more than that.
+pub fn set_frame_rate(app: &mut App, hz: f64) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / hz)));
+}
+
 /// Finishes an app's plugins and takes its World, so that it can move to another thread.
+///
+/// A system that cannot run, for instance because a resource does not exist, is a fault of the next tick there, and no
+/// panic.
 ///
 /// Schedules are set to run on the thread that calls them: Bevy's own threads cost more than they bring in a World of
 /// this size, and several Worlds side by side use the cores better.
@@ -61,28 +85,65 @@ pub fn into_world(mut app: App) -> World {
     for (_, schedule) in app.world_mut().resource_mut::<Schedules>().iter_mut() {
         schedule.set_executor(SingleThreadedExecutor::new());
     }
+    system_errors::listen(app.world_mut());
     std::mem::take(app.world_mut())
 }
 
-/// Runs one fixed tick.
+/// Runs one tick. Under [`TickPlacement::Frame`] that may take several frames, while a level is being made ready.
 ///
 /// # Errors
 ///
-/// The first breach of contract of the game in this tick: see [`Faults`].
+/// The first breach of contract of the game in this tick: see [`Faults`]. A panic, in Worlds with
+/// [`PanicReports`](crate::panics::PanicReports).
 pub fn tick_world(world: &mut World) -> Result<(), Fault> {
+    if let Some(mut faults) = world.get_resource_mut::<Faults>() {
+        faults.set_caller(true);
+    }
+    let ticked = panics::guard(world, run_frames);
+    // A World that has panicked may have lost anything.
+    if let Some(mut faults) = world.get_resource_mut::<Faults>() {
+        faults.set_caller(false);
+    }
+    ticked
+}
+
+/// Frames of a level that is being made ready in which the clock is not waited for.
+const QUICK_FRAMES: u32 = 60;
+
+/// Runs frames up to and with the next tick.
+fn run_frames(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
-    world.resource_mut::<Faults>().set_caller(true);
-    // The first run of the main schedule only starts the clock.
-    for _ in 0..2 {
+    system_errors::clear();
+    for frame in 1.. {
         world.run_schedule(Main);
         world.clear_trackers();
-        if *world.resource::<Tick>() != before {
+        if let Some(failure) = system_errors::take(world) {
+            world.resource_mut::<Faults>().report(failure);
+        }
+        world.resource_mut::<Faults>().take()?;
+        // The first run of the main schedule only starts the clock.
+        let waits = frame < 2 || is_loading(world);
+        if *world.resource::<Tick>() != before || !waits {
             break;
         }
+        if frame > QUICK_FRAMES {
+            #[allow(
+                clippy::disallowed_methods,
+                reason = "what is loaded arrives by the clock; no tick passes meanwhile"
+            )]
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
-    let mut faults = world.resource_mut::<Faults>();
-    faults.set_caller(false);
-    faults.take()
+    Ok(())
+}
+
+/// Whether somebody's level is not ready yet, where that keeps ticks from passing.
+fn is_loading(world: &mut World) -> bool {
+    if !world.contains_resource::<FrameGate>() {
+        return false;
+    }
+    let mut agents = world.query::<(&Control, &Episode)>();
+    agents.iter(world).any(|(control, episode)| control.is_active() && episode.is_loading())
 }
 
 /// Ticking an app by hand.

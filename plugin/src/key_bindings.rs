@@ -1,5 +1,7 @@
 //! Which keys a person plays with, and which action they mean.
 
+use std::{borrow::Cow, fmt, sync::Arc};
+
 use bevy::prelude::*;
 
 use crate::action::ActionValue;
@@ -30,19 +32,52 @@ impl KeyAxis {
 ///
 /// Works on agents under [`Control::Human`](crate::control::Control::Human) in an app with
 /// [`KeyboardPlugin`](crate::keyboard::KeyboardPlugin).
-#[derive(Component, Clone, Debug, Reflect)]
+#[derive(Component, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]
 pub struct KeyBindings {
     axes: Vec<KeyAxis>,
-    action: fn(&[i8]) -> ActionValue,
-    help: &'static str,
+    action: Arc<dyn Fn(&[i8]) -> ActionValue + Send + Sync>,
+    help: Cow<'static, str>,
+}
+
+impl fmt::Debug for KeyBindings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("KeyBindings").field("axes", &self.axes).field("help", &self.help).finish_non_exhaustive()
+    }
 }
 
 impl KeyBindings {
     /// A map over these axes. `action` gets one value per axis; `help` tells a person which keys there are.
-    pub fn new(axes: impl Into<Vec<KeyAxis>>, action: fn(&[i8]) -> ActionValue, help: &'static str) -> Self {
-        Self { axes: axes.into(), action, help }
+    pub fn new(
+        axes: impl Into<Vec<KeyAxis>>,
+        action: impl Fn(&[i8]) -> ActionValue + Send + Sync + 'static,
+        help: impl Into<Cow<'static, str>>,
+    ) -> Self {
+        Self { axes: axes.into(), action: Arc::new(action), help: help.into() }
+    }
+
+    /// The way back from a game's own keys: discrete action i means that the keys of set i are held. Of several that fit
+    /// the one with the most keys counts.
+    pub fn of_sets(sets: &[Vec<KeyCode>]) -> Self {
+        let mut keys = Vec::new();
+        for key in sets.iter().flatten() {
+            if !keys.contains(key) {
+                keys.push(*key);
+            }
+        }
+        let axes: Vec<_> = keys.iter().map(|&key| KeyAxis::new([], [key])).collect();
+        let place = |key: &KeyCode| keys.iter().position(|known| known == key).unwrap_or_default();
+        let sets: Vec<Vec<usize>> = sets.iter().map(|set| set.iter().map(place).collect()).collect();
+        let action = move |held: &[i8]| {
+            let fits = |set: &&(usize, &Vec<usize>)| set.1.iter().all(|&key| held[key] > 0);
+            let fitting = sets.iter().enumerate().collect::<Vec<_>>();
+            // The first of those with the most keys: `max_by_key` would take the last.
+            let best = fitting.iter().filter(fits).rev().max_by_key(|(_, set)| set.len());
+            ActionValue::Discrete(best.map_or(0, |(action, _)| *action as u32))
+        };
+        let help = keys.iter().map(|key| format!("{key:?}")).collect::<Vec<_>>().join(", ");
+        Self::new(axes, action, help)
     }
 
     /// The action of the keys that are held.
@@ -52,8 +87,8 @@ impl KeyBindings {
     }
 
     /// Which keys there are, for people.
-    pub fn help(&self) -> &'static str {
-        self.help
+    pub fn help(&self) -> &str {
+        &self.help
     }
 }
 
@@ -81,5 +116,20 @@ mod tests {
             let action = map().action(|key| held.contains(&key));
             assert_eq!(action, ActionValue::Continuous(values.to_vec()), "{held:?}");
         }
+    }
+
+    #[test]
+    fn the_keys_of_a_game_say_which_action_is_meant() {
+        let sets = [vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowLeft, KeyCode::Space], vec![KeyCode::Space]];
+        let bindings = KeyBindings::of_sets(&sets);
+        for (held, action) in [
+            (&[][..], 0),
+            (&[KeyCode::ArrowLeft], 1),
+            (&[KeyCode::Space, KeyCode::ArrowLeft], 2),
+            (&[KeyCode::Space, KeyCode::KeyQ], 3),
+        ] {
+            assert_eq!(bindings.action(|key| held.contains(&key)), ActionValue::Discrete(action), "{held:?}");
+        }
+        assert_eq!(bindings.help(), "ArrowLeft, Space");
     }
 }

@@ -3,10 +3,17 @@
 use bevy::{input::InputSystems, prelude::*};
 
 use crate::{
-    action::Action, bot, control::Control, episode::Episode, key_bindings::KeyBindings, systems::PlaybotSystems,
+    action::Action,
+    bot,
+    control::Control,
+    episode::Episode,
+    key_bindings::KeyBindings,
+    placement::{TickPlacement, TickSchedules, is_tick},
+    systems::PlaybotSystems,
 };
 
-/// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`].
+/// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`]. To be added after
+/// [`PlaybotPlugin`](crate::plugin::PlaybotPlugin).
 ///
 /// Ticks and frames have their own rates. A key counts in a tick if it is held then, or was pressed at any time since
 /// the tick before, so that a short tap is never lost between two ticks. Needs Bevy's `InputPlugin`.
@@ -28,8 +35,14 @@ impl TappedKeys {
 impl Plugin for KeyboardPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<TappedKeys>()
-            .add_systems(PreUpdate, note_taps.after(InputSystems))
-            .add_systems(FixedPreUpdate, decide.in_set(PlaybotSystems::Decide).before(bot::run_blind_bots));
+            .add_systems(PreUpdate, note_taps.after(InputSystems));
+        match TickSchedules::of(app).placement {
+            TickPlacement::Fixed => {
+                app.add_systems(FixedPreUpdate, decide.in_set(PlaybotSystems::Decide).before(bot::run_blind_bots))
+            }
+            // The game sees the keys of this very frame, so the action is made of those.
+            TickPlacement::Frame => app.add_systems(PreUpdate, decide.after(note_taps).run_if(is_tick)),
+        };
     }
 }
 

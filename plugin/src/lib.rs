@@ -88,10 +88,14 @@ pub mod demo;
 pub mod episode;
 pub mod fault;
 pub mod headless;
+pub mod headless_plugins;
 pub mod key_bindings;
 pub mod keyboard;
+mod known_plugins;
 pub mod level;
 pub mod observation;
+pub mod panics;
+pub mod placement;
 pub mod plugin;
 pub mod plugins;
 pub mod policy;
@@ -103,6 +107,7 @@ pub mod reward;
 pub mod skill_prior;
 pub mod state_hash;
 pub mod streams;
+pub mod system_errors;
 pub mod systems;
 pub mod takeover;
 pub mod test_app;
@@ -112,3 +117,8 @@ pub mod vision;
 
 pub use plugin::PlaybotPlugin;
 pub use plugins::PlaybotPlugins;
+
+/// What the README shows is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

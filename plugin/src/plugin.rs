@@ -1,11 +1,13 @@
 //! The plugin itself: resources and the order of its systems.
 
-use bevy::prelude::*;
+use bevy::{ecs::schedule::ScheduleLabel, input::InputSystems, prelude::*};
 
 use crate::{
     action, agent, bot, demo, episode,
     fault::{FaultSystems, Faults, announce_faults},
-    headless, observation, policy, reflect, reward, skill_prior, streams,
+    headless, observation,
+    placement::{self, FrameGate, TickPlacement, TickSchedules},
+    policy, reflect, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
 };
 
@@ -13,7 +15,10 @@ use crate::{
 ///
 /// It draws nothing, opens nothing and starts nothing: agents that the game spawns bring it to life.
 #[derive(Default, Debug, Clone, Copy)]
-pub struct PlaybotPlugin;
+pub struct PlaybotPlugin {
+    /// What a tick is made of.
+    pub placement: TickPlacement,
+}
 
 impl Plugin for PlaybotPlugin {
     fn build(&self, app: &mut App) {
@@ -23,27 +28,60 @@ impl Plugin for PlaybotPlugin {
             .add_plugins((action::plugin, episode::plugin, observation::plugin))
             .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin, reflect::plugin))
             .init_schedule(ObserveSchedule)
-            .add_systems(Last, announce_faults.in_set(FaultSystems).after(PlaybotSystems::Reset))
+            .add_systems(Last, announce_faults.in_set(FaultSystems).after(PlaybotSystems::Reset));
+        let schedules = TickSchedules::new(self.placement);
+        app.insert_resource(schedules)
             .configure_sets(
-                FixedPreUpdate,
-                (PlaybotSystems::Begin, PlaybotSystems::Observe, PlaybotSystems::Decide, PlaybotSystems::Act).chain(),
+                schedules.decide,
+                (
+                    PlaybotSystems::Begin,
+                    PlaybotSystems::Load,
+                    PlaybotSystems::Observe,
+                    PlaybotSystems::Decide,
+                    PlaybotSystems::Act,
+                )
+                    .chain(),
             )
             .configure_sets(
-                FixedPostUpdate,
+                schedules.judge,
                 (PlaybotSystems::Judge, PlaybotSystems::Record, PlaybotSystems::Reset).chain(),
             );
-        add_decision_systems(app);
-        add_outcome_systems(app);
+        match self.placement {
+            TickPlacement::Fixed => {
+                app.add_systems(FixedFirst, headless::count_tick);
+            }
+            TickPlacement::Frame => place_in_frames(app),
+        }
+        add_decision_systems(app, schedules.decide);
+        add_outcome_systems(app, schedules.judge);
     }
 }
 
+/// A frame is a tick, but for the first one and those in which a level is being made ready.
+fn place_in_frames(app: &mut App) {
+    use PlaybotSystems::{Act, Begin, Decide, Judge, Load, Observe, Record, Reset};
+    app.init_resource::<FrameGate>()
+        .configure_sets(PreUpdate, Act.before(InputSystems))
+        .configure_sets(PreUpdate, (Begin, Load).run_if(placement::has_begun))
+        .configure_sets(PreUpdate, (Observe, Decide, Act).run_if(placement::is_tick))
+        .configure_sets(Last, (Judge, Record, Reset).run_if(placement::is_tick))
+        .add_systems(
+            PreUpdate,
+            (
+                placement::begin_frame.before(Begin),
+                placement::open_gate.after(Load).before(Observe).run_if(placement::has_begun),
+            ),
+        );
+}
+
 /// Everything up to the action.
-fn add_decision_systems(app: &mut App) {
-    app.add_systems(FixedFirst, headless::count_tick).add_systems(
-        FixedPreUpdate,
+fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
+    app.add_systems(
+        schedule,
         (
             (
                 streams::seed_streams,
+                agent::check_agents,
                 agent::order_agents,
                 reward::clear_rewards,
                 episode::begin_episodes,
@@ -68,9 +106,9 @@ fn add_decision_systems(app: &mut App) {
 }
 
 /// Everything after the game has answered.
-fn add_outcome_systems(app: &mut App) {
+fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
-        FixedPostUpdate,
+        schedule,
         (
             (episode::judge, skill_prior::count_down_skills).chain().in_set(PlaybotSystems::Judge),
             (demo::recorder::record_ticks, demo::replay::check_replays).chain().in_set(PlaybotSystems::Record),

@@ -14,6 +14,7 @@ pub use crate::{
     key_bindings::{KeyAxis, KeyBindings},
     level::{LevelQueue, LevelSource},
     observation::{Observation, ObservationSpace, VectorSensor},
+    placement::TickPlacement,
     plugin::PlaybotPlugin,
     plugins::PlaybotPlugins,
     policy::{ActionDraw, ActivePolicy, PlaybotSeed},

@@ -2,11 +2,15 @@
 
 use bevy::{ecs::schedule::ScheduleLabel, prelude::*};
 
-/// Parts of a tick, in this order.
+/// Parts of a tick, in this order, in the schedules that [`TickSchedules`](crate::placement::TickSchedules) names: usually
+/// `FixedPreUpdate` and `FixedPostUpdate`.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PlaybotSystems {
     /// `FixedPreUpdate`: agents without a level get one.
     Begin,
+    /// `FixedPreUpdate`: a game whose levels take several frames says which are ready:
+    /// [`Episode::ready`](crate::episode::Episode::ready).
+    Load,
     /// `FixedPreUpdate`: [`ObserveSchedule`] fills the observations.
     Observe,
     /// `FixedPreUpdate`: whoever holds the control writes the action.

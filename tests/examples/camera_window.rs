@@ -20,7 +20,7 @@ fn main() {
     let seconds = std::env::args().nth(1).and_then(|word| word.parse().ok()).unwrap_or(5.0);
     App::new()
         .add_plugins(DefaultPlugins.set(ImagePlugin::default_nearest()))
-        .add_plugins((PlaybotPlugin, CameraSensorPlugin::default()))
+        .add_plugins((PlaybotPlugin::default(), CameraSensorPlugin::default()))
         .insert_resource(WinitSettings::continuous())
         .insert_resource(ClearColor(Color::srgb_u8(30, 60, 90)))
         .add_systems(Startup, build)

@@ -9,7 +9,7 @@ use bevy::{
 use bevy_playbot::vision::{Picture, Stage, VisionSystems};
 use playbot_lab::prelude::*;
 
-use crate::{Cell, Corridor};
+use crate::corridor::{Cell, Corridor};
 
 /// [`Corridor`], which is drawn: a green agent that its eye follows, a white exit at the right end and a red pit at the
 /// left one, a unit for each cell. The pictures say no more than the first number of the vector.
@@ -35,7 +35,11 @@ impl FromWorld for Paints {
 }
 
 /// Gives new agents a stage of their own with all that is seen on it.
-fn dress(new: Query<(Entity, &Agent), (With<Cell>, Without<Sprite>)>, paints: Res<Paints>, mut commands: Commands) {
+fn spawn_pictures(
+    new: Query<(Entity, &Agent), (With<Cell>, Without<Sprite>)>,
+    paints: Res<Paints>,
+    mut commands: Commands,
+) {
     for (entity, agent) in &new {
         let sprite =
             |paint: usize| Sprite { custom_size: Some(Vec2::ONE), ..Sprite::from_image(paints.0[paint].clone()) };
@@ -83,7 +87,7 @@ impl Game for PaintedCorridor {
 
     fn build_picture(&self, app: &mut App) {
         app.init_resource::<Paints>()
-            .add_systems(ObserveSchedule, (dress, follow).chain().in_set(VisionSystems::Dress));
+            .add_systems(ObserveSchedule, (spawn_pictures, follow).chain().in_set(VisionSystems::Dress));
     }
 
     fn build(&self, app: &mut App, mode: &str) {

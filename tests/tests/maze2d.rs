@@ -194,7 +194,7 @@ fn a_level_that_cannot_be_made_is_a_fault_that_says_why() {
 
 /// Records `levels` levels of the demonstrator.
 fn record(path: &Path, text: &str, levels: u64) {
-    let header = DemoHeader::new("maze2d", GAME.version(), text, GAME.tick_hz(), demo_actions(&GAME.actions()));
+    let header = GAME.demo_header(text);
     let (mut world, agents) = build_world(&GAME, text, 5, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
     GAME.arm_demonstrator(&mut world, agents[0], 0.5);

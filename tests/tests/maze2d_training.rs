@@ -50,7 +50,7 @@ fn experiment(algorithm: Algorithm) -> Experiment {
 fn skills() -> SkillModel {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, mode) = (folder.path().join("umaze.demo"), "umaze+retarget");
-    let header = DemoHeader::new("maze2d", GAME.version(), mode, GAME.tick_hz(), demo_actions(&GAME.actions()));
+    let header = GAME.demo_header(mode);
     let (mut world, agents) = build_world(&GAME, mode, 1, 0, 1);
     world.insert_resource(
         Recorder::new(DemoWriter::create(&path, header).expect("a fresh file")).with_step_limit(20_000),

@@ -21,7 +21,7 @@ use playbot_lab::{
 use playbot_tests::{Corridor, Drift};
 
 fn header() -> DemoHeader {
-    DemoHeader::new("corridor", 3, "plain", 10.0, demo_actions(&ActionSpace::Discrete(3)))
+    Corridor.demo_header("plain")
 }
 
 /// Records a random walker for this many episodes.

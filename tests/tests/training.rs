@@ -55,7 +55,7 @@ fn info(algorithm: Algorithm) -> RunInfo {
 /// A skill model from a random walker that is worth copying in half of its steps.
 fn skills(folder: &Path) -> SkillModel {
     let path = folder.join("walk.demo");
-    let header = DemoHeader::new("corridor", 3, "plain", 10.0, demo_actions(&ActionSpace::Discrete(3)));
+    let header = Corridor.demo_header("plain");
     let (mut world, agents) = build_world(&Corridor, "plain", 5, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(&path, header).expect("fresh")));
     let levels: Vec<u64> = (0..60).collect();

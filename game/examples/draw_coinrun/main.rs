@@ -9,10 +9,10 @@ mod art;
 
 use std::{error::Error, fs::File, io::BufWriter, path::Path};
 
-use art::Canvas;
+use art::canvas::Canvas;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/coinrun");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/coinrun");
     for (name, picture) in art::pictures()? {
         write(&folder.join(&name), &picture)?;
         println!("{name}: {} × {}", picture.width, picture.height);

@@ -3,12 +3,12 @@
 use bevy::math::{DQuat, DVec3, Quat, Vec3};
 
 use super::{
-    arrow::Coordinates,
+    arrow_matrix::Coordinates,
     constraint::{self, Mobility, Row},
+    constraint_solver::ConstraintSolver,
     contact::{self, Contact, WallBox},
     dynamics::{GRAVITY, bias, mass_matrix},
     kinematics::{Pose, Solids, turn},
-    newton::Newton,
     parts::{PARTS, Part, parts},
     skeleton::{ACTUATED, HINGE_DAMPING, JOINTS, LEGS, TORQUE},
     state::AntState,
@@ -85,7 +85,7 @@ pub struct AntBody {
     near: Vec<WallBox>,
     contacts: Vec<Contact>,
     rows: Vec<Row>,
-    newton: Newton,
+    solver: ConstraintSolver,
 }
 
 impl AntBody {
@@ -103,7 +103,7 @@ impl AntBody {
             near: Vec::new(),
             contacts: Vec::new(),
             rows: Vec::new(),
-            newton: Newton::default(),
+            solver: ConstraintSolver::default(),
         };
         body.set_state(&AntState::nominal());
         body
@@ -208,7 +208,7 @@ impl AntBody {
         let mass = mass_matrix(&self.solids, &legs);
         let free = mass.factor().solve(&forces);
         self.constrain(place, &pose, &velocity);
-        self.warm = if self.rows.is_empty() { free } else { self.newton.solve(&mass, &free, &self.rows, &self.warm) };
+        self.warm = if self.rows.is_empty() { free } else { self.solver.solve(&mass, &free, &self.rows, &self.warm) };
         let [a, b, c, d, e, f] = self.warm.base;
         Rates { spin: DVec3::new(a, b, c), centre: pose.rotation * DVec3::new(d, e, f), joints: self.warm.legs }
     }

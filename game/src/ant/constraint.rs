@@ -7,7 +7,7 @@
 use bevy::math::DVec3;
 
 use super::{
-    arrow::{BASE, Coordinates, Factored},
+    arrow_matrix::{BASE, Coordinates, Factored},
     contact::{Contact, Limb, MARGIN},
     dynamics::mass_matrix,
     kinematics::{Pose, Solids},

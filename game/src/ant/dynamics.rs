@@ -7,7 +7,7 @@
 use bevy::math::DVec3;
 
 use super::{
-    arrow::{Arrow, BASE, Coordinates},
+    arrow_matrix::{ArrowMatrix, BASE, Coordinates},
     kinematics::{Leg, Pose, Solids},
     skeleton::{ARMATURE, LEGS},
     spatial::{Inertia, Spatial},
@@ -17,8 +17,8 @@ use super::{
 pub const GRAVITY: f64 = 9.81;
 
 /// Mass matrix of a pose, rotors included.
-pub fn mass_matrix(solids: &Solids, legs: &[Leg; LEGS]) -> Arrow {
-    let mut matrix = Arrow::default();
+pub fn mass_matrix(solids: &Solids, legs: &[Leg; LEGS]) -> ArrowMatrix {
+    let mut matrix = ArrowMatrix::default();
     let mut whole = solids.trunk;
     for (at, leg) in legs.iter().enumerate() {
         let both = leg.upper + leg.lower;

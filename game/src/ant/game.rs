@@ -14,7 +14,7 @@ use super::{
     steering::{key_bindings, steer},
     walk::{Task, Walker, observe, start_episode, walk},
 };
-use crate::antview::VIEW;
+use crate::ant::view::VIEW;
 
 /// Control steps per second.
 pub const ANT_HZ: f64 = 10.0;
@@ -95,7 +95,7 @@ impl Game for Ant {
 
     #[cfg(feature = "view3d")]
     fn build_space_view(&self, app: &mut App) {
-        app.add_plugins(crate::antview::SolidViewPlugin);
+        app.add_plugins(crate::ant::view::SolidViewPlugin);
     }
 }
 

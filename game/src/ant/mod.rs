@@ -8,17 +8,18 @@
 //! to hold floor and walls, find those nearby, and answer rays ([`walls`]).
 //!
 //! The parts, from the bottom: [`skeleton`] has the measures, [`kinematics`] the pose, [`dynamics`] the mass matrix and
-//! the forces without contacts, [`contact`] finds where it touches, [`constraint`] and [`newton`] turn joint limits and
-//! contacts into accelerations, [`body`] integrates. [`pilot`] is what the game has taught.
+//! the forces without contacts, [`contact`] finds where it touches, [`constraint`] and [`constraint_solver`] turn joint
+//! limits and contacts into accelerations, [`body`] integrates. [`pilot`] is what the game has taught, [`view`] what ants
+//! look like.
 
-pub mod arrow;
+pub mod arrow_matrix;
 pub mod body;
 pub mod constraint;
+pub mod constraint_solver;
 pub mod contact;
 pub mod dynamics;
 pub mod game;
 pub mod kinematics;
-pub mod newton;
 pub mod parts;
 pub mod picture;
 pub mod pilot;
@@ -27,6 +28,7 @@ pub mod skeleton;
 pub mod spatial;
 pub mod state;
 pub mod steering;
+pub mod view;
 pub mod walk;
 pub mod walls;
 

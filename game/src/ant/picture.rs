@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use playbot_lab::prelude::*;
 
 use super::walk::{GOAL_RADIUS, Walker};
-use crate::antview::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround};
+use crate::ant::view::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround};
 
 /// Adds what is drawn to [`AntPlugin`](super::AntPlugin). Add it after the plugins that bring images, such as Bevy's own or
 /// a sensor's.

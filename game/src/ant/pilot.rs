@@ -13,7 +13,7 @@ use super::{
 };
 
 const NAME: &str = "assets/models/ant-walker.safetensors";
-const FILE: &[u8] = include_bytes!("../../../assets/models/ant-walker.safetensors");
+const FILE: &[u8] = include_bytes!("../../assets/models/ant-walker.safetensors");
 
 static SHIPPED: LazyLock<Result<Pilot, PilotError>> = LazyLock::new(|| Pilot::from_bytes(NAME, FILE));
 

@@ -4,19 +4,13 @@ use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{ObservationKind, Picture};
-use playbot_lab::prelude::*;
-use playbot_lab::{
-    benchmark::Benchmark,
-    floor_plan::FloorPlan,
-    inspect::{InspectError, LevelRequest, LevelView},
-    mode::ModeError,
-};
+use playbot_lab::{floor_plan::FloorPlan, mode::ModeError, prelude::*};
 
 use super::{
     components::{MazeAnt, PlaysIn},
     demonstrator_bot::DemonstratorBot,
     level::generate,
-    mode::{AntMazeMode, AntMazeModeError},
+    mode::AntMazeMode,
     picture::AntMazePicturePlugin,
     plugin::AntMazePlugin,
     view,
@@ -26,10 +20,10 @@ use crate::{
         game::{ANT_HZ, action_names},
         skeleton::JOINTS,
         steering::key_bindings,
+        view::VIEW,
     },
-    antview,
     maze::{
-        Map, Maze,
+        Map, Maze, MazeModeError,
         show_level::{self, MazeSource, unfit},
     },
 };
@@ -104,7 +98,7 @@ impl Game for AntMaze {
     }
 
     fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: antview::VIEW })
+        Some(Picture { width: VIEW })
     }
 
     fn build_picture(&self, app: &mut App) {
@@ -147,13 +141,13 @@ impl Game for AntMaze {
 
     #[cfg(feature = "view3d")]
     fn build_space_view(&self, app: &mut App) {
-        app.add_plugins(crate::antview::SolidViewPlugin);
+        app.add_plugins(crate::ant::view::SolidViewPlugin);
     }
 }
 
 /// The maze of a level, with its start and goal.
 fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
-    let parsed: AntMazeMode = mode.parse().map_err(|error: AntMazeModeError| error.of(mode))?;
+    let parsed: AntMazeMode = mode.parse().map_err(|error: MazeModeError| error.of(mode))?;
     let level = generate(&parsed, seed).map_err(unfit)?;
     level.maze.with_ends(level.start, level.goal).map_err(unfit)
 }

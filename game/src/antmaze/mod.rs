@@ -20,10 +20,11 @@ pub mod view;
 pub mod walls;
 pub mod waypoints;
 
+pub use crate::maze::MazeModeError as AntMazeModeError;
 pub use demonstrator_bot::DemonstratorBot;
 pub use game::AntMaze;
 pub use level::{AntMazeLevel, generate};
-pub use mode::{AntMazeMode, AntMazeModeError, GoalNoise, Goals, Pay};
+pub use mode::{AntMazeMode, GoalNoise, Goals, Pay};
 pub use plugin::{AntMazePlugin, AntMazeSystems};
 pub use sighted::SightedAntMaze;
 pub use walls::wall_boxes;

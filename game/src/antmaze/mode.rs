@@ -3,10 +3,8 @@
 use std::{fmt, str::FromStr};
 
 use bevy_playbot::unknown_name::UnknownName;
-use playbot_lab::mode::ModeError;
-use thiserror::Error;
 
-use crate::maze::{Cell, Map, MazeError, OptionError, fixed::antmaze};
+use crate::maze::{Cell, Map, MazeModeError, OptionError, fixed::antmaze};
 
 /// What a level of AntMaze is made of. Written as the map and its options, `large+sparse+limit=500`; what is left out is as
 /// in [`AntMazeMode::on`].
@@ -64,33 +62,6 @@ pub enum GoalNoise {
     D4rl,
 }
 
-/// The text is not a mode of AntMaze.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum AntMazeModeError {
-    /// No such map, or no such option.
-    #[error(transparent)]
-    Unknown(#[from] UnknownName),
-    /// The value of an option makes no sense.
-    #[error(transparent)]
-    Option(#[from] OptionError),
-    /// There can be no such maze.
-    #[error(transparent)]
-    Maze(#[from] MazeError),
-    /// An option is given twice, or with its opposite.
-    #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
-    Twice(String),
-}
-
-impl AntMazeModeError {
-    /// The error as games give it: for this mode.
-    pub fn of(self, mode: &str) -> ModeError {
-        match self {
-            Self::Unknown(unknown) => unknown.into(),
-            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
-        }
-    }
-}
-
 /// Options of every map.
 const OPTIONS: [&str; 7] =
     ["sparse", "dense=exp", "goals=demo", "goals=random", "goal-noise=d4rl", "random-start", "limit=1000"];
@@ -114,7 +85,7 @@ impl AntMazeMode {
         }
     }
 
-    fn set(&mut self, option: &str) -> Result<(), AntMazeModeError> {
+    fn set(&mut self, option: &str) -> Result<(), MazeModeError> {
         let (key, value) = option.split_once('=').unwrap_or((option, ""));
         match option {
             "sparse" => self.pay = Pay::Sparse,
@@ -138,7 +109,7 @@ impl AntMazeMode {
         Ok(())
     }
 
-    fn check(self) -> Result<Self, AntMazeModeError> {
+    fn check(self) -> Result<Self, MazeModeError> {
         self.map.check()?;
         if self.goals == Goals::Demo && self.demo_goals().is_empty() {
             let why = "generated mazes have no goals of demonstrations; take goals=random";
@@ -165,18 +136,14 @@ fn subject(option: &str) -> &str {
 }
 
 impl FromStr for AntMazeMode {
-    type Err = AntMazeModeError;
+    type Err = MazeModeError;
 
-    fn from_str(text: &str) -> Result<Self, AntMazeModeError> {
+    fn from_str(text: &str) -> Result<Self, MazeModeError> {
         let mut parts = text.split('+');
         let mut mode = Self::on(Map::named(parts.next().unwrap_or_default())?);
-        let options: Vec<_> = parts.collect();
-        for (index, option) in options.iter().enumerate() {
-            if options[..index].iter().any(|earlier| subject(earlier) == subject(option)) {
-                return Err(AntMazeModeError::Twice((*option).to_owned()));
-            }
-            mode.set(option)?;
-        }
+        let options: Vec<&str> = parts.collect();
+        MazeModeError::check_once(&options, subject)?;
+        options.iter().try_for_each(|option| mode.set(option))?;
         mode.check()
     }
 }

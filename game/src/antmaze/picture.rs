@@ -10,7 +10,7 @@ use super::{
     walls::wall_boxes,
 };
 use crate::{
-    antview::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround},
+    ant::view::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround},
     maze::{Cell, Maze},
 };
 

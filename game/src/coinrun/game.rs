@@ -130,7 +130,7 @@ impl Game for CoinRun {
     }
 
     fn experiment(&self) -> Option<(&'static str, &'static str)> {
-        Some(("assets/experiments/coinrun.ron", include_str!("../../../assets/experiments/coinrun.ron")))
+        Some(("assets/experiments/coinrun.ron", include_str!("../../assets/experiments/coinrun.ron")))
     }
 
     fn benchmarks(&self) -> Vec<Benchmark> {

@@ -5,9 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::near::NearBodies;
-use super::rules::Body;
-use super::tile::TileGrid;
+use super::{near::NearBodies, rules::Body, spawn::Spawn, tile::TileGrid};
 
 /// Difficulty of the level generator.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
@@ -49,30 +47,6 @@ impl FromStr for Mode {
             .find(|mode| mode.name() == name)
             .ok_or_else(|| UnknownMode(name.to_owned()))
     }
-}
-
-/// A body that a level starts with. Cells are tile coordinates; the body's centre is the middle of
-/// its cell.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Spawn {
-    /// A saw. It never moves.
-    Saw([i32; 2]),
-    /// A patrolling enemy.
-    Enemy {
-        /// Start cell.
-        cell: [i32; 2],
-        /// Start direction: 1 right, -1 left.
-        dir: i8,
-        /// Picture, 0 to 8.
-        sprite: u8,
-    },
-    /// A crate. It never moves.
-    Crate {
-        /// Cell.
-        cell: [i32; 2],
-        /// Picture, 0 to 3.
-        sprite: u8,
-    },
 }
 
 /// The parts from which a [`Level`] is put together.

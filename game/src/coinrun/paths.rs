@@ -5,8 +5,9 @@
 //! at the edge of the view.
 
 use super::{
-    Outcome, PlayerState, TileGrid,
-    rules::{Body, begin_step, is_supported, move_player, touch},
+    rules::{Body, Outcome, PlayerState, begin_step, is_supported, move_player, touch},
+    tile::TileGrid,
+    view_size::REACH,
 };
 
 /// Buttons that are tried: right and jump, right, jump, nothing, left, left and jump.
@@ -45,7 +46,7 @@ impl<'a> Surroundings<'a> {
     pub fn follow(&self, start: &Body, memory: &PlayerState, action: u8, out: &mut [f32]) {
         let (mut player, mut memory, mut enemies) = (*start, *memory, self.enemies.clone());
         let (mut end, mut steps, mut flew, mut lands) = (None, 0, false, false);
-        let half_view = super::view::REACH as f32 + 0.5;
+        let half_view = REACH as f32 + 0.5;
         let in_view = |player: &Body| (player.x - start.x).abs().max((player.y - start.y).abs()) < half_view;
         while steps < STEPS && end.is_none() && !lands && in_view(&player) {
             let step = begin_step(&mut player, &mut memory, self.tiles, action);

@@ -9,8 +9,8 @@ use bevy_rapier2d::prelude::*;
 use super::{
     SIZE, Tile,
     components::{Arena, ArenaBody, Crate, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
-    plugin::CoinRunSystems,
     rules::Body,
+    systems::CoinRunSystems,
 };
 
 /// Adds rapier to CoinRun.

@@ -4,11 +4,10 @@ use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
 use playbot_lab::prelude::*;
 
-use super::{Mode, arena, components::CoinRunMode, demonstrator_bot, physics::CoinRunPhysicsPlugin, play};
-
-/// The tick of CoinRun, in `FixedUpdate`. Add what your game adds before or after it.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct CoinRunSystems;
+use super::{
+    arena, components::CoinRunMode, demonstrator_bot, level::Mode, physics::CoinRunPhysicsPlugin, play,
+    systems::CoinRunSystems,
+};
 
 /// Adds the rules of CoinRun. Agents are made by [`spawn_agent`](super::game::spawn_agent).
 #[derive(Clone, Copy, Debug)]

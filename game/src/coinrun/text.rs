@@ -4,8 +4,9 @@
 //! `^` lava surface, `C` coin, `|` enemy barrier, `S` saw, `>` and `<` enemy with its direction,
 //! `x` crate, `A` start of the player. A body hides the tile in its cell.
 
-use super::level::{Level, LevelParts, Mode, Spawn};
+use super::level::{Level, LevelParts, Mode};
 use super::rules::START_CELL;
+use super::spawn::Spawn;
 use super::tile::{SIZE, Tile, TileGrid};
 
 /// Rows shown above the highest thing in a level.

@@ -15,15 +15,13 @@
 //! middle of cell (6, 6). Velocities are divided by their largest value, `cell_x` and `cell_y` place the player in its
 //! tile, from -0.5 to 0.5, and `a` is the number of the action that is held.
 
+pub use super::view_size::{REACH, SIDE};
 use super::{
-    PlayerState, Tile, TileGrid, paths,
-    rules::{Body, ENEMY_SPEED, JUMP_SPEED, WALK_SPEED, is_supported},
+    paths,
+    rules::{Body, ENEMY_SPEED, JUMP_SPEED, PlayerState, WALK_SPEED, is_supported},
+    tile::{Tile, TileGrid},
 };
 
-/// Tiles from the player's cell to the edge of the view.
-pub const REACH: i32 = 6;
-/// Width and height of the view, in tiles.
-pub const SIDE: usize = 13;
 /// Cells in view.
 pub const CELLS: usize = SIDE * SIDE;
 /// Enemies that are listed by themselves.

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{cell::Cell, layout::Walls};
+use super::{cell::Cell, walls::Walls};
 
 /// The number of moves from every cell to one of them.
 #[derive(Clone, Debug, PartialEq, Eq)]

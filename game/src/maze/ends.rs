@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{cell::Cell, distances::Distances, draw::Draw, layout::Walls};
+use super::{cell::Cell, distances::Distances, draw::Draw, walls::Walls};
 
 /// Starts that are tried for a wanted difficulty.
 const STARTS: usize = 32;

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{
     cell::Cell,
-    layout::{MAX_CELLS, MAX_SIDE},
+    limits::{MAX_CELLS, MAX_SIDE},
 };
 
 /// The maze cannot be played or made. Rows and columns are counted from 0.

@@ -1,6 +1,6 @@
 //! Rooms in a grid, and the walls between them that fall.
 
-use super::{cell::Cell, draw::Draw, error::MazeError, layout::Walls, spec::MazeSpec};
+use super::{cell::Cell, draw::Draw, error::MazeError, spec::MazeSpec, walls::Walls};
 
 /// A grid of square rooms.
 pub(super) struct Rooms {

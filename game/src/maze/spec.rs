@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{error::MazeError, layout::check_size};
+use super::{error::MazeError, walls::check_size};
 
 /// Seeds of the mazes to learn from, unless somebody names others.
 pub const TRAIN_SEEDS: RangeInclusive<u64> = 0..=63;

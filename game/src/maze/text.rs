@@ -1,10 +1,6 @@
 //! Mazes as text, one character to the cell.
 
-use super::{
-    cell::Cell,
-    error::MazeError,
-    layout::{Maze, Walls},
-};
+use super::{cell::Cell, error::MazeError, layout::Maze, walls::Walls};
 
 impl Maze {
     /// Reads a maze from its rows: `#` or `1` is a wall, `O`, `0`, a blank or `.` a free cell, `S` or `r` the start and `G` or `g` the

@@ -17,7 +17,7 @@ use super::{
     demonstrator_bot::DemonstratorBot,
     floor_plan::point,
     level::Maze2dLevel,
-    mode::{Maze2dMode, Maze2dModeError},
+    mode::Maze2dMode,
     picture::{Maze2dPicturePlugin, VIEW},
     play::OBSERVED,
     plugin::Maze2dPlugin,
@@ -164,7 +164,7 @@ impl Game for Maze2d {
 
 /// The maze of a level, with its start and goal.
 fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
-    let parsed: Maze2dMode = mode.parse().map_err(|error: Maze2dModeError| error.of(mode))?;
+    let parsed: Maze2dMode = mode.parse().map_err(|error: MazeModeError| error.of(mode))?;
     let Maze2dLevel { maze, start_cell, goal_cell, .. } = Maze2dLevel::new(&parsed, seed).map_err(unfit)?;
     maze.with_ends(start_cell, goal_cell).map_err(unfit)
 }

@@ -1,6 +1,6 @@
 //! Maze2D: push a ball through a maze to the goal. D4RL's `pointmaze`, and mazes without end.
 //!
-//! [`ball`], [`soft`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
+//! [`ball`], [`soft_contact`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
 //! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
 //! makes of a seed. [`SightedMaze2d`] is the same game for agents that see walls and goal.
@@ -22,15 +22,16 @@ pub mod plugin;
 mod ray;
 pub mod sighted;
 pub mod sim;
-pub mod soft;
+pub mod soft_contact;
 mod trace;
 pub mod walls;
 
+pub use crate::maze::MazeModeError as Maze2dModeError;
 pub use ball::Ball;
 pub use demonstrator::Demonstrator;
 pub use demonstrator_bot::DemonstratorBot;
 pub use game::Maze2d;
 pub use level::Maze2dLevel;
-pub use mode::{Contact, Maze2dMode, Maze2dModeError};
+pub use mode::{Contact, Maze2dMode};
 pub use plugin::{Maze2dPlugin, Maze2dSystems};
 pub use sighted::SightedMaze2d;

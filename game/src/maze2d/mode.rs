@@ -3,11 +3,9 @@
 use std::{fmt, str::FromStr};
 
 use bevy_playbot::unknown_name::UnknownName;
-use playbot_lab::mode::ModeError;
-use thiserror::Error;
 
 use super::walls::D4RL_OFFSET;
-use crate::maze::{Map, Maze, MazeError, OptionError};
+use crate::maze::{Map, Maze, MazeError, MazeModeError, OptionError};
 
 /// What the walls do to the ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,39 +39,6 @@ pub struct Maze2dMode {
     pub contact: Contact,
     /// The demonstrator walks to one random cell after the other, as in D4RL's data. Changes nothing in the game.
     pub retarget: bool,
-}
-
-/// The text is not a mode of Maze2D.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum Maze2dModeError {
-    /// An unknown map, option or contact.
-    #[error(transparent)]
-    Name(#[from] UnknownName),
-    /// The value of an option of the map cannot be read.
-    #[error(transparent)]
-    Option(#[from] OptionError),
-    /// There is no such maze.
-    #[error(transparent)]
-    Maze(#[from] MazeError),
-    /// The limit is no number of steps.
-    #[error("`limit={0}`: write steps, at least 1, as in limit=1000")]
-    Limit(String),
-    /// An option is given twice, or with its opposite.
-    #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
-    Twice(String),
-    /// Episodes end before the demonstrator can turn to another cell.
-    #[error("`retarget` needs episodes that go on at the goal: leave out end-at-goal")]
-    RetargetEnds,
-}
-
-impl Maze2dModeError {
-    /// The error as games give it: for this mode.
-    pub fn of(self, mode: &str) -> ModeError {
-        match self {
-            Self::Name(unknown) => unknown.into(),
-            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
-        }
-    }
 }
 
 /// Options of every map, each with a value it takes.
@@ -126,7 +91,7 @@ impl Maze2dMode {
     }
 
     /// Takes one option.
-    fn set(&mut self, option: &str) -> Result<(), Maze2dModeError> {
+    fn set(&mut self, option: &str) -> Result<(), MazeModeError> {
         let (key, value) = option.split_once('=').unwrap_or((option, ""));
         match (key, value) {
             ("sparse", "") => self.sparse = true,
@@ -141,7 +106,9 @@ impl Maze2dMode {
             ("retarget", "") => self.retarget = true,
             ("limit", _) => {
                 let steps = value.parse().ok().filter(|&steps| steps > 0);
-                self.limit = steps.ok_or_else(|| Maze2dModeError::Limit(value.to_owned()))?;
+                let wanted = "write steps, at least 1, as in limit=1000";
+                let wrong = || OptionError { key: key.to_owned(), value: value.to_owned(), wanted };
+                self.limit = steps.ok_or_else(wrong)?;
             }
             _ if self.map.set_option(key, value)? => {}
             _ => return Err(self.unknown(option).into()),
@@ -198,17 +165,13 @@ fn subject(option: &str) -> &str {
 }
 
 impl FromStr for Maze2dMode {
-    type Err = Maze2dModeError;
+    type Err = MazeModeError;
 
-    fn from_str(text: &str) -> Result<Self, Maze2dModeError> {
+    fn from_str(text: &str) -> Result<Self, MazeModeError> {
         let mut parts = text.split('+');
         let mut map = Map::named(parts.next().unwrap_or_default())?;
         let options: Vec<&str> = parts.collect();
-        for (index, option) in options.iter().enumerate() {
-            if options[..index].iter().any(|earlier| subject(earlier) == subject(option)) {
-                return Err(Maze2dModeError::Twice((*option).to_owned()));
-            }
-        }
+        MazeModeError::check_once(&options, subject)?;
         // The size of a generated maze decides on the usual limit.
         for (key, value) in options.iter().filter_map(|option| option.split_once('=')) {
             map.set_option(key, value)?;
@@ -217,7 +180,8 @@ impl FromStr for Maze2dMode {
         let mut mode = Self::new(map);
         options.iter().try_for_each(|option| mode.set(option))?;
         if mode.retarget && mode.end_at_goal {
-            return Err(Maze2dModeError::RetargetEnds);
+            let why = "`retarget` needs episodes that go on at the goal: leave out end-at-goal";
+            return Err(MazeModeError::Together(why));
         }
         Ok(mode)
     }

@@ -5,7 +5,7 @@ use super::{
     level::Maze2dLevel,
     mode::{Contact, Maze2dMode},
     physics::MazePhysics,
-    soft::contact_force,
+    soft_contact::contact_force,
     walls::Walls,
 };
 

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use playbot_lab::inspect::{InspectError, Print, TraceRequest, plain, read_text};
 
+use crate::maze::MazeModeError;
+
 use super::{
-    Ball, Maze2dLevel, Maze2dMode, Maze2dModeError,
+    Ball, Maze2dLevel, Maze2dMode,
     ball::{Vec2d, clip_action},
     sim::BallSim,
 };
@@ -20,7 +22,7 @@ pub(super) fn run(request: &TraceRequest, print: Print) -> Result<Option<String>
         ));
     };
     let name = request.mode.unwrap_or("medium");
-    let mode: Maze2dMode = name.parse().map_err(|error: Maze2dModeError| error.of(name))?;
+    let mode: Maze2dMode = name.parse().map_err(|error: MazeModeError| error.of(name))?;
     let mut level = Maze2dLevel::new(&mode, request.seed).map_err(|error| InspectError::Usage(error.to_string()))?;
     if !request.start.is_empty() {
         level.start = start(request.start, &level)?;

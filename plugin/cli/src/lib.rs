@@ -7,6 +7,7 @@ mod tell;
 mod bench;
 mod config;
 mod demo;
+mod doctor;
 mod error;
 mod eval;
 mod experiment;
@@ -64,6 +65,7 @@ Examples:
   playbot record coinrun --levels easy:0..9 --out my.demo
   playbot play coinrun --seed 7 --record my.demo   play it yourself
   playbot demo verify demos/coinrun
+  playbot doctor coinrun                           is the game the same every time?
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
@@ -86,6 +88,8 @@ enum Verb {
     Play(play::Args),
     /// Look at, check and repair recordings.
     Demo(demo::Args),
+    /// Check that a game plays the same when it is given the same actions, and find what differs.
+    Doctor(doctor::Args),
     /// Learn the skill model from recordings.
     LearnSkills(learn_skills::Args),
     /// Train a policy.
@@ -158,6 +162,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Record(args) => record::run(args, games),
         Verb::Play(args) => play::run(args, games),
         Verb::Demo(args) => demo::run(args, games),
+        Verb::Doctor(args) => doctor::run(args, games),
         Verb::LearnSkills(args) => learn_skills::run(args, games),
         Verb::Train(args) => train::run(args, games),
         Verb::Study(args) => study::run(args, games),

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
     policy::{ActionDraw, in_words},
     policy_file::policy_observation,
     skill_prior::SkillPrior,
     vision::ObservationConfig,
 };
+use playbot_lab::policy_export::check_policy;
 use playbot_lab::sensors::GameSensors;
 use playbot_lab::{
     eval::Player,

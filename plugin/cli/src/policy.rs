@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::policy_file::policy_observation;
 use playbot_lab::games::Games;
+use playbot_lab::policy_export::check_policy;
 use playbot_lab::{
     game::Game,
     policy_export::{export_policy, policy_file},

@@ -145,7 +145,7 @@ fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
 }
 
 fn open_writer(game: &dyn Game, mode: &str, args: &Args) -> Result<DemoWriter, CliError> {
-    let mut header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), demo_actions(&game.actions()));
+    let mut header = game.demo_header(mode);
     header.demonstrator = game.demonstrator().unwrap_or("none").to_owned();
     header.action_noise = args.noise;
     if args.observations {

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 pub use bevy_playbot::episode::EpisodeResult;
 
-use crate::{game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world};
+use crate::{arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world};
 use bevy_playbot::{
     agent::Agent,
     bot::BlindBot,
@@ -174,7 +174,12 @@ fn play(
     follow: bool,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Vec<Trail>, EvalError> {
-    let worlds: Result<Vec<_>, _> = (0..plan.worlds).map(|world| stage(game, player, plan, world)).collect();
+    if let Some(problem) = game.problem() {
+        return Err(Fault(problem).into());
+    }
+    let arrangement = Arrangement::new(game, plan.arenas, plan.worlds);
+    let worlds: Result<Vec<_>, _> =
+        arrangement.first_agents().map(|first| stage(game, player, plan, arrangement, first)).collect();
     let mut worlds = worlds?;
     let followed = follow.then_some(game);
     let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, followed, &progress));
@@ -187,10 +192,14 @@ fn play(
 }
 
 /// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
-fn stage(game: &dyn Game, player: &Player, plan: &EvalPlan, world_index: u32) -> Result<World, VisionError> {
-    let per_world = (plan.arenas / plan.worlds).max(1);
-    let total = (per_world * plan.worlds) as usize;
-    let first = world_index * per_world;
+fn stage(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    arrangement: Arrangement,
+    first: u32,
+) -> Result<World, VisionError> {
+    let (per_world, total) = (arrangement.arenas, arrangement.total() as usize);
     let sight = if matches!(player, Player::Policy { .. }) { plan.sight } else { ObservationConfig::default() };
     let (mut world, agents) = build_observing_world(game, &plan.split.mode, &sight, plan.seed, first, per_world)?;
     world.init_resource::<Results>();

@@ -1,6 +1,6 @@
 //! What the plugin needs to know of a game in order to build it headless, many arenas at a time.
 
-use bevy::prelude::*;
+use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use crate::{
     benchmark::Benchmark,
@@ -10,9 +10,13 @@ use crate::{
 };
 use bevy_playbot::{
     action::ActionSpace,
+    agent::has_no_actions,
     bot::BlindBot,
+    demo::{file::DemoHeader, recorder::demo_actions},
+    headless_plugins::HeadlessPlugins,
     key_bindings::KeyBindings,
     observation::{Observation, ObservationSpace},
+    placement::TickPlacement,
     policy_file::GameCard,
     unknown_name::UnknownName,
     vision::Picture,
@@ -53,8 +57,33 @@ pub trait Game: Send + Sync {
         None
     }
 
-    /// Fixed ticks per second of game time.
+    /// Ticks per second of game time.
     fn tick_hz(&self) -> f64;
+
+    /// What a tick is made of. Under [`TickPlacement::Frame`] the game is built into a World with
+    /// [`HeadlessPlugins`], as [`headless_plugins`](Self::headless_plugins) has them; else into one with time and nothing
+    /// more.
+    fn placement(&self) -> TickPlacement {
+        TickPlacement::Fixed
+    }
+
+    /// Bevy's plugins for a headless World under [`TickPlacement::Frame`]: the usual ones, unless the game leaves some
+    /// out.
+    fn headless_plugins(&self, usual: HeadlessPlugins) -> PluginGroupBuilder {
+        usual.build()
+    }
+
+    /// Most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any
+    /// number. Whoever plays many arenas at a time builds more Worlds instead; one agent more is a fault.
+    fn arenas_per_world(&self) -> Option<u32> {
+        None
+    }
+
+    /// What is wrong with the game, so that it cannot be played at all.
+    fn problem(&self) -> Option<String> {
+        has_no_actions(&self.actions())
+            .then(|| format!("the game `{}` has no actions: say what an agent can do", self.name()))
+    }
 
     /// Actions of every agent.
     fn actions(&self) -> ActionSpace;
@@ -75,6 +104,11 @@ pub trait Game: Send + Sync {
     /// How the game is drawn for agents that see pictures; `None` if it cannot be drawn.
     fn picture(&self) -> Option<Picture> {
         None
+    }
+
+    /// Whether agents can see it through a camera of its own, without a [`picture`](Self::picture).
+    fn has_camera(&self) -> bool {
+        false
     }
 
     /// Adds what is drawn to an app, after [`build`](Self::build): sprites, tiles and transforms for everything that the
@@ -158,6 +192,11 @@ pub trait Game: Send + Sync {
     /// Adds the view in space to a window's app, with a [`CameraFocus`](crate::space_view::CameraFocus) on agents.
     fn build_space_view(&self, _app: &mut App) {}
 
+    /// The head of a recording of the game in this mode.
+    fn demo_header(&self, mode: &str) -> DemoHeader {
+        DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()))
+    }
+
     /// What the game says of itself to policy files.
     fn card(&self) -> GameCard {
         GameCard {
@@ -166,7 +205,7 @@ pub trait Game: Send + Sync {
             observations: self.observation().names,
             actions: self.actions(),
             action_names: self.action_names(),
-            has_picture: self.picture().is_some(),
+            has_picture: self.picture().is_some() || self.has_camera(),
         }
     }
 }

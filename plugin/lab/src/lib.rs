@@ -3,21 +3,26 @@
 //! - A [`Game`](game::Game) says how a game is built without a window, many arenas at a time.
 //! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
 //! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
-//! - [`policy_export`] makes the one file that a game ships with, for
+//! - [`doctor`] finds out whether a game plays the same when it is given the same actions, and what differs if not.
+//! - [`pipeline`] goes the whole road with four function calls; [`policy_export`] makes the one file that a game ships with, for
 //!   [`policy_file`](bevy_playbot::policy_file) to load there.
 //!
 //! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.
 
+pub mod arrangement;
 pub mod benchmark;
 pub mod demo;
+pub mod doctor;
 pub mod eval;
 pub mod floor_plan;
+pub mod foreign;
 pub mod game;
 pub mod games;
 pub mod held_out;
 pub mod inspect;
 pub mod mode;
 pub mod parallel;
+pub mod pipeline;
 pub mod policy_export;
 pub mod prelude;
 pub mod report;

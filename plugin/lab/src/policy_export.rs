@@ -5,7 +5,7 @@ use std::path::Path;
 use playbot_learner::{FileError, Observations, Policy, PolicyCard, PolicyFile, SkillSource};
 use thiserror::Error;
 
-use crate::{game::Game, split::LevelSplit, train::collect::Collector};
+use crate::{arrangement::at_most, game::Game, split::LevelSplit, train::collect::Collector};
 use bevy_playbot::{
     fault::Fault,
     policy_file::policy_observation,
@@ -14,7 +14,7 @@ use bevy_playbot::{
 };
 
 /// Arenas and ticks of the short play from which a file's examples are taken.
-const EXAMPLE_ARENAS: u32 = 4;
+const EXAMPLE_ARENAS: usize = 4;
 const EXAMPLE_TICKS: usize = 32;
 /// Every so many of its rows becomes an example.
 const EXAMPLE_STRIDE: usize = 9;
@@ -71,8 +71,10 @@ pub fn export_policy(
 ) -> Result<(), ExportError> {
     let prior = file.skills.as_ref().map(SkillPrior::from);
     let latent = file.policy.latent();
-    let mut collector = Collector::new(game, levels, &policy_observation(file)?, seed, 0, EXAMPLE_ARENAS, prior)?;
-    let (rollout, _) = collector.collect(&file.policy, latent, EXAMPLE_TICKS)?;
+    let arenas = at_most(game, EXAMPLE_ARENAS);
+    let ticks = EXAMPLE_TICKS * EXAMPLE_ARENAS / arenas;
+    let mut collector = Collector::new(game, levels, &policy_observation(file)?, seed, 0, arenas as u32, prior)?;
+    let (rollout, _) = collector.collect(&file.policy, latent, ticks)?;
     let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
     let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
     let n = rows.len();

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
+    headless_plugins::HeadlessPlugins,
     observation::VectorSensor,
     raster::{RasterPlugin, RasterSensor},
     vision::{ObservationConfig, ObservationKind, VisionError},
@@ -29,6 +30,12 @@ pub trait GameSensors {
     /// See [`VisionError`].
     fn build(&self, game: &dyn Game, app: &mut App) -> Result<(), VisionError>;
 
+    /// Bevy's plugins for a headless World whose agents see so.
+    fn headless_plugins(&self) -> HeadlessPlugins;
+
+    /// Whether it is a game's own camera that they see through.
+    fn is_own_camera(&self, game: &dyn Game) -> bool;
+
     /// Gives an agent the sensor. One that sees pictures needs no vector, which costs time to fill.
     fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity);
 }
@@ -46,7 +53,7 @@ impl GameSensors for ObservationConfig {
             return Ok(());
         }
         self.image.check()?;
-        if game.picture().is_none() {
+        if game.picture().is_none() && !self.is_own_camera(game) {
             return Err(VisionError::NoPicture { game: game.name() });
         }
         if self.kind == ObservationKind::Camera && !cfg!(feature = "camera") {
@@ -65,13 +72,33 @@ impl GameSensors for ObservationConfig {
             #[cfg(not(feature = "camera"))]
             ObservationKind::Camera => return Err(VisionError::NoCamera),
         };
-        game.build_picture(app);
+        if !self.is_own_camera(game) {
+            game.build_picture(app);
+        }
         Ok(())
     }
 
+    fn headless_plugins(&self) -> HeadlessPlugins {
+        match self.kind {
+            #[cfg(feature = "camera")]
+            ObservationKind::Camera => HeadlessPlugins::drawing(),
+            _ => HeadlessPlugins::default(),
+        }
+    }
+
+    fn is_own_camera(&self, game: &dyn Game) -> bool {
+        self.kind == ObservationKind::Camera && game.has_camera()
+    }
+
     fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity) {
-        let Some(picture) = game.picture() else { return };
         let mut entity = world.entity_mut(agent);
+        #[cfg(feature = "camera")]
+        if self.is_own_camera(game) {
+            entity.insert(bevy_playbot::camera::CameraSensor::of_game(self.image));
+            entity.remove::<VectorSensor>();
+            return;
+        }
+        let Some(picture) = game.picture() else { return };
         match self.kind {
             ObservationKind::Vector => return,
             ObservationKind::Raster => entity.insert(RasterSensor::following(agent, picture.width, self.image)),

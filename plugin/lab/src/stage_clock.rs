@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use bevy::prelude::*;
 
-use bevy_playbot::systems::PlaybotSystems;
+use bevy_playbot::{placement::TickSchedules, systems::PlaybotSystems};
 
 /// Seconds spent in the parts of a tick. Insert it to measure; without it no clock is read.
 #[derive(Resource, Debug, Clone)]
@@ -39,8 +39,9 @@ impl StageClock {
 /// Adds the readings between the parts of a tick.
 pub(crate) fn add_readings(app: &mut App) {
     let measuring = resource_exists::<StageClock>;
+    let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
     app.add_systems(
-        FixedPreUpdate,
+        decide,
         (
             start.before(PlaybotSystems::Begin),
             after_simulation.after(PlaybotSystems::Begin).before(PlaybotSystems::Observe),
@@ -50,7 +51,7 @@ pub(crate) fn add_readings(app: &mut App) {
             .run_if(measuring),
     )
     .add_systems(
-        FixedPostUpdate,
+        judge,
         (after_simulation.before(PlaybotSystems::Judge), after_recording.after(PlaybotSystems::Reset))
             .run_if(measuring),
     );

@@ -2,7 +2,12 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    headless::{headless_app, into_world, set_tick_rate},
+    agent::AgentLimit,
+    demo::{file::DemoHeader, recorder::demo_actions},
+    fault::Faults,
+    headless::{headless_app, headless_frame_app, into_world, set_tick_rate},
+    panics::{EpisodeTrace, PanicReports},
+    placement::TickPlacement,
     policy::PlaybotSeed,
     vision::{ObservationConfig, VisionError},
 };
@@ -30,11 +35,24 @@ pub fn build_observing_world(
     first: u32,
     count: u32,
 ) -> Result<(World, Vec<Entity>), VisionError> {
-    let mut app = headless_app();
-    set_tick_rate(&mut app, game.tick_hz());
+    sight.check(game)?;
+    let mut app = match game.placement() {
+        TickPlacement::Fixed => {
+            let mut app = headless_app();
+            set_tick_rate(&mut app, game.tick_hz());
+            app
+        }
+        TickPlacement::Frame => headless_frame_app(game.headless_plugins(sight.headless_plugins()), game.tick_hz()),
+    };
     add_game(game, &mut app, mode, sight, seed)?;
+    let actions = demo_actions(&game.actions());
+    let header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), actions);
+    PanicReports::new(header, std::env::temp_dir()).add_to(&mut app);
     let mut world = into_world(app);
     let agents = spawn_agents(game, &mut world, sight, first, count);
+    for &agent in &agents {
+        world.entity_mut(agent).insert(EpisodeTrace::default());
+    }
     Ok((world, agents))
 }
 
@@ -52,6 +70,12 @@ pub fn add_game(
     seed: u64,
 ) -> Result<(), VisionError> {
     app.insert_resource(PlaybotSeed(seed));
+    if let Some(most) = game.arenas_per_world() {
+        app.insert_resource(AgentLimit { game: game.name(), most });
+    }
+    if let (Some(problem), Some(mut faults)) = (game.problem(), app.world_mut().get_resource_mut::<Faults>()) {
+        faults.report(problem);
+    }
     stage_clock::add_readings(app);
     game.build(app, mode);
     sight.build(game, app)

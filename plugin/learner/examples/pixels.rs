@@ -7,12 +7,12 @@
 #![allow(clippy::print_stdout)]
 
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionRows, Activation, Adam, AdamConfig, CnnKind, ImageNet, ObsRows, tracked};
+use playbot_learner::nn::{ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, ObsBatch, tracked};
 use playbot_learner::policy::{Actor, Critic, NetInput, NetShape};
 use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, gradient_step};
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal, unit};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, Observations, PolicySpec,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, Learner, Observations, PolicySpec,
     PpoConfig, PpoLearner, Rollout, ScoreConfig, SkillConfig, SkillTrainer, StdKind,
 };
 use std::time::Instant;
@@ -55,15 +55,15 @@ fn split(name: &str, cnn: &CnnKind) -> Result<(), LearnError> {
     let heads = PpoNets { actor: actor.clone(), critic: critic.clone() };
     let whole = PpoNets { actor: actor.with_cnn(trunk.clone()), critic };
     let Observations::Image(bytes) = pixels(rows, &mut rng) else { return Ok(()) };
-    let images = || match ObsRows::pixels(bytes.clone(), [rows, 3, 64, 64], &device) {
-        ObsRows::Image(x) => x,
-        ObsRows::Vector(_) => unreachable!("made of pixels"),
+    let images = || match ObsBatch::pixels(bytes.clone(), [rows, 3, 64, 64], &device) {
+        ObsBatch::Image(x) => x,
+        ObsBatch::Vector(_) => unreachable!("made of pixels"),
     };
     let x = images();
     let features = trunk.forward(x.clone());
     let column = |value: f32| Tensor::<1>::full([rows], value, &device);
     let ppo = PpoBatch {
-        actions: ActionRows::new(&Actions::Discrete((0..rows).map(|_| below(&mut rng, 15) as u32).collect()), &device),
+        actions: ActionBatch::new(&Actions::Discrete((0..rows).map(|_| below(&mut rng, 15) as u32).collect()), &device),
         old_log_probs: column(-15.0f32.ln()),
         advantages: Tensor::from_data(
             TensorData::new((0..rows).map(|_| normal(&mut rng)).collect::<Vec<f32>>(), [rows]),
@@ -74,7 +74,7 @@ fn split(name: &str, cnn: &CnnKind) -> Result<(), LearnError> {
     };
     let step = |nets: &PpoNets, inputs: NetInput| {
         let (mut nets, mut adam) = (tracked(nets), Adam::new(AdamConfig::default()));
-        let batch = Minibatch { inputs, ppo: ppo.clone(), decoder: None };
+        let batch = Minibatch { inputs, ppo: ppo.clone(), teacher: None };
         best(5, || gradient_step(&mut nets, &mut adam, &batch, &PpoConfig::default(), None, 1e-4).map(drop))
     };
     let to_numbers = best(5, || {

@@ -7,8 +7,8 @@
 use playbot_learner::nn::Parameters;
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal, unit};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, PpoConfig, PpoLearner, Rollout, ScoreConfig,
-    SkillConfig, SkillTrainer,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, Learner, PpoConfig, PpoLearner, Rollout,
+    ScoreConfig, SkillConfig, SkillTrainer,
 };
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -9,7 +9,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 use playbot_learner::nn::{
-    ActionRows, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, ObsRows, tracked,
+    ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, ObsBatch, tracked,
 };
 use playbot_learner::policy::{Actor, Critic, NetShape};
 use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, gradient_step};
@@ -87,13 +87,13 @@ fn ppo(rounds: usize) -> Result<(), LearnError> {
     let batch = Minibatch {
         inputs: Tensor::<2>::from_data(TensorData::new(inputs, [rows, obs_dim]), &device).into(),
         ppo: PpoBatch {
-            actions: ActionRows::new(&Actions::Discrete(actions), &device),
+            actions: ActionBatch::new(&Actions::Discrete(actions), &device),
             old_log_probs: column() * 0.01 - (choices as f32).ln(),
             advantages: column(),
             old_values: column(),
             returns: column(),
         },
-        decoder: None,
+        teacher: None,
     };
     let config = PpoConfig::default();
     let mut adam = Adam::new(AdamConfig::default());
@@ -114,9 +114,9 @@ fn cnn(name: &str, kind: &CnnKind, batch: usize, rounds: usize) -> Result<(), Le
     let target = Tensor::<2>::from_data(TensorData::new(target, [batch, kind.features()]), &device);
     let features = |net: &ImageNet| {
         let shape = [batch, image.channels, image.height, image.width];
-        match ObsRows::pixels(pixels.clone(), shape, &device) {
-            ObsRows::Image(x) => Ok(net.forward(x)),
-            ObsRows::Vector(_) => Err(LearnError::Config("pixels are images".to_owned())),
+        match ObsBatch::pixels(pixels.clone(), shape, &device) {
+            ObsBatch::Image(x) => Ok(net.forward(x)),
+            ObsBatch::Vector(_) => Err(LearnError::Config("pixels are images".to_owned())),
         }
     };
     time(&format!("{name} 64x64x3, batch {batch}, features alone"), rounds, || {

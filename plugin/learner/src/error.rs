@@ -55,7 +55,7 @@ pub enum LearnError {
     NoWindow {
         /// Window length in steps.
         window: usize,
-        /// Steps of the longest episode; by [`crate::WindowRule::Legacy`] of all together.
+        /// Steps of the longest episode; where windows may cross the ends of episodes, of all together.
         longest: usize,
     },
     /// A policy copied from the decoder does not act like the decoder.

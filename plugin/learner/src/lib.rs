@@ -11,6 +11,7 @@
 //!   the skill z, starts as a copy of the decoder, and pays for leaving it where the decoder is sure ([`ScoreConfig`]).
 //! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps what was
 //!   played and learns from it again and again.
+//! - Training code needs to know neither: both implement [`Learner`].
 //!
 //! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Rows are flat `f32` slices in host
 //! memory (bytes for pixels), row-major ([`ObsSlice`]). All randomness comes from generators that the caller owns or
@@ -20,7 +21,7 @@
 //!
 //! ```
 //! use playbot_learner::rng::Streams;
-//! use playbot_learner::{ActionSpace, DeviceKind, PolicySpec, PpoConfig, PpoLearner};
+//! use playbot_learner::{ActionSpace, DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner};
 //!
 //! let spec = PolicySpec { obs: 2.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
 //! let learner = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?;
@@ -35,12 +36,12 @@
 mod device;
 mod error;
 mod file;
-mod layout;
+mod learner;
 pub mod nn;
 pub mod norm;
 mod observation;
-mod observations;
 pub mod policy;
+mod policy_file;
 pub mod ppo;
 pub mod rng;
 mod rollout;
@@ -53,18 +54,24 @@ mod spec;
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
 pub use file::write_atomically;
+pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;
-pub use observation::{ImageShape, ObsKind};
-pub use observations::{ObsSlice, Observations};
-pub use policy::{PictureCard, Policy, PolicyCard, PolicyFile, PolicyOutput, SkillSource, StdKind};
+pub use observation::{ImageShape, ObsKind, ObsSlice, Observations, PictureCard};
+pub use policy::{Policy, PolicyOutput, StdKind};
+pub use policy_file::{PolicyCard, PolicyFile};
 pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};
 pub use rng::{RngState, Streams};
 pub use rollout::{EndStates, Rollout, RolloutStep};
 pub use sac::{EntropyCoef, SacConfig, SacLearner, SacMetrics};
-pub use score::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
+pub use score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{
     ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
-    SkillProgress, SkillTrainer, WindowRule,
+    SkillProgress, SkillSource, SkillTrainer, WindowRule,
 };
 pub use space::{Action, ActionSpace, Actions};
 pub use spec::{PolicySpec, TimeLimit};
+
+/// What the README shows is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,5 @@
 //! What a policy reads and does, and what the end of its time means to a learner.
 
-use crate::nn::Activation;
-use crate::policy::NetShape;
 use crate::{ActionSpace, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
@@ -29,12 +27,6 @@ impl PolicySpec {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
         Ok(())
-    }
-
-    /// Sizes of a network with these hidden layers that reads the skill and `obs_dim` numbers: the observation, or the
-    /// features of an image.
-    pub(crate) fn net_shape(&self, obs_dim: usize, hidden: &[usize], activation: Activation) -> NetShape {
-        NetShape { obs_dim, latent: self.latent, hidden: hidden.to_vec(), activation }
     }
 }
 

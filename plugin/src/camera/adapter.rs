@@ -12,12 +12,12 @@ fn settings() -> WgpuSettings {
     WgpuSettings { backends: Some(Backends::from_env().unwrap_or(Backends::PRIMARY)), ..WgpuSettings::default() }
 }
 
-pub(super) fn creation() -> RenderCreation {
+pub(crate) fn creation() -> RenderCreation {
     settings().into()
 }
 
 /// Settings of a renderer that draws nothing.
-pub(super) fn none() -> RenderCreation {
+pub(crate) fn none() -> RenderCreation {
     WgpuSettings { backends: None, ..WgpuSettings::default() }.into()
 }
 

@@ -41,6 +41,9 @@ pub enum CameraError {
     /// The camera was despawned, or is none.
     #[error("the camera {0} of its sensor does not exist or is no camera; despawn the sensor with its camera")]
     NoCamera(Entity),
+    /// The game has no camera.
+    #[error("the game has no active camera of its own to look through; spawn one when a level begins")]
+    NoOwnCamera,
     /// Two agents want different things of one camera.
     #[error("another agent looks through the same camera {0} in another size; give them the same size")]
     CameraShared(Entity),

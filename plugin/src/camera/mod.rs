@@ -36,6 +36,7 @@ mod scene_schedule;
 mod sensor;
 mod tiles;
 
+pub(crate) use adapter::{creation as drawing, none as not_drawing};
 pub use error::CameraError;
 pub use eye::SensorCamera;
 pub use plugin::CameraSensorPlugin;

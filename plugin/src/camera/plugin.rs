@@ -16,6 +16,7 @@ use super::{
     scene_schedule::add_renderer,
 };
 use crate::{
+    headless_plugins::NoScreen,
     systems::ObserveSchedule,
     vision::{VisionError, VisionPlugin, VisionSystems},
 };
@@ -58,7 +59,7 @@ impl CameraSensorPlugin {
 
 impl Plugin for CameraSensorPlugin {
     fn build(&self, app: &mut App) {
-        if app.is_plugin_added::<RenderPlugin>() {
+        if app.is_plugin_added::<RenderPlugin>() && !app.world().contains_resource::<NoScreen>() {
             app.add_systems(Last, renderer::draw_windows);
             app.insert_resource(ShowsWindows);
         }

@@ -2,7 +2,7 @@
 
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
-use super::{CameraError, CameraSensor, CameraSource};
+use super::{CameraError, CameraSensor, CameraSource, SensorCamera};
 use crate::{
     agent::{Agent, AgentOrder},
     control::Control,
@@ -56,6 +56,8 @@ pub(super) fn requests(world: &mut World) -> Asked {
     let limit =
         world.get_resource::<RenderDevice>().map_or(u32::MAX, |device| device.limits().max_texture_dimension_2d);
     let mut sensors = world.query::<((&Agent, &Control, &Episode), (&CameraSensor, &ImageSensor))>();
+    let mut cameras = world.query_filtered::<(Entity, &'static Camera), Without<SensorCamera>>();
+    cameras.update_archetypes(world);
     let mut asked = Asked::default();
     let mut refused = Vec::new();
     for &entity in world.resource::<AgentOrder>().entities() {
@@ -70,6 +72,12 @@ pub(super) fn requests(world: &mut World) -> Asked {
             CameraSource::Following { target, width } => {
                 check_target(world, target, width).map(|()| asked.following.push((request, target, width)))
             }
+            CameraSource::OfGame => match own_camera(world, &cameras) {
+                Some(camera) => {
+                    check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
+                }
+                None => Err(CameraError::NoOwnCamera),
+            },
             CameraSource::Camera(camera) => {
                 check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
             }
@@ -80,6 +88,15 @@ pub(super) fn requests(world: &mut World) -> Asked {
         report(world, [request].into_iter(), error);
     }
     asked
+}
+
+/// The game's own camera: of the active ones, the one that draws first.
+fn own_camera(
+    world: &World,
+    cameras: &QueryState<(Entity, &'static Camera), Without<SensorCamera>>,
+) -> Option<Entity> {
+    let active = cameras.iter_manual(world).filter(|(_, camera)| camera.is_active);
+    active.min_by_key(|(entity, camera)| (camera.order, *entity)).map(|(entity, _)| entity)
 }
 
 fn check_size(options: &ImageOptions, limit: u32) -> Result<(), CameraError> {

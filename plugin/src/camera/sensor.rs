@@ -16,6 +16,8 @@ pub enum CameraSource {
     },
     /// Through a camera of the game.
     Camera(Entity),
+    /// Through the game's own camera, whichever entity that is now: of several active ones, the one that draws first.
+    OfGame,
 }
 
 /// Fills an agent's [`Frame`](crate::vision::Frame) with what Bevy's renderer draws.
@@ -34,6 +36,11 @@ impl CameraSensor {
     /// The components of an agent that sees `width` units of the world around `target`.
     pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
         (Self { source: CameraSource::Following { target, width } }, ImageSensor(image))
+    }
+
+    /// The components of an agent that sees what the game's own camera sees: see [`CameraSource::OfGame`].
+    pub fn of_game(image: ImageOptions) -> (Self, ImageSensor) {
+        (Self { source: CameraSource::OfGame }, ImageSensor(image))
     }
 
     /// The components of an agent that sees what a camera of the game sees, 2D or 3D, squeezed into the picture's size.

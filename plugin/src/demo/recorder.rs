@@ -80,7 +80,7 @@ pub fn demo_actions(space: &ActionSpace) -> DemoActions {
     }
 }
 
-fn decider(control: Control) -> Decider {
+pub(crate) fn decider(control: Control) -> Decider {
     match control {
         Control::Human => Decider::Human,
         Control::Bot => Decider::Bot,
@@ -90,7 +90,7 @@ fn decider(control: Control) -> Decider {
     }
 }
 
-fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
+pub(crate) fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
     match (actions, action) {
         (EpisodeActions::Discrete(list), ActionValue::Discrete(index)) => list.push(*index),
         (EpisodeActions::Continuous { values, .. }, ActionValue::Continuous(row)) => values.extend_from_slice(row),

@@ -1,29 +1,10 @@
 //! All pictures of CoinRun, made anew from their sources.
 
 mod backdrop;
-mod canvas;
+pub mod canvas;
+mod pictures;
 mod scenes;
 mod sheet;
 mod sprite_text;
 
-pub use canvas::Canvas;
-
-/// The drawings of tiles and figures.
-pub const SPRITES: &str = include_str!("../../../../assets/coinrun/sprites.txt");
-
-/// Every picture with its file name in `assets/coinrun`.
-///
-/// # Errors
-///
-/// The drawings cannot be read: the line and what is wrong with it.
-pub fn pictures() -> Result<Vec<(String, Canvas)>, String> {
-    let drawings = sprite_text::read(SPRITES)?;
-    let mut pictures = vec![("figures.png".to_owned(), sheet::figures(&drawings)?)];
-    for ground in sheet::GROUNDS {
-        pictures.push((format!("ground_{ground}.png"), sheet::ground(&drawings, ground)?));
-    }
-    for scene in scenes::all() {
-        pictures.push((format!("backdrop_{}.png", scene.name), backdrop::paint(&scene)));
-    }
-    Ok(pictures)
-}
+pub use pictures::pictures;

@@ -6,7 +6,7 @@ use playbot_lab::prelude::*;
 
 use super::{
     art::{Art, Pose},
-    dress::Scenery,
+    scenery::{PLAYER_HEIGHT, Scenery},
 };
 use crate::coinrun::{
     components::{Arena, ArenaBody, Crate, Enemy, InArena, PlayerBody, PlayerMemory, PlaysIn, Saw},
@@ -18,8 +18,6 @@ use crate::coinrun::{
 const STEP_TICKS: u32 = 5;
 /// A player slower than this stands, tiles per tick.
 const STANDING: f32 = 0.01;
-/// Height of a player's picture in heights of its body; its feet are at the body's.
-pub(super) const PLAYER_HEIGHT: f32 = 1.7415;
 
 /// Player, and the clock of its arena.
 pub(super) fn players(

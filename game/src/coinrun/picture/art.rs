@@ -13,7 +13,7 @@ use crate::coinrun::Tile;
 
 macro_rules! drawing {
     ($name:literal) => {
-        include_bytes!(concat!("../../../../assets/coinrun/", $name, ".png"))
+        include_bytes!(concat!("../../../assets/coinrun/", $name, ".png"))
     };
 }
 

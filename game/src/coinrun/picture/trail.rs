@@ -4,8 +4,8 @@ use bevy::prelude::*;
 
 use super::{
     art::Art,
-    dress::{BLOCKS, Scenery},
     puffs::{PUFFS, Row},
+    scenery::{BLOCKS, Scenery},
 };
 use crate::coinrun::{
     components::{Arena, ArenaBody, InArena, PlayerBody},

@@ -1,7 +1,6 @@
 //! A player that follows plans and makes a new one whenever something else happened.
 
-use super::search::Found;
-use super::{PlannerConfig, plan_or_progress};
+use super::{config::PlannerConfig, plan::plan_or_progress, search::Found};
 use crate::coinrun::sim::Sim;
 
 /// An actor in a closed loop: ask it for an action, play that action or another one, ask again.

@@ -1,8 +1,6 @@
 //! A proof that the coin cannot be reached: a flood fill that allows more than the rules do.
 
-use crate::coinrun::level::{Level, Spawn};
-use crate::coinrun::sim::Sim;
-use crate::coinrun::tile::SIZE;
+use crate::coinrun::{level::Level, sim::Sim, spawn::Spawn, tile::SIZE};
 
 /// A jump lifts the player's centre by 6.4 tiles, so by at most this many rows.
 const JUMP_ROWS: i32 = 7;

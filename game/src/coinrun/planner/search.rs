@@ -3,8 +3,10 @@
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashSet};
 
-use super::PlannerConfig;
-use super::hazard::{is_too_close, risk};
+use super::{
+    config::PlannerConfig,
+    hazard::{is_too_close, risk},
+};
 use crate::coinrun::rules::WALK_SPEED;
 use crate::coinrun::sim::Sim;
 

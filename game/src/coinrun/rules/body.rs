@@ -1,7 +1,6 @@
 //! The rectangle that everything that moves, hurts or carries consists of.
 
 use super::constants::{BLOCK_HALF, ENEMY_SPEED, PLAYER_HALF_HEIGHT, PLAYER_HALF_WIDTH, START_CELL};
-use crate::coinrun::level::Spawn;
 
 /// An axis-aligned rectangle with a velocity.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -49,28 +48,5 @@ impl Body {
         let reach_x = (self.rx + other.rx) + margin;
         let reach_y = (self.ry + other.ry) + margin;
         (self.x - other.x).abs() < reach_x && (self.y - other.y).abs() < reach_y
-    }
-}
-
-impl Spawn {
-    pub(in crate::coinrun) fn saw(&self) -> Option<Body> {
-        match *self {
-            Spawn::Saw(cell) => Some(Body::block(cell)),
-            _ => None,
-        }
-    }
-
-    pub(in crate::coinrun) fn enemy(&self) -> Option<Body> {
-        match *self {
-            Spawn::Enemy { cell, dir, .. } => Some(Body::enemy(cell, dir)),
-            _ => None,
-        }
-    }
-
-    pub(in crate::coinrun) fn solid_crate(&self) -> Option<Body> {
-        match *self {
-            Spawn::Crate { cell, .. } => Some(Body::block(cell)),
-            _ => None,
-        }
     }
 }

@@ -10,7 +10,7 @@ use bevy::{
 
 macro_rules! drawing {
     ($name:literal) => {
-        include_bytes!(concat!("../../../../assets/maze2d/", $name, ".png"))
+        include_bytes!(concat!("../../../assets/maze2d/", $name, ".png"))
     };
 }
 

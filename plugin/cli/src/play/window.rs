@@ -71,8 +71,7 @@ fn partner(game: &dyn Game, args: &Args) -> Result<(Option<Partner>, Observation
 }
 
 fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
-    let actions = demo_actions(&game.actions());
-    let header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), actions);
+    let header = game.demo_header(mode);
     DemoHeader { demonstrator: args.name.clone(), ..header }
 }
 

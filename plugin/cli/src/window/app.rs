@@ -64,7 +64,7 @@ impl GameWindow {
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         sight.check(game)?;
         let mut app = bevy_app(game.name())?;
-        app.add_plugins((PlaybotPlugin, KeyboardPlugin, TileLayerPlugin));
+        app.add_plugins((PlaybotPlugin::default(), KeyboardPlugin, TileLayerPlugin));
         set_fixed_step(&mut app, game.tick_hz());
         add_game(game, &mut app, playlist.mode(), &sight, seed)?;
         if !sight.is_image() {

@@ -7,7 +7,7 @@ use playbot_learner::{ObsKind, Observations};
 
 use super::verify::VerifyError;
 use crate::sensors::GameSensors;
-use crate::{game::Game, parallel::on_threads, worlds::build_observing_world};
+use crate::{arrangement::at_most, game::Game, parallel::on_threads, worlds::build_observing_world};
 use bevy_playbot::demo::{
     file::DemoEpisode,
     replay::{Divergence, Replay},
@@ -43,14 +43,15 @@ pub(super) fn watch(
     threads: usize,
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<Watched>, VerifyError> {
-    let threads = threads.clamp(1, jobs.len().div_ceil(SIDE_BY_SIDE).max(1));
+    let side_by_side = at_most(game, SIDE_BY_SIDE);
+    let threads = threads.clamp(1, jobs.len().div_ceil(side_by_side).max(1));
     let mut shares: Vec<Vec<Job>> = vec![Vec::new(); threads];
     for (i, job) in jobs.into_iter().enumerate() {
         shares[i % threads].push(job);
     }
     let parts = on_threads(&mut shares, threads, |share| {
         let jobs = std::mem::take(share);
-        Onlookers::new(game, sight, mode, jobs.len().min(SIDE_BY_SIDE))?.watch(jobs, progress)
+        Onlookers::new(game, sight, mode, jobs.len().min(side_by_side))?.watch(jobs, progress)
     });
     let mut all = Vec::new();
     for part in parts {

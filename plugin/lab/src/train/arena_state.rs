@@ -58,7 +58,12 @@ pub enum RestoreError {
     #[error(transparent)]
     Fault(#[from] Fault),
     /// The replayed arena is not the saved one.
-    #[error("arena {0} did not replay to its saved state: the checkpoint was made with other rules of the game")]
+    #[error(
+        "arena {0} did not replay to its saved state: the checkpoint was made with other rules of the game, or the game \
+         keeps something that a new World does not have: resources that a restart does not reset, the time that has passed \
+         (`Time`), a `Local` of a system, a random generator that is not seeded from the level, or the order in which \
+         entities are stored; `playbot doctor` finds what it is"
+    )]
     Diverged(usize),
     /// The checkpoint has another number of arenas.
     #[error("the checkpoint has {saved} arenas, the experiment {wanted}")]
@@ -116,7 +121,7 @@ pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result
     let world = collector.world_mut();
     let queues: Vec<_> = agents.iter().map(|&agent| world.get::<LevelQueue>(agent).cloned()).collect();
     for (&agent, state) in agents.iter().zip(saved) {
-        let control = if state.level.is_some() { Control::Human } else { Control::Idle };
+        let control = if state.level.is_some() { Control::Replay } else { Control::Idle };
         world.entity_mut(agent).insert((control, LevelQueue::Always(state.level.unwrap_or_default())));
     }
     replay(world, &agents, saved)?;

@@ -15,6 +15,7 @@ use bevy_playbot::{
     headless::tick_world,
     level::LevelQueue,
     observation::Observation,
+    placement::TickSchedules,
     policy::{ActionDraw, ActivePolicy, AgentStreams, Decision},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior, draw_skills},
@@ -66,7 +67,8 @@ impl Collector {
         if let Some(prior) = prior {
             world.insert_resource(prior);
         }
-        world.schedule_scope(FixedPostUpdate, |_, schedule| {
+        let judge = world.resource::<TickSchedules>().judge;
+        world.schedule_scope(judge, |_, schedule| {
             schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
         });
         for (&agent, index) in agents.iter().zip(first..) {

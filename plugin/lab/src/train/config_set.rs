@@ -63,7 +63,7 @@ mod tests {
     use std::path::Path;
 
     use playbot_learner::{
-        AlphaKind, EntropyCoef, StdKind,
+        ConfidenceKind, EntropyCoef, StdKind,
         nn::{Activation, CnnKind},
     };
 
@@ -114,7 +114,7 @@ mod tests {
         expected.ppo.lr = 1.0;
         expected.ppo.hidden = vec![64, 64];
         expected.ppo.activation = Activation::Tanh;
-        expected.score.alpha = AlphaKind::Off;
+        expected.score.confidence = ConfidenceKind::Off;
         expected.skills.prior_std = StdKind::Vector;
         expected.ppo.total_updates = Some(3);
         expected.sac.entropy = EntropyCoef::Fixed(0.5);

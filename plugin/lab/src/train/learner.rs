@@ -1,42 +1,33 @@
-//! The learners behind the algorithms, as one.
+//! The learner behind an experiment's algorithm.
 
-use std::path::Path;
-
-use playbot_learner::{
-    DeviceKind, FileError, LearnError, ObsSlice, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SacMetrics,
-    SkillModel, SkillSource, UpdateMetrics,
+use std::{
+    ops::{Deref, DerefMut},
+    path::Path,
 };
+
+pub use playbot_learner::LearnerMetrics;
+use playbot_learner::{DeviceKind, FileError, PolicySpec, PpoLearner, SacLearner, SkillModel};
 
 use super::{algorithm::Algorithm, config::Experiment, trainer::TrainError};
 use crate::game::Game;
 use crate::sensors::GameSensors;
 use bevy_playbot::vision::ObservationConfig;
 
-/// A learner of either family.
+/// The learner of an experiment's algorithm, whichever that is.
 #[derive(Debug)]
-pub enum Learner {
-    /// PPO and SCORE-PPO.
-    Ppo(Box<PpoLearner>),
-    /// SAC and SCORE-SAC.
-    Sac(Box<SacLearner>),
+pub struct Learner(Box<dyn playbot_learner::Learner>);
+
+impl Deref for Learner {
+    type Target = dyn playbot_learner::Learner;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.0
+    }
 }
 
-/// What an update of either family reports.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LearnerMetrics {
-    /// PPO and SCORE-PPO.
-    Ppo(UpdateMetrics),
-    /// SAC and SCORE-SAC.
-    Sac(SacMetrics),
-}
-
-impl LearnerMetrics {
-    /// The numbers by their TensorBoard tags; what was not measured is left out.
-    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
-        match self {
-            Self::Ppo(metrics) => metrics.scalars(),
-            Self::Sac(metrics) => metrics.scalars(),
-        }
+impl DerefMut for Learner {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut *self.0
     }
 }
 
@@ -64,78 +55,20 @@ impl Learner {
             warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
         }
         Ok(match (algorithm.is_sac(), skills) {
-            (false, None) => Self::Ppo(PpoLearner::new(ppo, spec, seed, device)?.into()),
-            (false, Some(model)) => Self::Ppo(PpoLearner::with_skill(ppo, score, model, seed, device)?.into()),
-            (true, None) => Self::Sac(SacLearner::new(sac, spec, seed, device)?.into()),
-            (true, Some(model)) => Self::Sac(SacLearner::with_skill(sac, score, model, seed, device)?.into()),
+            (false, None) => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
+            (false, Some(model)) => Self::of(PpoLearner::with_skill(ppo, score, model, seed, device)?),
+            (true, None) => Self::of(SacLearner::new(sac, spec, seed, device)?),
+            (true, Some(model)) => Self::of(SacLearner::with_skill(sac, score, model, seed, device)?),
         })
     }
 
-    /// The policy that plays now.
-    pub fn policy(&self) -> Policy {
-        match self {
-            Self::Ppo(learner) => learner.policy(),
-            Self::Sac(learner) => learner.policy(),
-        }
-    }
-
-    /// Where its skills come from, if it has any.
-    pub fn skills(&self) -> Option<SkillSource> {
-        match self {
-            Self::Ppo(learner) => learner.skills(),
-            Self::Sac(learner) => learner.skills(),
-        }
-    }
-
-    /// Width of the skills that a rollout must hold.
-    pub fn rollout_latent(&self) -> usize {
-        match self {
-            Self::Ppo(learner) => learner.rollout_latent(),
-            Self::Sac(learner) => learner.rollout_latent(),
-        }
-    }
-
-    /// Learns from a rollout.
-    ///
-    /// # Errors
-    ///
-    /// [`LearnError`] if it does not fit, or names what ran away.
-    pub fn update(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError> {
-        match self {
-            Self::Ppo(learner) => learner.update(rollout).map(LearnerMetrics::Ppo),
-            Self::Sac(learner) => learner.update(rollout).map(LearnerMetrics::Sac),
-        }
-    }
-
-    /// Mean divergence between decoder and policy over `n` rows, in nats; `None` without skills.
-    ///
-    /// # Errors
-    ///
-    /// [`LearnError::InitialKl`] if the policy should still be a copy of the decoder and is not.
-    pub fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
-        match self {
-            Self::Ppo(learner) => learner.initial_kl(z, obs, n),
-            Self::Sac(learner) => learner.initial_kl(z, obs, n),
-        }
-    }
-
-    /// Writes everything that is needed to go on bit for bit.
-    ///
-    /// # Errors
-    ///
-    /// [`FileError`] if it cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), FileError> {
-        match self {
-            Self::Ppo(learner) => learner.save(path),
-            Self::Sac(learner) => learner.save(path),
-        }
+    fn of(learner: impl playbot_learner::Learner + 'static) -> Self {
+        Self(Box::new(learner))
     }
 
     /// Takes over what an experiment may change while a training is stopped: its length, over which a learning rate falls.
     pub(crate) fn set_length(&mut self, experiment: &Experiment) {
-        if let Self::Ppo(learner) = self {
-            learner.set_total_updates(experiment.ppo_config().total_updates);
-        }
+        self.set_total_updates(experiment.ppo_config().total_updates);
     }
 
     /// Reads what the learner of this algorithm has saved.
@@ -145,8 +78,8 @@ impl Learner {
     /// [`FileError`] says what is wrong with the file.
     pub fn load(algorithm: Algorithm, path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         Ok(match algorithm.is_sac() {
-            false => Self::Ppo(PpoLearner::load(path, device)?.into()),
-            true => Self::Sac(SacLearner::load(path, device)?.into()),
+            false => Self::of(PpoLearner::load(path, device)?),
+            true => Self::of(SacLearner::load(path, device)?),
         })
     }
 }

@@ -188,7 +188,7 @@ mod tests {
         let file = |text: &str| study_runs(&experiment(text)).expect("valid")[0].skill_file().expect("Unicode");
         // As of the first release with studies; new keys must not change it.
         assert_eq!(file(""), "skills-72e1ee68-seed3.safetensors");
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments/coinrun-ablation.ron");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/experiments/coinrun-ablation.ron");
         let runs = study_runs(&crate::train::config_file::read_experiment(&shipped).expect("valid")).expect("valid");
         assert_eq!(runs[0].skill_file().expect("Unicode"), "skills-1b4ea9c2-seed1.safetensors");
         assert_ne!(file(""), file(r#"(name: "a", set: ["skills.norm_obs=true"])"#));

@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Instant};
 
 use bevy::prelude::World;
-use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel};
+use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel, SkillSource};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -15,6 +15,7 @@ use super::{
     learner::{Learner, LearnerMetrics},
     metrics_log::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
 };
+use crate::arrangement::Arrangement;
 use crate::game::Game;
 use crate::parallel::on_threads;
 use crate::sensors::GameSensors;
@@ -195,10 +196,12 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let share = experiment.arenas / experiment.worlds;
+        let arrangement = Arrangement::new(game, experiment.arenas, experiment.worlds);
+        let share = arrangement.arenas;
         let (levels, sight, seed) = (&experiment.train, experiment.sight(), experiment.seed);
-        let collectors: Result<_, _> = (0..experiment.worlds)
-            .map(|world| Collector::new(game, levels, &sight, seed, world * share, share, prior.clone()))
+        let collectors: Result<_, _> = arrangement
+            .first_agents()
+            .map(|first| Collector::new(game, levels, &sight, seed, first, share, prior.clone()))
             .collect();
         let (experiment, collectors) = (experiment.clone(), collectors?);
         Ok(Self { experiment, threads, learner, collectors, progress: Progress::default() })
@@ -223,7 +226,7 @@ impl Trainer {
         let rollout = Rollout::join(rollouts)?;
         let collect_s = start.elapsed().as_secs_f64();
         let initial_kl = self.initial_kl(&rollout)?;
-        let learner = self.learner.update(&rollout)?;
+        let learner = self.learner.learn(&rollout)?;
         self.progress.note(&finished);
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();
@@ -276,13 +279,21 @@ impl Trainer {
     }
 
     /// Where the policy's skills come from, if it has any.
+    pub fn skill_source(&self) -> Option<SkillSource> {
+        self.learner.skills()
+    }
+
+    /// The prior that draws its skills.
     pub fn skill_prior(&self) -> Option<SkillPrior> {
-        self.learner.skills().as_ref().map(SkillPrior::from)
+        self.skill_source().as_ref().map(SkillPrior::from)
     }
 }
 
 /// Whether the experiment can be run on this game.
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
+    if let Some(problem) = game.problem() {
+        return Err(Fault(problem).into());
+    }
     experiment.check()?;
     experiment.check_levels(game)?;
     experiment.sight().check(game)?;

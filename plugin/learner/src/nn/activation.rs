@@ -1,6 +1,6 @@
 //! The non-linearity between layers.
 
-use super::kernels::{self, has_kernels};
+use super::cpu::kernels::{self, has_kernels};
 use burn::tensor::{Tensor, activation};
 use serde::{Deserialize, Serialize};
 

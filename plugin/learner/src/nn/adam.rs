@@ -1,6 +1,6 @@
 //! The Adam optimizer over named parameters.
 
-use super::fast_math::vectorized;
+use super::cpu::fast_math::vectorized;
 use super::grads::NamedGrads;
 use super::params::{ParamVisitor, Parameters};
 use crate::LearnError;

@@ -1,11 +1,10 @@
 //! Convolution and pooling over images `[n, channels, height, width]`.
 
-use super::init::orthogonal;
 use super::params::{ParamVisitor, Parameters, path};
-use super::tensors::vector;
+use super::source::{Fresh, Init, ParamSource};
 use burn::tensor::module::{conv2d, max_pool2d};
 use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
 /// A two-dimensional convolution (cross-correlation) with a square kernel.
@@ -32,14 +31,26 @@ impl Conv2d {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let weight = orthogonal(outputs, inputs * kernel * kernel, gain, rng);
+        let Ok(layer) = Self::build(&mut Fresh { rng, device }, "", inputs, outputs, kernel, gain);
+        layer
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        inputs: usize,
+        outputs: usize,
+        kernel: usize,
+        gain: f64,
+    ) -> Result<Self, S::Error> {
         let shape = [outputs, inputs, kernel, kernel];
-        Self {
-            weight: Tensor::from_data(TensorData::new(weight, shape), device),
-            bias: vector(vec![0.0; outputs], device),
+        Ok(Self {
+            weight: source.param(&path(prefix, "weight"), shape, Init::Orthogonal(gain))?,
+            bias: source.param(&path(prefix, "bias"), [outputs], Init::Zeros)?,
             stride: 1,
             padding: 0,
-        }
+        })
     }
 
     /// The same layer with another stride.
@@ -74,7 +85,7 @@ pub fn max_pool(x: Tensor<4>, kernel: usize, stride: usize, padding: usize) -> T
 
 /// How many places a kernel or pooling window takes along a side of `size` pixels; `None` if it does not fit once.
 pub fn window_places(size: usize, kernel: usize, stride: usize, padding: usize) -> Option<usize> {
-    let room = (size + 2 * padding).checked_sub(kernel)?;
+    let room = size.saturating_add(2 * padding).checked_sub(kernel)?;
     Some(room / stride + 1)
 }
 
@@ -82,8 +93,9 @@ pub fn window_places(size: usize, kernel: usize, stride: usize, padding: usize) 
 mod tests {
     use super::*;
     use crate::DeviceKind;
-    use crate::nn::host;
+    use crate::nn::{host, vector};
     use crate::rng::Streams;
+    use burn::tensor::TensorData;
 
     #[test]
     fn a_convolution_by_hand() {

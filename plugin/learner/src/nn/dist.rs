@@ -27,14 +27,14 @@ pub enum Dist {
 
 /// A batch of actions on a device, one per row.
 #[derive(Clone, Debug)]
-pub enum ActionRows {
+pub enum ActionBatch {
     /// Indices, `[n, 1]`.
     Discrete(Tensor<2, Int>),
     /// Vectors, `[n, dim]`.
     Continuous(Tensor<2>),
 }
 
-impl ActionRows {
+impl ActionBatch {
     /// Moves `actions` to `device`.
     pub fn new(actions: &Actions, device: &Device) -> Self {
         let n = actions.len();
@@ -58,12 +58,12 @@ impl Dist {
     ///
     /// # Errors
     /// [`LearnError::Action`] if the actions are of the other kind.
-    pub fn log_prob(&self, actions: &ActionRows) -> Result<Tensor<1>, LearnError> {
+    pub fn log_prob(&self, actions: &ActionBatch) -> Result<Tensor<1>, LearnError> {
         match (self, actions) {
-            (Self::Categorical { log_probs }, ActionRows::Discrete(index)) => {
+            (Self::Categorical { log_probs }, ActionBatch::Discrete(index)) => {
                 Ok(log_probs.clone().gather(1, index.clone()).squeeze_dim(1))
             }
-            (Self::Gaussian { mean, log_std }, ActionRows::Continuous(action)) => {
+            (Self::Gaussian { mean, log_std }, ActionBatch::Continuous(action)) => {
                 let score = (action.clone() - mean.clone()) * log_std.clone().neg().exp();
                 let terms = score.square() * 0.5 + log_std.clone() + HALF_LN_TAU;
                 Ok(terms.sum_dim(1).squeeze_dim(1).neg())
@@ -104,14 +104,6 @@ impl Dist {
                 Ok(terms.sum_dim(1).squeeze_dim(1))
             }
             _ => Err(LearnError::Action("the distributions differ in kind".to_owned())),
-        }
-    }
-
-    /// The same numbers outside of any gradient graph.
-    pub fn detach(self) -> Self {
-        match self {
-            Self::Categorical { log_probs } => Self::Categorical { log_probs: log_probs.inner() },
-            Self::Gaussian { mean, log_std } => Self::Gaussian { mean: mean.inner(), log_std: log_std.inner() },
         }
     }
 

@@ -1,9 +1,9 @@
 //! A stack of gated recurrent layers, in one or both directions.
 
-use super::kernels::{self, has_kernels};
+use super::cpu::kernels::{self, has_kernels};
 use super::params::{ParamVisitor, Parameters, path};
-use super::{init::uniform, tensors};
-use burn::tensor::{Device, Tensor, TensorData, activation::sigmoid};
+use super::source::{Fresh, Init, ParamSource};
+use burn::tensor::{Device, Tensor, activation::sigmoid};
 use rand::Rng;
 
 /// One recurrent layer. The directions lie side by side in the first dimension.
@@ -40,25 +40,34 @@ impl Gru {
         rng: &mut R,
         device: &Device,
     ) -> Self {
+        let source = &mut Fresh { rng, device };
+        let Ok(gru) = Self::build(source, "", inputs, hidden, layers, bidirectional);
+        gru
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        inputs: usize,
+        hidden: usize,
+        layers: usize,
+        bidirectional: bool,
+    ) -> Result<Self, S::Error> {
         let directions = if bidirectional { 2 } else { 1 };
-        let bound = 1.0 / (hidden as f64).sqrt();
-        let gates = 3 * hidden;
-        let layers = (0..layers)
-            .map(|k| {
-                let width = if k == 0 { inputs } else { directions * hidden };
-                let mut cube = |rows: usize| {
-                    let values = uniform(directions * rows * gates, bound, rng);
-                    Tensor::from_data(TensorData::new(values, [directions, rows, gates]), device)
-                };
-                let (weight_ih, weight_hh) = (cube(width), cube(hidden));
-                let mut bias = || {
-                    let values = uniform(directions * gates, bound, rng);
-                    tensors::matrix(values, directions, gates, device)
-                };
-                GruLayer { weight_ih, weight_hh, bias_ih: bias(), bias_hh: bias() }
+        let init = Init::Uniform(1.0 / (hidden as f64).sqrt());
+        let gates = hidden.saturating_mul(3);
+        let layer = |k: usize| -> Result<GruLayer, S::Error> {
+            let width = if k == 0 { inputs } else { hidden.saturating_mul(directions) };
+            let prefix = path(prefix, &format!("l{k}"));
+            Ok(GruLayer {
+                weight_ih: source.param(&path(&prefix, "weight_ih"), [directions, width, gates], init)?,
+                weight_hh: source.param(&path(&prefix, "weight_hh"), [directions, hidden, gates], init)?,
+                bias_ih: source.param(&path(&prefix, "bias_ih"), [directions, gates], init)?,
+                bias_hh: source.param(&path(&prefix, "bias_hh"), [directions, gates], init)?,
             })
-            .collect();
-        Self { layers }
+        };
+        Ok(Self { layers: (0..layers).map(layer).collect::<Result<_, S::Error>>()? })
     }
 
     /// Runs over a sequence `[steps * B, inputs]`, time-major (row `t * B + b`), from `initial` states (one
@@ -176,8 +185,9 @@ impl Parameters for Gru {
 mod tests {
     use super::*;
     use crate::DeviceKind;
-    use crate::nn::{NamedGrads, host, tracked};
+    use crate::nn::{NamedGrads, host, matrix, tracked};
     use crate::rng::{Streams, normal};
+    use burn::tensor::TensorData;
 
     const STEPS: usize = 4;
     const BATCH: usize = 3;
@@ -199,8 +209,7 @@ mod tests {
         };
         let input = cube(STEPS * BATCH, 3 * hidden).autodiff().require_grad();
         let initial = cube(BATCH, hidden).autodiff().require_grad();
-        let probe =
-            tensors::matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
+        let probe = matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
         layer = tracked(&layer);
         let GruLayer { weight_hh, bias_ih, bias_hh, .. } = layer.layers[0].clone();
         let output = scan(input.clone(), weight_hh, bias_ih, bias_hh, initial.clone());

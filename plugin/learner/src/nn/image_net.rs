@@ -1,6 +1,7 @@
 //! The network that turns images into features, of either architecture.
 
 use super::params::{ParamVisitor, Parameters};
+use super::source::{Fresh, ParamSource};
 use super::{Activation, Impala, Linear, Nature};
 use crate::{ImageShape, LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
@@ -61,6 +62,21 @@ impl CnnKind {
             Self::Nature { feature } => *feature,
         }
     }
+
+    /// `Ok` if such a network can read such images.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the image is too small for the architecture, or a size is 0.
+    pub(crate) fn check_image(&self, image: ImageShape) -> Result<(), LearnError> {
+        let kind = ObsKind::Image(image);
+        if image.numbers() == 0 || self.smallest() == 0 {
+            return Err(LearnError::Config(format!("a cnn {self:?} over {kind} has a size of 0")));
+        }
+        if matches!(self, Self::Nature { .. }) && !Nature::fits(image) {
+            return Err(LearnError::Config(format!("cnn Nature needs at least 36 rows and columns, not {kind}")));
+        }
+        Ok(())
+    }
 }
 
 /// Images to features.
@@ -83,21 +99,25 @@ impl ImageNet {
         rng: &mut R,
         device: &Device,
     ) -> Result<Self, LearnError> {
-        if image.numbers() == 0 || kind.smallest() == 0 {
-            return Err(LearnError::Config(format!("a cnn {kind:?} over {} has a size of 0", ObsKind::Image(image))));
-        }
-        match kind {
+        kind.check_image(image)?;
+        let Ok(net) = Self::build(&mut Fresh { rng, device }, "", kind, image);
+        Ok(net)
+    }
+
+    /// [`Self::new`] with parameters out of `source`, for images that [`CnnKind::check_image`] allows or the source
+    /// refuses.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        kind: &CnnKind,
+        image: ImageShape,
+    ) -> Result<Self, S::Error> {
+        Ok(match kind {
             CnnKind::Impala { channels, feature } => {
-                Ok(Self::Impala(Impala::new(channels, *feature, image, rng, device)))
+                Self::Impala(Impala::build(source, prefix, channels, *feature, image)?)
             }
-            CnnKind::Nature { feature } => {
-                let net = Nature::new(*feature, image, rng, device).map(Self::Nature);
-                net.ok_or_else(|| {
-                    let image = ObsKind::Image(image);
-                    LearnError::Config(format!("cnn Nature needs at least 36 rows and columns, not {image}"))
-                })
-            }
-        }
+            CnnKind::Nature { feature } => Self::Nature(Nature::build(source, prefix, *feature, image)?),
+        })
     }
 
     /// Architecture and sizes.
@@ -157,7 +177,7 @@ impl Parameters for ImageNet {
 mod tests {
     use super::*;
     use crate::DeviceKind;
-    use crate::nn::{ObsRows, host, parameter_count};
+    use crate::nn::{ObsBatch, host, parameter_count};
     use crate::rng::Streams;
 
     fn net(kind: &CnnKind, channels: usize, height: usize, width: usize) -> Result<ImageNet, LearnError> {
@@ -175,7 +195,7 @@ mod tests {
             let net = net(kind, channels, height, width).expect("it fits");
             let pixels = (0..2 * channels * height * width).map(|i| (i * 37 % 256) as u8).collect();
             let shape = [2, channels, height, width];
-            let ObsRows::Image(x) = ObsRows::pixels(pixels, shape, &DeviceKind::Flex.plain()) else {
+            let ObsBatch::Image(x) = ObsBatch::pixels(pixels, shape, &DeviceKind::Flex.plain()) else {
                 panic!("made of pixels");
             };
             let features = net.forward(x);

@@ -1,13 +1,15 @@
 //! The image encoder of IMPALA.
 
 use super::conv::{Conv2d, max_pool, window_places};
+use super::cpu::trunk::{self, Stage};
 use super::image_net::last_layer;
 use super::params::{ParamVisitor, Parameters, path};
-use super::trunk::{self, Stage};
+use super::source::{Fresh, ParamSource};
 use super::{Activation, Linear};
 use crate::ImageShape;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
+use std::f64::consts::SQRT_2;
 
 /// Stages of convolution, pooling and residual blocks, then a linear layer (Espeholt et al. 2018, "IMPALA", the larger
 /// of its two networks, without its recurrent part).
@@ -47,22 +49,34 @@ impl Impala {
         rng: &mut R,
         device: &Device,
     ) -> Self {
+        let Ok(net) = Self::build(&mut Fresh { rng, device }, "", channels, feature, image);
+        net
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        channels: &[usize],
+        feature: usize,
+        image: ImageShape,
+    ) -> Result<Self, S::Error> {
         let (mut inputs, mut height, mut width) = (image.channels, image.height, image.width);
         let mut stages = Vec::with_capacity(channels.len());
         // A side of at least one pixel stays one.
         let pooled = |side: usize| window_places(side, 3, 2, 1).unwrap_or(1);
-        for &outputs in channels {
-            stages.push(ImpalaStage::new(inputs, outputs, rng, device));
+        for (i, &outputs) in channels.iter().enumerate() {
+            stages.push(ImpalaStage::build(source, &path(prefix, &format!("s{i}")), inputs, outputs)?);
             (inputs, height, width) = (outputs, pooled(height), pooled(width));
         }
-        let fc = Linear::new(inputs * height * width, feature, std::f64::consts::SQRT_2, rng, device);
-        Self { stages, fc }
+        let flat = inputs.saturating_mul(height).saturating_mul(width);
+        Ok(Self { stages, fc: Linear::build(source, &path(prefix, "fc"), flat, feature, SQRT_2)? })
     }
 
     /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
         let stages: Vec<Stage<'_>> = self.stages.iter().flat_map(ImpalaStage::of_trunk).collect();
-        let flat = trunk::forward(&pixels, &stages).unwrap_or_else(|| {
+        let flat = trunk::features(&pixels, &stages).unwrap_or_else(|| {
             let x = self.stages.iter().fold(pixels, |x, stage| stage.forward(x));
             Activation::Relu.forward(x).flatten(1, 3)
         });
@@ -71,11 +85,18 @@ impl Impala {
 }
 
 impl ImpalaStage {
-    fn new<R: Rng + ?Sized>(inputs: usize, outputs: usize, rng: &mut R, device: &Device) -> Self {
-        let mut conv = |inputs| Conv2d::new(inputs, outputs, 3, 1.0, rng, device).with_padding(1);
-        let first = conv(inputs);
-        let mut block = || ResidualBlock { conv0: conv(outputs), conv1: conv(outputs) };
-        Self { conv: first, blocks: [block(), block()] }
+    fn build<S: ParamSource>(source: &mut S, prefix: &str, inputs: usize, outputs: usize) -> Result<Self, S::Error> {
+        let mut conv = |name: &str, inputs| -> Result<Conv2d, S::Error> {
+            Ok(Conv2d::build(source, &path(prefix, name), inputs, outputs, 3, 1.0)?.with_padding(1))
+        };
+        let first = conv("conv", inputs)?;
+        let mut block = |name: &str| -> Result<ResidualBlock, S::Error> {
+            Ok(ResidualBlock {
+                conv0: conv(&path(name, "conv0"), outputs)?,
+                conv1: conv(&path(name, "conv1"), outputs)?,
+            })
+        };
+        Ok(Self { conv: first, blocks: [block("res0")?, block("res1")?] })
     }
 
     fn of_trunk(&self) -> [Stage<'_>; 3] {

@@ -1,7 +1,7 @@
 //! A linear layer.
 
 use super::params::{ParamVisitor, Parameters, path};
-use super::{init::orthogonal, matrix, vector};
+use super::source::{Fresh, Init, ParamSource};
 use burn::tensor::{Device, Tensor, module::linear};
 use rand::Rng;
 
@@ -17,10 +17,22 @@ pub struct Linear {
 impl Linear {
     /// Orthogonal weights times `gain`, zero bias.
     pub fn new<R: Rng + ?Sized>(inputs: usize, outputs: usize, gain: f64, rng: &mut R, device: &Device) -> Self {
-        Self {
-            weight: matrix(orthogonal(inputs, outputs, gain, rng), inputs, outputs, device),
-            bias: vector(vec![0.0; outputs], device),
-        }
+        let Ok(layer) = Self::build(&mut Fresh { rng, device }, "", inputs, outputs, gain);
+        layer
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        inputs: usize,
+        outputs: usize,
+        gain: f64,
+    ) -> Result<Self, S::Error> {
+        Ok(Self {
+            weight: source.param(&path(prefix, "weight"), [inputs, outputs], Init::Orthogonal(gain))?,
+            bias: source.param(&path(prefix, "bias"), [outputs], Init::Zeros)?,
+        })
     }
 
     /// `[.., inputs]` to `[.., outputs]`.

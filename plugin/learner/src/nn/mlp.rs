@@ -1,9 +1,11 @@
 //! A multi-layer perceptron.
 
 use super::params::{ParamVisitor, Parameters, path};
+use super::source::{Fresh, ParamSource};
 use super::{Activation, Linear};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
+use std::f64::consts::SQRT_2;
 
 /// Hidden layers `l0`, `l1`, ... with an activation after each, then a linear `head`.
 #[derive(Clone, Debug)]
@@ -27,13 +29,28 @@ impl Mlp {
         rng: &mut R,
         device: &Device,
     ) -> Self {
+        let source = &mut Fresh { rng, device };
+        let Ok(net) = Self::build(source, "", inputs, hidden, outputs, activation, head_gain);
+        net
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        inputs: usize,
+        hidden: &[usize],
+        outputs: usize,
+        activation: Activation,
+        head_gain: f64,
+    ) -> Result<Self, S::Error> {
         let mut width = inputs;
         let mut layers = Vec::with_capacity(hidden.len());
-        for &next in hidden {
-            layers.push(Linear::new(width, next, std::f64::consts::SQRT_2, rng, device));
+        for (i, &next) in hidden.iter().enumerate() {
+            layers.push(Linear::build(source, &path(prefix, &format!("l{i}")), width, next, SQRT_2)?);
             width = next;
         }
-        Self { layers, head: Linear::new(width, outputs, head_gain, rng, device), activation }
+        Ok(Self { layers, head: Linear::build(source, &path(prefix, "head"), width, outputs, head_gain)?, activation })
     }
 
     /// Input width.

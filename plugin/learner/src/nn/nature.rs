@@ -1,9 +1,10 @@
 //! The image encoder of the first deep Q-network.
 
 use super::conv::{Conv2d, window_places};
+use super::cpu::trunk::{self, Stage};
 use super::image_net::last_layer;
 use super::params::{ParamVisitor, Parameters, path};
-use super::trunk::{self, Stage};
+use super::source::{Fresh, ParamSource};
 use super::{Activation, Linear};
 use crate::ImageShape;
 use burn::tensor::{Device, Tensor};
@@ -11,7 +12,7 @@ use rand::Rng;
 use std::f64::consts::SQRT_2;
 
 /// Output channels, kernel and stride of each convolution.
-pub(crate) const LAYERS: [(usize, usize, usize); 3] = [(32, 8, 4), (64, 4, 2), (64, 3, 1)];
+const LAYERS: [(usize, usize, usize); 3] = [(32, 8, 4), (64, 4, 2), (64, 3, 1)];
 
 /// Three convolutions and a linear layer, ReLU after each (Mnih et al. 2015, "Human-level control through deep
 /// reinforcement learning"). Several times cheaper than [`super::Impala`].
@@ -26,25 +27,51 @@ pub struct Nature {
 impl Nature {
     /// Orthogonal weights with gain √2. `None` if the image is too small for the kernels: a side needs 36 pixels.
     pub fn new<R: Rng + ?Sized>(feature: usize, image: ImageShape, rng: &mut R, device: &Device) -> Option<Self> {
-        let (mut inputs, mut height, mut width) = (image.channels, image.height, image.width);
+        if !Self::fits(image) {
+            return None;
+        }
+        let Ok(net) = Self::build(&mut Fresh { rng, device }, "", feature, image);
+        Some(net)
+    }
+
+    /// Whether an image is large enough for the kernels.
+    pub(crate) fn fits(image: ImageShape) -> bool {
+        places(image.height).is_some() && places(image.width).is_some()
+    }
+
+    /// [`Self::new`] with parameters out of `source`. For an image that is too small the last layer has no inputs.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        feature: usize,
+        image: ImageShape,
+    ) -> Result<Self, S::Error> {
+        let mut inputs = image.channels;
         let mut convs = Vec::with_capacity(LAYERS.len());
-        for (outputs, kernel, stride) in LAYERS {
-            (height, width) = (window_places(height, kernel, stride, 0)?, window_places(width, kernel, stride, 0)?);
-            convs.push(Conv2d::new(inputs, outputs, kernel, SQRT_2, rng, device).with_stride(stride));
+        for (i, (outputs, kernel, stride)) in LAYERS.into_iter().enumerate() {
+            let conv = Conv2d::build(source, &path(prefix, &format!("conv{i}")), inputs, outputs, kernel, SQRT_2)?;
+            convs.push(conv.with_stride(stride));
             inputs = outputs;
         }
-        Some(Self { convs, fc: Linear::new(inputs * height * width, feature, SQRT_2, rng, device) })
+        let sides = places(image.height).unwrap_or(0).saturating_mul(places(image.width).unwrap_or(0));
+        let fc = Linear::build(source, &path(prefix, "fc"), inputs.saturating_mul(sides), feature, SQRT_2)?;
+        Ok(Self { convs, fc })
     }
 
     /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
         let stages: Vec<Stage<'_>> = self.convs.iter().map(Stage::Relu).collect();
-        let flat = trunk::forward(&pixels, &stages).unwrap_or_else(|| {
+        let flat = trunk::features(&pixels, &stages).unwrap_or_else(|| {
             let x = self.convs.iter().fold(pixels, |x, conv| Activation::Relu.forward(conv.forward(x)));
             x.flatten(1, 3)
         });
         last_layer(&self.fc, flat)
     }
+}
+
+/// Places of the last convolution along a side of `size` pixels.
+fn places(size: usize) -> Option<usize> {
+    LAYERS.into_iter().try_fold(size, |size, (_, kernel, stride)| window_places(size, kernel, stride, 0))
 }
 
 impl Parameters for Nature {

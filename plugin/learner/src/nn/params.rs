@@ -10,7 +10,7 @@ pub trait ParamVisitor {
 
 /// A network (or a part of one) that can name its parameters.
 pub trait Parameters {
-    /// Shows every parameter to `visitor`; `prefix` (may be empty) goes before each name.
+    /// Calls `visitor` with every parameter; `prefix` (may be empty) goes before each name.
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V);
 }
 

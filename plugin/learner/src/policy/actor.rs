@@ -1,8 +1,8 @@
 //! The network that gives a distribution over actions.
 
-use super::NetInput;
+use super::{NetInput, NetShape, StdShape};
 use crate::nn::{
-    Activation, Dist, ImageNet, Linear, Mlp, ObsRows, ParamVisitor, Parameters, bounded_log_std, path, vector,
+    Dist, Fresh, ImageNet, Init, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, bounded_log_std, path,
 };
 use crate::{ActionSpace, LearnError};
 use burn::tensor::{Device, Tensor};
@@ -40,19 +40,6 @@ pub enum LogStd {
     },
 }
 
-/// Sizes of an actor or critic.
-#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
-pub struct NetShape {
-    /// Width of the observation, or the number of features that an image becomes.
-    pub obs_dim: usize,
-    /// Width of the skill z that goes before the observation; 0 for none.
-    pub latent: usize,
-    /// Width of each hidden layer.
-    pub hidden: Vec<usize>,
-    /// The function after each hidden layer.
-    pub activation: Activation,
-}
-
 /// π(a | s, z): input `[z, s]`, hidden layers, and a head of logits or means. Images come in as the features that a
 /// trunk of convolutions makes of them.
 ///
@@ -77,17 +64,8 @@ impl Actor {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let inputs = shape.latent + shape.obs_dim;
-        let net = Mlp::new(inputs, &shape.hidden, space.dim(), shape.activation, 0.01, rng, device);
-        let log_std = match (space, std) {
-            (ActionSpace::Discrete(_), _) => LogStd::None,
-            (ActionSpace::Continuous(n), StdKind::Vector) => LogStd::Vector(vector(vec![0.0; n], device)),
-            (ActionSpace::Continuous(n), StdKind::State) => {
-                let width = shape.hidden.last().copied().unwrap_or(inputs);
-                LogStd::State(Linear::new(width, n, 0.01, rng, device))
-            }
-        };
-        Self { cnn: None, net, log_std }
+        let Ok(actor) = Self::build(&mut Fresh { rng, device }, "", shape, space, std.into());
+        actor
     }
 
     /// Logits, or a squashed Gaussian with ln σ within `log_std_range`. Orthogonal weights as in [`Self::new`].
@@ -98,11 +76,34 @@ impl Actor {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let mut actor = Self::new(shape, space, StdKind::State, rng, device);
-        if let LogStd::State(layer) = actor.log_std {
-            actor.log_std = LogStd::Squashed { layer, range: log_std_range };
-        }
+        let std = StdShape::Squashed(log_std_range.0, log_std_range.1);
+        let Ok(actor) = Self::build(&mut Fresh { rng, device }, "", shape, space, std);
         actor
+    }
+
+    /// An actor without a trunk, with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        shape: &NetShape,
+        space: ActionSpace,
+        std: StdShape,
+    ) -> Result<Self, S::Error> {
+        let (inputs, dim) = (shape.inputs(), space.dim());
+        let net = Mlp::build(source, prefix, inputs, &shape.hidden, dim, shape.activation, 0.01)?;
+        let name = path(prefix, "log_std");
+        let mut layer = || Linear::build(source, &name, shape.hidden.last().copied().unwrap_or(inputs), dim, 0.01);
+        let log_std = match (space, std) {
+            (ActionSpace::Discrete(_), _) => LogStd::None,
+            (ActionSpace::Continuous(_), StdShape::State) => LogStd::State(layer()?),
+            (ActionSpace::Continuous(_), StdShape::Squashed(low, high)) => {
+                LogStd::Squashed { layer: layer()?, range: (low, high) }
+            }
+            (ActionSpace::Continuous(_), StdShape::Vector) => {
+                LogStd::Vector(source.param(&name, [dim], Init::Zeros)?)
+            }
+        };
+        Ok(Self { cnn: None, net, log_std })
     }
 
     /// The same actor with a trunk that reads images; its features must be [`NetShape::obs_dim`] of the actor.
@@ -124,12 +125,12 @@ impl Actor {
     ///
     /// # Errors
     /// [`LearnError::Config`] if the observations are of the other kind than the network.
-    pub fn observe(&self, states: &ObsRows) -> Result<Tensor<2>, LearnError> {
+    pub fn observe(&self, states: &ObsBatch) -> Result<Tensor<2>, LearnError> {
         match (&self.cnn, states) {
-            (None, ObsRows::Vector(x)) => Ok(x.clone()),
-            (Some(cnn), ObsRows::Image(x)) => Ok(cnn.forward(x.clone())),
-            (None, ObsRows::Image(_)) => Err(LearnError::Config("a network for vectors got images".to_owned())),
-            (Some(_), ObsRows::Vector(_)) => Err(LearnError::Config("a network for images got vectors".to_owned())),
+            (None, ObsBatch::Vector(x)) => Ok(x.clone()),
+            (Some(cnn), ObsBatch::Image(x)) => Ok(cnn.forward(x.clone())),
+            (None, ObsBatch::Image(_)) => Err(LearnError::Config("a network for vectors got images".to_owned())),
+            (Some(_), ObsBatch::Vector(_)) => Err(LearnError::Config("a network for images got vectors".to_owned())),
         }
     }
 
@@ -139,10 +140,10 @@ impl Actor {
     /// As [`Self::observe`].
     pub fn join(&self, input: &NetInput) -> Result<Tensor<2>, LearnError> {
         let (z, pixels) = match input {
-            NetInput::Joined(x) => return self.observe(&ObsRows::Vector(x.clone())),
+            NetInput::Joined(x) => return self.observe(&ObsBatch::Vector(x.clone())),
             NetInput::Images { z, pixels } => (z, pixels),
         };
-        let features = self.observe(&ObsRows::Image(pixels.clone()))?;
+        let features = self.observe(&ObsBatch::Image(pixels.clone()))?;
         Ok(match z {
             None => features,
             Some(z) => Tensor::cat(vec![z.clone(), features], 1),

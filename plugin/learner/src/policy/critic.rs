@@ -1,12 +1,12 @@
 //! The network that estimates the return.
 
 use super::NetShape;
-use crate::nn::{Mlp, ParamVisitor, Parameters};
+use crate::nn::{Fresh, Mlp, ParamSource, ParamVisitor, Parameters};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
 /// V(s, z): the actor's input and hidden layers, one output. Of images it reads the features that the actor's trunk makes,
-/// which both teach.
+/// which is trained by the losses of both.
 #[derive(Clone, Debug)]
 pub struct Critic {
     /// Hidden layers and the head.
@@ -16,8 +16,13 @@ pub struct Critic {
 impl Critic {
     /// Orthogonal weights, gain √2 in the hidden layers and 1 in the head.
     pub fn new<R: Rng + ?Sized>(shape: &NetShape, rng: &mut R, device: &Device) -> Self {
-        let inputs = shape.latent + shape.obs_dim;
-        Self { net: Mlp::new(inputs, &shape.hidden, 1, shape.activation, 1.0, rng, device) }
+        let Ok(critic) = Self::build(&mut Fresh { rng, device }, "", shape);
+        critic
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(source: &mut S, prefix: &str, shape: &NetShape) -> Result<Self, S::Error> {
+        Ok(Self { net: Mlp::build(source, prefix, shape.inputs(), &shape.hidden, 1, shape.activation, 1.0)? })
     }
 
     /// Values of joined inputs `[z, s]`: `[n, latent + obs_dim]` to `[n]`.

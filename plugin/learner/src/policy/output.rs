@@ -1,7 +1,7 @@
-//! What a policy says about a batch of observations.
+//! The outputs of a policy for a batch of observations.
 
 use crate::nn::{
-    argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
+    HostDist, argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
 };
 use crate::{Action, ActionSpace, LearnError};
 use rand::Rng;
@@ -94,6 +94,12 @@ impl PolicyOutput {
             }
             (space, action) => Err(LearnError::Action(format!("{action:?} in {space:?}"))),
         }
+    }
+
+    /// The distributions alone.
+    pub(crate) fn into_dist(self) -> HostDist {
+        let log_std = (!self.log_std.is_empty()).then_some(self.log_std);
+        HostDist { dim: self.space.dim(), head: self.head, log_std }
     }
 
     fn head(&self, row: usize) -> &[f32] {

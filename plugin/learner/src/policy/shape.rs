@@ -1,262 +1,191 @@
-//! What the header of a policy file says about its networks.
+//! The sizes of actors and critics: from a shape a fresh network is made, or a stored one is taken out of a file.
 
-use super::file::SKILL_STATS;
-use super::{Actor, Critic, LogStd, NetShape, Policy, SkillSource, StdKind};
+use super::{Actor, Critic, LogStd, StdKind};
 use crate::file::TensorFile;
-use crate::layout::{check_actor, check_cnn, check_mlp, joined_width};
-use crate::nn::{CnnKind, ImageNet, Mlp, path};
-use crate::norm::take_obs_stats;
+use crate::nn::{Activation, CnnKind, Fresh, ImageNet, Mlp, path};
 use crate::rng::Streams;
-use crate::skill::{Prior, SkillDraw};
-use crate::{ActionSpace, DeviceKind, FileError, ImageShape, LearnError, ObsKind};
+use crate::{FileError, LearnError, ObsKind, PolicySpec};
+use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PolicyShape {
-    pub(super) action_space: ActionSpace,
-    /// Size of the images that it observes; `None` for vectors.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    image: Option<ImageShape>,
-    pub(super) actor: ActorShape,
-    pub(super) critic: Option<NetShape>,
-    pub(super) normalised: bool,
+/// Sizes of an actor's layers behind its trunk, or of a critic.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
+pub struct NetShape {
+    /// Width of the observation, or the number of features that an image becomes.
+    pub obs_dim: usize,
+    /// Width of the skill z that goes before the observation; 0 for none.
+    pub latent: usize,
+    /// Width of each hidden layer.
+    pub hidden: Vec<usize>,
+    /// The function after each hidden layer.
+    pub activation: Activation,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ActorShape {
-    pub(super) net: NetShape,
-    std: StdShape,
-    /// The trunk that reads images; `None` for vectors.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    cnn: Option<CnnKind>,
+impl NetShape {
+    /// Width of `[z, s]`.
+    pub(crate) fn inputs(&self) -> usize {
+        self.latent.saturating_add(self.obs_dim)
+    }
+
+    /// The sizes of `net`, which reads observations of `obs_dim` behind its skills.
+    fn of(net: &Mlp, obs_dim: usize) -> Self {
+        Self {
+            obs_dim,
+            latent: net.inputs() - obs_dim,
+            hidden: net.layers.iter().map(|layer| layer.weight.dims()[1]).collect(),
+            activation: net.activation,
+        }
+    }
+
+    /// The critic of this shape called `name`, out of a file.
+    pub(crate) fn stored_critic(
+        &self,
+        file: &mut TensorFile,
+        name: &str,
+        device: &Device,
+    ) -> Result<Critic, FileError> {
+        Critic::build(&mut file.params(device), name, self)
+    }
 }
 
 /// How an actor's standard deviation is made; without meaning for discrete actions.
-#[derive(Serialize, Deserialize)]
-enum StdShape {
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
+pub(crate) enum StdShape {
+    /// One learned vector for all states.
     Vector,
+    /// A second head.
     State,
+    /// A second head, bounded smoothly between two numbers, of a squashed Gaussian.
     Squashed(f64, f64),
 }
 
-#[derive(Serialize, Deserialize)]
+impl From<StdKind> for StdShape {
+    fn from(kind: StdKind) -> Self {
+        match kind {
+            StdKind::Vector => Self::Vector,
+            StdKind::State => Self::State,
+        }
+    }
+}
+
+/// The whole architecture of an actor, as policy files describe it.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SkillsShape {
-    latent: usize,
-    tanh: bool,
-    /// `None` is a standard normal.
-    prior: Option<ActorShape>,
-    decoder: ActorShape,
-    horizon: usize,
-    draw: SkillDraw,
-    /// Whether decoder and prior see normalised observations.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    normalised: bool,
-}
-
-impl PolicyShape {
-    /// The shape of `policy`.
-    pub(super) fn of(policy: &Policy) -> Self {
-        let image = match policy.observation() {
-            ObsKind::Vector(_) => None,
-            ObsKind::Image(image) => Some(image),
-        };
-        let obs_dim = policy.actor.obs_dim(policy.latent);
-        Self {
-            action_space: policy.space,
-            image,
-            actor: ActorShape::of(&policy.actor, obs_dim),
-            critic: policy.critic.as_ref().map(|critic| net_shape(&critic.net, obs_dim)),
-            normalised: policy.stats.is_some(),
-        }
-    }
-
-    /// What the policy observes.
-    pub(super) fn observation(&self) -> ObsKind {
-        self.image.map_or(ObsKind::Vector(self.actor.net.obs_dim), ObsKind::Image)
-    }
-
-    /// `Ok` if `file` holds networks of this shape that go together.
-    pub(super) fn check(&self, file: &TensorFile) -> Result<(), FileError> {
-        let net = &self.actor.net;
-        self.actor.check(file, "actor", self.action_space, self.image)?;
-        if self.normalised && self.image.is_some() {
-            return Err(file.format(NORMALISED_IMAGES.to_owned()));
-        }
-        let Some(critic) = &self.critic else { return Ok(()) };
-        same_widths(file, "critic", (critic.obs_dim, critic.latent), (net.obs_dim, net.latent))?;
-        check_mlp(file, "critic", (joined_width(file, "critic", critic)?, &critic.hidden, 1))
-    }
-
-    /// Actor and critic of this shape, to be filled from a file.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] if images are too small for the convolutions.
-    pub(super) fn build(&self, device: DeviceKind) -> Result<(Actor, Option<Critic>), LearnError> {
-        let critic = |net| Critic::new(net, &mut Streams::new(0).stream("", 0), &device.plain());
-        Ok((self.actor.build(self.action_space, self.image, device)?, self.critic.as_ref().map(critic)))
-    }
-}
-
-impl SkillsShape {
-    /// The shape of `skills`.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] if they are held for no time, or if prior and decoder do not see the same.
-    pub(super) fn of(skills: &SkillSource) -> Result<Self, LearnError> {
-        if skills.horizon == 0 {
-            return Err(LearnError::Config(NO_HORIZON.to_owned()));
-        }
-        let (decoder, prior) = (&skills.decoder, &skills.prior.net);
-        if prior.as_ref().is_some_and(|prior| prior.stats != decoder.stats) {
-            let text = "prior and decoder normalise observations in different ways: they must be of one skill model";
-            return Err(LearnError::Config(text.to_owned()));
-        }
-        Ok(Self {
-            latent: skills.prior.latent(),
-            tanh: skills.prior.tanh,
-            prior: prior.as_ref().map(|net| ActorShape::of(&net.actor, net.actor.obs_dim(0))),
-            decoder: ActorShape::of(&decoder.actor, decoder.actor.obs_dim(decoder.latent)),
-            horizon: skills.horizon,
-            draw: skills.draw,
-            normalised: decoder.stats.is_some(),
-        })
-    }
-
-    /// `Ok` if `file` holds networks of this shape that go together and with `policy`.
-    pub(super) fn check(&self, file: &TensorFile, policy: &PolicyShape) -> Result<(), FileError> {
-        if self.horizon == 0 {
-            return Err(file.format(NO_HORIZON.to_owned()));
-        }
-        if self.normalised && policy.image.is_some() {
-            return Err(file.format(NORMALISED_IMAGES.to_owned()));
-        }
-        let (net, latent) = (&policy.actor.net, self.latent);
-        self.decoder.check(file, "decoder", policy.action_space, policy.image)?;
-        let widths = |net: &NetShape| (net.obs_dim, net.latent);
-        // Networks of images each have features of their own.
-        let obs_dim = |shape: &ActorShape| shape.cnn.as_ref().map_or(net.obs_dim, CnnKind::features);
-        same_widths(file, "decoder", widths(&self.decoder.net), (obs_dim(&self.decoder), latent))?;
-        if latent == 0 || ![0, latent].contains(&net.latent) {
-            return Err(file.format(format!("skills are {latent} wide, but the policy reads {}", net.latent)));
-        }
-        let Some(prior) = &self.prior else { return Ok(()) };
-        prior.check(file, "prior", ActionSpace::Continuous(latent), policy.image)?;
-        same_widths(file, "prior", widths(&prior.net), (obs_dim(prior), 0))
-    }
-
-    pub(super) fn take(
-        self,
-        file: &mut TensorFile,
-        policy: &PolicyShape,
-        device: DeviceKind,
-    ) -> Result<SkillSource, FileError> {
-        let (plain, space, observation) = (device.plain(), policy.action_space, policy.observation());
-        let decoder = self.decoder.take(file, "decoder", space, policy.image, device)?;
-        let stats = match self.normalised {
-            false => None,
-            true => Some(Arc::new(take_obs_stats(file, SKILL_STATS, observation.numbers())?)),
-        };
-        let prior = match &self.prior {
-            None => Prior::standard_normal(self.latent, self.tanh),
-            Some(shape) => {
-                let space = ActionSpace::Continuous(self.latent);
-                let net = shape.take(file, "prior", space, policy.image, device)?;
-                Prior::learned(&net, stats.clone(), observation, (self.latent, self.tanh), plain.clone())
-            }
-        };
-        let decoder = Policy::new(&decoder, None, stats, space, (observation, self.latent), plain);
-        Ok(SkillSource { prior, decoder, horizon: self.horizon, draw: self.draw })
-    }
+pub(crate) struct ActorShape {
+    pub(crate) net: NetShape,
+    pub(crate) std: StdShape,
+    /// The trunk that reads images; `None` for vectors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) cnn: Option<CnnKind>,
 }
 
 impl ActorShape {
-    fn of(actor: &Actor, obs_dim: usize) -> Self {
+    /// An actor of `spec` with these hidden layers, and the trunk `cnn` if it observes images.
+    pub(crate) fn new(
+        spec: &PolicySpec,
+        cnn: &CnnKind,
+        hidden: &[usize],
+        activation: Activation,
+        std: StdShape,
+    ) -> Self {
+        let (obs_dim, cnn) = match spec.obs {
+            ObsKind::Vector(width) => (width, None),
+            ObsKind::Image(_) => (cnn.features(), Some(cnn.clone())),
+        };
+        Self { net: NetShape { obs_dim, latent: spec.latent, hidden: hidden.to_vec(), activation }, std, cnn }
+    }
+
+    /// The shape of `actor`, which reads skills of width `latent`.
+    pub(crate) fn of(actor: &Actor, latent: usize) -> Self {
         let std = match actor.log_std {
             LogStd::None | LogStd::Vector(_) => StdShape::Vector,
             LogStd::State(_) => StdShape::State,
             LogStd::Squashed { range: (low, high), .. } => StdShape::Squashed(low, high),
         };
-        Self { net: net_shape(&actor.net, obs_dim), std, cnn: actor.cnn.as_ref().map(ImageNet::kind) }
+        Self { net: NetShape::of(&actor.net, actor.obs_dim(latent)), std, cnn: actor.cnn.as_ref().map(ImageNet::kind) }
     }
 
-    /// `Ok` if `file` holds an actor of this shape, called `prefix`, that observes `image`s, or vectors, and acts in
-    /// `space`.
-    fn check(
+    /// The shape of `critic`, which reads what an actor of this shape reads.
+    pub(crate) fn critic(&self, critic: &Critic) -> NetShape {
+        NetShape::of(&critic.net, self.net.obs_dim)
+    }
+
+    /// An actor with starting weights from the stream `name`, and its trunk with some from `name.cnn`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the trunk.
+    pub(crate) fn fresh(
         &self,
-        file: &TensorFile,
-        prefix: &str,
-        space: ActionSpace,
-        image: Option<ImageShape>,
-    ) -> Result<(), FileError> {
-        match (&self.cnn, image) {
-            (None, None) => {}
-            (Some(cnn), Some(image)) => {
-                check_cnn(file, &path(prefix, "cnn"), cnn, image)?;
-                let widths = |obs_dim| (obs_dim, self.net.latent);
-                same_widths(file, prefix, widths(self.net.obs_dim), widths(cnn.features()))?;
+        spec: &PolicySpec,
+        streams: &Streams,
+        name: &str,
+        device: &Device,
+    ) -> Result<Actor, LearnError> {
+        let cnn = match (&self.cnn, spec.obs) {
+            (Some(cnn), ObsKind::Image(image)) => {
+                Some(ImageNet::new(cnn, image, &mut streams.stream(&format!("{name}.cnn"), 0), device)?)
             }
-            (None, Some(_)) => return Err(file.format(format!("`{prefix}` reads vectors, but must read images"))),
-            (Some(_), None) => return Err(file.format(format!("`{prefix}` reads images, but must read vectors"))),
-        }
-        check_actor(file, prefix, &self.net, space, !matches!(self.std, StdShape::Vector))
-    }
-
-    /// An actor of this shape, to be filled from a file.
-    fn build(&self, space: ActionSpace, image: Option<ImageShape>, device: DeviceKind) -> Result<Actor, LearnError> {
-        let (rng, device) = (&mut Streams::new(0).stream("", 0), &device.plain());
-        let actor = match self.std {
-            StdShape::Vector => Actor::new(&self.net, space, StdKind::Vector, rng, device),
-            StdShape::State => Actor::new(&self.net, space, StdKind::State, rng, device),
-            StdShape::Squashed(low, high) => Actor::squashed(&self.net, space, (low, high), rng, device),
+            _ => None,
         };
-        Ok(match self.cnn.as_ref().zip(image) {
-            Some((cnn, image)) => actor.with_cnn(ImageNet::new(cnn, image, rng, device)?),
-            None => actor,
-        })
+        let mut source = Fresh { rng: &mut streams.stream(name, 0), device };
+        let Ok(actor) = Actor::build(&mut source, "", &self.net, spec.action_space, self.std);
+        Ok(Actor { cnn, ..actor })
     }
 
-    /// The actor of this shape called `prefix`, out of a file.
-    fn take(
+    /// The actor of this shape called `name`, out of a file.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first tensor that is missing or misshapen, or says why the shape is not one of `spec`.
+    pub(crate) fn stored(
         &self,
+        spec: &PolicySpec,
         file: &mut TensorFile,
-        prefix: &str,
-        space: ActionSpace,
-        image: Option<ImageShape>,
-        device: DeviceKind,
+        name: &str,
+        device: &Device,
     ) -> Result<Actor, FileError> {
-        let mut actor = self.build(space, image, device).map_err(|e| file.learner(e))?;
-        file.take_network(prefix, &mut actor, &device.plain())?;
-        Ok(actor)
+        let cnn = match (&self.cnn, spec.obs) {
+            (None, ObsKind::Vector(_)) => None,
+            (Some(cnn), ObsKind::Image(image)) => {
+                let prefix = path(name, "cnn");
+                file.product(&prefix, &[image.channels, image.height, image.width])?;
+                let net = ImageNet::build(&mut file.params(device), &prefix, cnn, image)?;
+                let latent = self.net.latent;
+                InputWidths { obs_dim: cnn.features(), latent }.check(file, name, self.net.input_widths())?;
+                Some(net)
+            }
+            (None, ObsKind::Image(_)) => {
+                return Err(file.format(format!("`{name}` reads vectors, but must read images")));
+            }
+            (Some(_), ObsKind::Vector(_)) => {
+                return Err(file.format(format!("`{name}` reads images, but must read vectors")));
+            }
+        };
+        let actor = Actor::build(&mut file.params(device), name, &self.net, spec.action_space, self.std)?;
+        Ok(Actor { cnn, ..actor })
     }
 }
 
-const NORMALISED_IMAGES: &str = "normalises images, whose pixels are divided by 255 instead";
-const NO_HORIZON: &str = "a skill must be held for at least 1 tick, not 0";
-
-/// `Ok` if the network `name` reads observations and skills as wide as the others do.
-fn same_widths(
-    file: &TensorFile,
-    name: &str,
-    found: (usize, usize),
-    expected: (usize, usize),
-) -> Result<(), FileError> {
-    if found == expected {
-        return Ok(());
-    }
-    let text = |(obs_dim, latent)| format!("observations of {obs_dim} and skills of {latent}");
-    Err(file.format(format!("`{name}` reads {}, but must read {}", text(found), text(expected))))
+/// What a network reads: observations (or features of images) and skills of these widths.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct InputWidths {
+    pub(crate) obs_dim: usize,
+    pub(crate) latent: usize,
 }
 
-/// The sizes of `net`, which reads observations of `obs_dim` behind its skills.
-fn net_shape(net: &Mlp, obs_dim: usize) -> NetShape {
-    NetShape {
-        obs_dim,
-        latent: net.inputs() - obs_dim,
-        hidden: net.layers.iter().map(|layer| layer.weight.dims()[1]).collect(),
-        activation: net.activation,
+impl InputWidths {
+    /// `Ok` if the network `name` reads just this.
+    pub(crate) fn check(self, file: &TensorFile, name: &str, found: Self) -> Result<(), FileError> {
+        if found == self {
+            return Ok(());
+        }
+        let text = |widths: Self| format!("observations of {} and skills of {}", widths.obs_dim, widths.latent);
+        Err(file.format(format!("`{name}` reads {}, but must read {}", text(found), text(self))))
+    }
+}
+
+impl NetShape {
+    /// What it reads.
+    pub(crate) fn input_widths(&self) -> InputWidths {
+        InputWidths { obs_dim: self.obs_dim, latent: self.latent }
     }
 }

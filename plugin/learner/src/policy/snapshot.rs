@@ -1,9 +1,9 @@
 //! A frozen policy that plays.
 
-use super::{Actor, Critic, HostStates, PolicyOutput};
+use super::{Actor, Critic, InputBuilder, PolicyOutput, States};
 use crate::nn::{CnnKind, ImageNet, frozen, host};
 use crate::norm::ObsStats;
-use crate::{ActionSpace, LearnError, ObsKind, ObsSlice};
+use crate::{ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec};
 use burn::tensor::{Device, Tensor};
 use std::sync::Arc;
 
@@ -18,54 +18,48 @@ const IMAGES_AT_A_TIME: usize = 256;
 /// are in the batch or on the number of threads.
 #[derive(Clone, Debug)]
 pub struct Policy {
-    pub(super) actor: Actor,
-    pub(super) critic: Option<Critic>,
-    pub(super) stats: Option<Arc<ObsStats>>,
-    pub(super) space: ActionSpace,
-    observation: ObsKind,
-    pub(super) latent: usize,
+    pub(crate) actor: Actor,
+    pub(crate) critic: Option<Critic>,
+    pub(crate) stats: Option<Arc<ObsStats>>,
+    spec: PolicySpec,
     device: Device,
 }
 
 impl Policy {
-    /// A snapshot of `actor` and `critic`, which must read a skill of the given width and the given observations.
+    /// A snapshot of `actor` and `critic`, which must read and do what `spec` says.
     pub(crate) fn new(
         actor: &Actor,
         critic: Option<&Critic>,
         stats: Option<Arc<ObsStats>>,
-        space: ActionSpace,
-        (observation, latent): (impl Into<ObsKind>, usize),
+        spec: PolicySpec,
         device: Device,
     ) -> Self {
-        Self {
-            actor: frozen(actor),
-            critic: critic.map(frozen),
-            stats,
-            space,
-            observation: observation.into(),
-            latent,
-            device,
-        }
+        Self { actor: frozen(actor), critic: critic.map(frozen), stats, spec, device }
+    }
+
+    /// What it reads and does.
+    pub fn spec(&self) -> PolicySpec {
+        self.spec
     }
 
     /// What it acts in.
     pub fn action_space(&self) -> ActionSpace {
-        self.space
+        self.spec.action_space
     }
 
     /// Width of the skill it reads; 0 if it ignores skills.
     pub fn latent(&self) -> usize {
-        self.latent
+        self.spec.latent
     }
 
     /// What it observes.
     pub fn observation(&self) -> ObsKind {
-        self.observation
+        self.spec.obs
     }
 
     /// Numbers in the observation it reads.
     pub fn obs_dim(&self) -> usize {
-        self.observation.numbers()
+        self.spec.obs.numbers()
     }
 
     /// Whether its networks see normalised observations. It takes raw ones all the same.
@@ -87,14 +81,14 @@ impl Policy {
     /// or the other way round; [`LearnError::NotFinite`] if an output is NaN or infinite.
     pub fn forward<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<PolicyOutput, LearnError> {
         let (mut head, mut log_std, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let dim = self.space.dim();
-        self.see(z, obs.into(), n, |x, rows| {
+        let dim = self.spec.action_space.dim();
+        self.for_each_chunk(States { z, obs: obs.into(), n }, |x, rows| {
             let dist = self.actor.forward(x.clone()).to_host()?;
             head.extend_from_slice(&dist.head[..rows * dim]);
             if let Some(stds) = dist.log_std {
                 log_std.extend_from_slice(&stds[..rows * dim]);
             }
-            self.judge(x, rows, &mut values)
+            self.append_values(x, rows, &mut values)
         })?;
         for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
             // A log-probability may be -infinity without harm.
@@ -102,7 +96,7 @@ impl Policy {
                 return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: None });
             }
         }
-        Ok(PolicyOutput { space: self.space, squashed: self.actor.is_squashed(), head, log_std, values })
+        Ok(PolicyOutput { space: self.spec.action_space, squashed: self.actor.is_squashed(), head, log_std, values })
     }
 
     /// Only the values of [`Self::forward`]; zeros if there is no critic.
@@ -114,12 +108,12 @@ impl Policy {
             return Ok(vec![0.0; n]);
         }
         let mut values = Vec::with_capacity(n);
-        self.see(z, obs.into(), n, |x, rows| self.judge(x, rows, &mut values))?;
+        self.for_each_chunk(States { z, obs: obs.into(), n }, |x, rows| self.append_values(x, rows, &mut values))?;
         Ok(values)
     }
 
     /// Adds the values of the first `rows` joined inputs.
-    fn judge(&self, x: Tensor<2>, rows: usize, values: &mut Vec<f32>) -> Result<(), LearnError> {
+    fn append_values(&self, x: Tensor<2>, rows: usize, values: &mut Vec<f32>) -> Result<(), LearnError> {
         match &self.critic {
             Some(critic) => values.extend_from_slice(&host(critic.forward(x))?[..rows]),
             None => values.resize(values.len() + rows, 0.0),
@@ -127,26 +121,25 @@ impl Policy {
         Ok(())
     }
 
-    /// Shows the joined inputs of `n` states to `show`, some rows at a time, with the number of rows.
+    /// Calls `read` with the joined inputs of some states at a time and their number, until all were read.
     ///
-    /// They are at least two: matrix libraries sum a single row in another order than the rows of a matrix, and a lone
-    /// agent shall act like one of many.
-    fn see(
+    /// The inputs have at least two rows: matrix libraries sum a single row in another order than the rows of a matrix,
+    /// and a lone agent shall act like one of many.
+    fn for_each_chunk(
         &self,
-        z: &[f32],
-        obs: ObsSlice<'_>,
-        n: usize,
-        mut show: impl FnMut(Tensor<2>, usize) -> Result<(), LearnError>,
+        states: States<'_>,
+        mut read: impl FnMut(Tensor<2>, usize) -> Result<(), LearnError>,
     ) -> Result<(), LearnError> {
+        let States { z, obs, n } = states;
         if n == 0 {
             return Ok(());
         }
-        let (kind, latent) = (&self.observation, self.latent);
+        let PolicySpec { obs: kind, latent, .. } = &self.spec;
         obs.check_size("observations", kind, n)?;
-        if latent > 0 {
+        if *latent > 0 {
             LearnError::check("skills", n * latent, z.len())?;
         }
-        let states = HostStates { z, latent, obs, kind, stats: self.stats.as_deref() };
+        let inputs = InputBuilder { z, latent: *latent, obs, kind, stats: self.stats.as_deref() };
         let chunk = match kind {
             ObsKind::Vector(_) => VECTORS_AT_A_TIME,
             ObsKind::Image(_) => IMAGES_AT_A_TIME,
@@ -154,8 +147,8 @@ impl Policy {
         for start in (0..n).step_by(chunk) {
             let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
             let len = rows.len();
-            let x = self.actor.join(&states.input(&rows, &self.device))?;
-            show(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
+            let x = self.actor.join(&inputs.input(&rows, &self.device))?;
+            read(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What an update reports.
+//! What a gradient step and an update report.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,8 +20,9 @@ pub struct UpdateMetrics {
     pub explained_variance: f32,
     /// Mean divergence between decoder and policy in nats, not weighted; `None` without a penalty.
     pub decoder_kl: Option<f32>,
-    /// Mean of α; `None` without a penalty.
-    pub alpha_mean: Option<f32>,
+    /// Mean of the decoder's confidence, α in the paper; `None` without a penalty.
+    #[serde(rename = "alpha_mean")]
+    pub confidence: Option<f32>,
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
     /// The learning rate used.
@@ -29,6 +30,23 @@ pub struct UpdateMetrics {
 }
 
 impl UpdateMetrics {
+    /// The means over `steps` gradient steps whose metrics add up to `sum`.
+    pub(super) fn mean(sum: &StepMetrics, steps: usize, penalised: bool, explained_variance: f64, lr: f64) -> Self {
+        let mean = |total: f64| (total / steps as f64) as f32;
+        Self {
+            policy_loss: mean(sum.policy_loss),
+            value_loss: mean(sum.value_loss),
+            entropy: mean(sum.entropy),
+            approx_kl: mean(sum.approx_kl),
+            clip_fraction: mean(sum.clip_fraction),
+            explained_variance: explained_variance as f32,
+            decoder_kl: penalised.then(|| mean(sum.decoder_kl)),
+            confidence: penalised.then(|| mean(sum.confidence)),
+            grad_norm: mean(sum.grad_norm),
+            lr: lr as f32,
+        }
+    }
+
     /// The numbers by their TensorBoard tags; what was not measured is left out.
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let all = [
@@ -41,9 +59,49 @@ impl UpdateMetrics {
             ("losses/explained_variance", Some(self.explained_variance)),
             ("losses/grad_norm", Some(self.grad_norm)),
             ("score/decoder_kl", self.decoder_kl),
-            ("score/alpha_mean", self.alpha_mean),
+            ("score/alpha_mean", self.confidence),
         ];
         all.into_iter().filter_map(|(tag, value)| Some((tag, f64::from(value?)))).collect()
+    }
+}
+
+/// What one gradient step looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepMetrics {
+    /// Clipped surrogate loss.
+    pub policy_loss: f64,
+    /// Value loss, with its ½ and without its weight.
+    pub value_loss: f64,
+    /// Entropy in nats.
+    pub entropy: f64,
+    /// The loss that was minimised.
+    pub total_loss: f64,
+    /// mean(ratio - 1 - ln ratio).
+    pub approx_kl: f64,
+    /// Share of |ratio - 1| > clip.
+    pub clip_fraction: f64,
+    /// Mean divergence between decoder and policy, not weighted.
+    pub decoder_kl: f64,
+    /// mean(confidence · divergence), or the legacy form of it, without kl_coef.
+    pub kl_penalty: f64,
+    /// Mean of the decoder's confidence.
+    pub confidence: f64,
+    /// Norm of the gradient before clipping.
+    pub grad_norm: f64,
+}
+
+impl StepMetrics {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.policy_loss += other.policy_loss;
+        self.value_loss += other.value_loss;
+        self.entropy += other.entropy;
+        self.total_loss += other.total_loss;
+        self.approx_kl += other.approx_kl;
+        self.clip_fraction += other.clip_fraction;
+        self.decoder_kl += other.decoder_kl;
+        self.kl_penalty += other.kl_penalty;
+        self.confidence += other.confidence;
+        self.grad_norm += other.grad_norm;
     }
 }
 

@@ -1,7 +1,11 @@
 //! Actor and critic as one set of parameters.
 
+use super::PpoConfig;
+use crate::file::TensorFile;
+use crate::learner::LearnerBase;
 use crate::nn::{ParamVisitor, Parameters, path};
-use crate::policy::{Actor, Critic};
+use crate::policy::{Actor, ActorShape, Critic, NetShape, StdShape};
+use crate::{FileError, LearnError};
 
 /// What PPO trains: the parameters `actor.*` and `critic.*`, whose gradients are clipped together. The trunk of images,
 /// `actor.cnn.*`, is the critic's too.
@@ -11,6 +15,45 @@ pub struct PpoNets {
     pub actor: Actor,
     /// The value function.
     pub critic: Critic,
+}
+
+impl PpoNets {
+    /// A copy of the decoder, or starting weights from the stream `ppo.actor`, and a critic with some from `ppo.critic`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the convolutions.
+    pub(super) fn fresh(config: &PpoConfig, base: &LearnerBase) -> Result<Self, LearnError> {
+        let (shape, device) = (actor_shape(config, base), base.device.plain());
+        let actor = match base.copied_teacher() {
+            Some(teacher) => teacher.decoder().clone(),
+            None => shape.fresh(&base.spec, &base.streams, "ppo.actor", &device)?,
+        };
+        let mut rng = base.streams.stream("ppo.critic", 0);
+        Ok(Self { actor, critic: Critic::new(&critic_shape(config, &shape), &mut rng, &device) })
+    }
+
+    /// Those of a checkpoint.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first tensor that is missing or misshapen.
+    pub(super) fn stored(config: &PpoConfig, base: &LearnerBase, file: &mut TensorFile) -> Result<Self, FileError> {
+        let (shape, device) = (actor_shape(config, base), base.device.plain());
+        let actor = shape.stored(&base.spec, file, "actor", &device)?;
+        Ok(Self { actor, critic: critic_shape(config, &shape).stored_critic(file, "critic", &device)? })
+    }
+}
+
+/// The decoder's layers for a copy of it, else those of the settings.
+fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
+    match base.copied_teacher() {
+        Some(teacher) => teacher.description.decoder_shape(),
+        None => ActorShape::new(&base.spec, &config.cnn, &config.hidden, config.activation, StdShape::Vector),
+    }
+}
+
+/// The critic reads what the actor's layers read, through layers of its own.
+fn critic_shape(config: &PpoConfig, actor: &ActorShape) -> NetShape {
+    NetShape { hidden: config.hidden.clone(), activation: config.activation, ..actor.net }
 }
 
 impl Parameters for PpoNets {

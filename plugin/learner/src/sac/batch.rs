@@ -1,11 +1,10 @@
 //! Transitions from the replay buffer, made ready for a gradient step.
 
 use super::SacLearner;
-use crate::nn::{ActionRows, matrix, vector};
-use crate::policy::joined_rows;
-use crate::rng::{ChaCha8Rng, normal};
-use crate::score::{DecoderBatch, present_stats};
-use crate::{ActionSpace, LearnError};
+use crate::LearnError;
+use crate::nn::{ActionBatch, matrix, vector};
+use crate::policy::{States, joined_rows};
+use crate::score::TeacherBatch;
 use burn::tensor::Tensor;
 
 /// One batch of transitions on the device.
@@ -14,7 +13,7 @@ pub struct SacBatch {
     /// What the actor reads, `[n, latent + obs_dim]`.
     pub inputs: Tensor<2>,
     /// The actions taken.
-    pub actions: ActionRows,
+    pub actions: ActionBatch,
     /// What they earned, `[n]`.
     pub rewards: Tensor<1>,
     /// 1 where the value of the next state counts, 0 where the episode was over, `[n]`.
@@ -22,51 +21,50 @@ pub struct SacBatch {
     /// The next states as the actor reads them, `[n, latent + obs_dim]`; any numbers where they do not count.
     pub next_inputs: Tensor<2>,
     /// Constants of the penalty, if there is one.
-    pub decoder: Option<DecoderBatch>,
+    pub teacher: Option<TeacherBatch>,
 }
 
 impl SacLearner {
-    /// Standard normal numbers for a batch of draws; discrete actions need none.
-    pub(super) fn noise(&self, rng: &mut ChaCha8Rng) -> Option<Tensor<2>> {
-        let ActionSpace::Continuous(dim) = self.spec.action_space else { return None };
-        let n = self.config.batch;
-        Some(matrix((0..n * dim).map(|_| normal(rng)).collect(), n, dim, &self.device.plain()))
+    /// Width of what the actor reads.
+    pub(super) fn inputs(&self) -> usize {
+        self.base.spec.latent + self.buffer.obs_dim
     }
 
-    /// The transitions in `slots` on the device, normalised; with the decoder's side of them if the actor needs it.
+    /// The transitions in `slots` on the device, normalised; with the teacher's side of them if the actor needs it.
     pub(super) fn batch(&self, slots: &[usize], with_actor: bool) -> Result<SacBatch, LearnError> {
-        let (buffer, device, n) = (&self.buffer, self.device.plain(), slots.len());
-        let stats = present_stats(self.skill.as_ref(), self.observations.as_ref());
-        let (latent, obs_dim) = (self.spec.latent, buffer.obs_dim);
+        let (base, buffer, n) = (&self.base, &self.buffer, slots.len());
+        let (stats, device) = (base.obs_stats(), base.device.plain());
+        let (latent, obs_dim) = (base.spec.latent, buffer.obs_dim);
         let inputs = |z: &[f32], obs: &[f32]| {
             let rows = slots.iter().copied();
             let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), rows);
             matrix(rows, n, self.inputs(), &device)
         };
-        let reward = |&slot: &usize| match &self.rewards {
+        let reward = |&slot: &usize| match &base.rewards {
             Some(normalizer) => normalizer.scale(buffer.rewards[slot]),
             None => buffer.rewards[slot],
         };
         let actions = buffer.actions.gather(slots);
-        let decoder = match self.skill.as_ref().filter(|_| with_actor) {
+        let teacher = match base.teacher.as_ref().filter(|_| with_actor) {
             None => None,
-            Some(skill) => {
+            Some(teacher) => {
                 let gather = |values: &[f32], width| joined_rows(&[], 0, values, width, None, slots.iter().copied());
                 let (z, obs) = (gather(&buffer.z, buffer.latent), gather(&buffer.obs, buffer.obs_dim));
                 let squashed = self.nets.actor.is_squashed();
-                let mut rng = self.streams.stream("score.own_samples", self.gradient_steps);
-                skill.rows((&z, &obs), &actions, squashed, &mut rng, self.device)?
+                let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);
+                let states = States { z: &z, obs: (&obs).into(), n };
+                teacher.output(states, &actions, squashed, &mut rng, base.device)?
             }
         };
         let all: Vec<usize> = (0..n).collect();
         let continues = slots.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
         Ok(SacBatch {
             inputs: inputs(&buffer.z, &buffer.obs),
-            actions: ActionRows::new(&actions, &device),
+            actions: ActionBatch::new(&actions, &device),
             rewards: vector(slots.iter().map(reward).collect(), &device),
             continues: vector(continues, &device),
             next_inputs: inputs(&buffer.next_z, &buffer.next_obs),
-            decoder: decoder.map(|rows| rows.batch(&all, &device)),
+            teacher: teacher.map(|output| output.batch(&all, &device)),
         })
     }
 }

@@ -4,14 +4,14 @@ use crate::nn::Activation;
 use crate::{ActionSpace, LearnError, TimeLimit};
 use serde::{Deserialize, Serialize};
 
-/// How much entropy is worth: the temperature α of the soft value.
+/// How much entropy is worth: the temperature of the soft value, α in the papers.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
 #[serde(deny_unknown_fields)]
 pub enum EntropyCoef {
     /// Tuned so that the policy's entropy comes near a target (Haarnoja et al. 2018, "Soft actor-critic algorithms and
     /// applications").
     Auto {
-        /// α at the start.
+        /// The temperature at the start.
         #[serde(default = "one")]
         initial: f64,
         /// The target in units of -dim (continuous; 1 if `None`) or of ln K, the entropy of K equal choices (discrete;
@@ -28,7 +28,7 @@ fn one() -> f64 {
 }
 
 /// Hyperparameters of SAC. The defaults follow the paper's Table 4 for its mazes and, where that says nothing, the
-/// released code; but α is tuned, as there, instead of the table's constant 0.2.
+/// released code; but the temperature is tuned, as there, instead of the table's constant 0.2.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[serde(deny_unknown_fields, default)]
 pub struct SacConfig {
@@ -36,8 +36,9 @@ pub struct SacConfig {
     pub actor_lr: f64,
     /// Learning rate of the critics' Adam (the released code has 1e-3).
     pub critic_lr: f64,
-    /// Learning rate of ln α's Adam.
-    pub alpha_lr: f64,
+    /// Learning rate of the temperature's Adam.
+    #[serde(rename = "alpha_lr")]
+    pub temperature_lr: f64,
     /// Transitions in a gradient step, drawn with replacement.
     pub batch: usize,
     /// Transitions that are kept, the newest. Each takes 2 · (obs_dim + latent) + action width + 2 numbers of 4 bytes.
@@ -84,7 +85,7 @@ impl Default for SacConfig {
         Self {
             actor_lr: 3e-4,
             critic_lr: 3e-4,
-            alpha_lr: 3e-4,
+            temperature_lr: 3e-4,
             batch: 256,
             buffer: 1_000_000,
             learning_starts: 5000,
@@ -128,7 +129,7 @@ impl SacConfig {
         let positive = [
             ("actor_lr", self.actor_lr),
             ("critic_lr", self.critic_lr),
-            ("alpha_lr", self.alpha_lr),
+            ("alpha_lr", self.temperature_lr),
             ("updates_per_step", self.updates_per_step),
             ("tau", self.tau),
             ("adam_eps", self.adam_eps),
@@ -151,15 +152,15 @@ impl SacConfig {
             EntropyCoef::Auto { target_scale: Some(scale), .. } if !scale.is_finite() => {
                 bad(format!("sac entropy target_scale must be finite, not {scale}"))
             }
-            EntropyCoef::Fixed(alpha) if !(alpha >= 0.0 && alpha.is_finite()) => {
-                bad(format!("sac entropy must not be negative, but is {alpha}"))
+            EntropyCoef::Fixed(temperature) if !(temperature >= 0.0 && temperature.is_finite()) => {
+                bad(format!("sac entropy must not be negative, but is {temperature}"))
             }
             _ => Ok(()),
         }
     }
 
-    /// The entropy in nats that α is tuned for: -scale · dim (continuous) or scale · ln K (discrete); `None` if α is
-    /// fixed.
+    /// The entropy in nats that the temperature is tuned for: -scale · dim (continuous) or scale · ln K (discrete); `None` if it
+    /// is fixed.
     pub fn target_entropy(&self, space: ActionSpace) -> Option<f64> {
         let EntropyCoef::Auto { target_scale, .. } = self.entropy else { return None };
         Some(match space {

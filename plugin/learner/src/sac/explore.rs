@@ -32,12 +32,13 @@ mod tests {
     use super::*;
     use crate::policy::Policy;
     use crate::rng::Streams;
-    use crate::{Action, DeviceKind};
+    use crate::{Action, DeviceKind, PolicySpec};
 
     /// How 20,000 actions fall into five bins.
     fn counts(space: ActionSpace) -> [usize; 5] {
         let device = DeviceKind::Flex.plain();
-        let policy = Policy::new(&explorer(space, 3, &device), None, None, space, (2, 1), device);
+        let spec = PolicySpec { obs: 2.into(), latent: 1, action_space: space };
+        let policy = Policy::new(&explorer(space, 3, &device), None, None, spec, device);
         let output = policy.forward(&[5.0], &[-3.0, 4.0], 1).expect("finite");
         let mut rng = Streams::new(1).stream("draw", 0);
         let mut counts = [0; 5];

@@ -2,16 +2,19 @@
 
 use super::buffer::ReplayBuffer;
 use super::explore::explorer;
-use super::metrics::Sums;
-use super::transitions::check_ends;
-use super::{EntropyCoef, SacBatch, SacConfig, SacMetrics, SacNets, actor_step, alpha_step, critic_step, soft_update};
+use super::{SacConfig, SacNets};
+use crate::file::{FileKind, TensorFile};
+use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
 use crate::nn::{Adam, AdamConfig};
-use crate::norm::{ObsNormalizer, RewardNormalizer};
-use crate::policy::{Actor, Policy, SkillSource};
-use crate::rng::{ChaCha8Rng, Streams};
-use crate::score::{FrozenSkill, ScoreConfig, present_stats};
-use crate::skill::{Prior, SkillModel};
-use crate::{ActionSpace, DeviceKind, LearnError, ObsSlice, PolicySpec, Rollout};
+use crate::norm::RewardNormalizer;
+use crate::policy::{Policy, States};
+use crate::score::{ScoreConfig, Teacher};
+use crate::skill::SkillModel;
+use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, Rollout};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const FILE: FileKind = FileKind { name: "sac checkpoint", version: 1 };
 
 /// Improves a policy from transitions, new and old.
 ///
@@ -21,19 +24,13 @@ use crate::{ActionSpace, DeviceKind, LearnError, ObsSlice, PolicySpec, Rollout};
 #[derive(Debug)]
 pub struct SacLearner {
     pub(super) config: SacConfig,
-    pub(super) spec: PolicySpec,
-    pub(super) skill: Option<FrozenSkill>,
+    pub(super) base: LearnerBase,
     pub(super) nets: SacNets,
     pub(super) optimizers: Optimizers,
     pub(super) buffer: ReplayBuffer,
-    pub(super) rewards: Option<RewardNormalizer>,
-    pub(super) observations: Option<ObsNormalizer>,
-    pub(super) streams: Streams,
-    pub(super) updates: u64,
     pub(super) gradient_steps: u64,
     /// The part of a gradient step that is still owed.
     pub(super) carry: f64,
-    pub(super) device: DeviceKind,
 }
 
 /// One Adam for each loss.
@@ -41,7 +38,33 @@ pub struct SacLearner {
 pub(super) struct Optimizers {
     pub(super) critics: Adam,
     pub(super) actor: Adam,
-    pub(super) alpha: Adam,
+    pub(super) temperature: Adam,
+}
+
+impl Optimizers {
+    fn new(config: &SacConfig) -> Self {
+        let adam = || Adam::new(AdamConfig { eps: config.adam_eps, ..AdamConfig::default() });
+        Self { critics: adam(), actor: adam(), temperature: adam() }
+    }
+
+    /// Takes the moments out of a checkpoint.
+    fn take(&mut self, file: &mut TensorFile, nets: &mut SacNets, counters: &Counters) -> Result<(), FileError> {
+        file.take_adam(&mut self.critics, "", &mut nets.critics, counters.critic_steps)?;
+        file.take_adam(&mut self.actor, "actor", &mut nets.actor, counters.actor_steps)?;
+        file.take_adam(&mut self.temperature, "", &mut nets.log_temperature, counters.temperature_steps)
+    }
+}
+
+/// The counters in a checkpoint.
+#[derive(Serialize, Deserialize, Debug)]
+struct Counters {
+    gradient_steps: u64,
+    carry: f64,
+    transitions: u64,
+    critic_steps: u64,
+    actor_steps: u64,
+    #[serde(rename = "alpha_steps")]
+    temperature_steps: u64,
 }
 
 impl SacLearner {
@@ -50,7 +73,7 @@ impl SacLearner {
     /// # Errors
     /// [`LearnError::Config`] for settings that cannot work, or observations that are images.
     pub fn new(config: SacConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
-        Self::build(config, spec, None, seed, device)
+        Self::fresh(config, spec, None, seed, device)
     }
 
     /// SCORE-SAC: tied to `model`'s decoder as `score` says.
@@ -69,79 +92,57 @@ impl SacLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
-        let skill = FrozenSkill::new(score, model);
-        Self::build(config, skill.spec(), Some(skill), seed, device)
+        let teacher = Teacher::new(score, model);
+        Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
-    pub(super) fn build(
+    fn fresh(
         config: SacConfig,
         spec: PolicySpec,
-        skill: Option<FrozenSkill>,
+        teacher: Option<Teacher>,
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
+        let base = Self::new_base(&config, spec, teacher, seed, device)?;
+        let nets = SacNets::fresh(&config, &base)?;
+        Ok(Self::with_nets(config, base, nets))
+    }
+
+    fn new_base(
+        config: &SacConfig,
+        spec: PolicySpec,
+        teacher: Option<Teacher>,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<LearnerBase, LearnError> {
         config.validate()?;
-        spec.validate()?;
-        let copy = match &skill {
-            Some(skill) => skill.copy(config.norm_obs)?,
-            None => None,
-        };
-        if copy.is_some() && matches!(spec.action_space, ActionSpace::Continuous(_)) {
+        let rewards = config.norm_reward.then(|| RewardNormalizer::new(config.gamma));
+        let base = LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)?;
+        if base.copied_teacher().is_some() && matches!(spec.action_space, ActionSpace::Continuous(_)) {
             let text = "sac squashes continuous actions, so its policy cannot start as a copy of the decoder: set score \
                         init_from_decoder to false (the penalty still ties the two together)";
             return Err(LearnError::Config(text.to_owned()));
         }
-        let streams = Streams::new(seed);
-        let obs_dim = spec.obs.vector("SAC")?;
-        let shape = spec.net_shape(obs_dim, &config.hidden, config.activation);
-        let initial = match config.entropy {
-            EntropyCoef::Auto { initial, .. } => initial,
-            EntropyCoef::Fixed(_) => 1.0,
-        };
-        let nets = SacNets::new(&shape, spec.action_space, config.log_std, copy, initial, &streams, device);
-        let adam = || Adam::new(AdamConfig { eps: config.adam_eps, ..AdamConfig::default() });
-        let latent = skill.as_ref().map_or(spec.latent, FrozenSkill::latent);
-        Ok(Self {
+        spec.obs.vector("SAC")?;
+        Ok(base)
+    }
+
+    fn with_nets(config: SacConfig, base: LearnerBase, nets: SacNets) -> Self {
+        let (obs_dim, latent) = (base.spec.obs.numbers(), base.rollout_latent());
+        Self {
             nets,
-            optimizers: Optimizers { critics: adam(), actor: adam(), alpha: adam() },
-            buffer: ReplayBuffer::new(config.buffer, obs_dim, latent, &spec.action_space),
-            rewards: config.norm_reward.then(|| RewardNormalizer::new(config.gamma)),
-            observations: config.norm_obs.then(|| ObsNormalizer::new(obs_dim)),
-            updates: 0,
+            optimizers: Optimizers::new(&config),
+            buffer: ReplayBuffer::new(config.buffer, obs_dim, latent, &base.spec.action_space),
             gradient_steps: 0,
             carry: 0.0,
             config,
-            spec,
-            skill,
-            streams,
-            device,
-        })
+            base,
+        }
     }
 
     /// The settings.
     pub fn config(&self) -> &SacConfig {
         &self.config
-    }
-
-    /// The settings of SCORE, with a skill model.
-    pub fn score_config(&self) -> Option<&ScoreConfig> {
-        self.skill.as_ref().map(|skill| &skill.config)
-    }
-
-    /// What the policy reads and does. With a skill model rollouts need skills also where `latent` is 0
-    /// ([`Self::rollout_latent`]).
-    pub fn spec(&self) -> PolicySpec {
-        self.spec
-    }
-
-    /// Width of the skills that a rollout must hold.
-    pub fn rollout_latent(&self) -> usize {
-        self.buffer.latent
-    }
-
-    /// Calls of [`Self::update`] done.
-    pub fn updates(&self) -> u64 {
-        self.updates
     }
 
     /// Gradient steps of the critics done.
@@ -154,140 +155,74 @@ impl SacLearner {
         self.buffer.seen
     }
 
-    /// The seed.
-    pub fn seed(&self) -> u64 {
-        self.streams.seed()
+    /// Reads a file that [`Learner::save`] wrote. The learner goes on exactly as the saved one would have.
+    ///
+    /// # Errors
+    /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
+    pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
+        let mut saved = Checkpoint::<SacConfig, Counters>::read(path, FILE, device)?;
+        let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
+        let base = base.map_err(|e| saved.file.learner(e))?;
+        let nets = SacNets::stored(&saved.config, &base, &mut saved.file)?;
+        let mut learner = Self::with_nets(saved.config.clone(), base, nets);
+        let counters = &saved.counters;
+        learner.optimizers.take(&mut saved.file, &mut learner.nets, counters)?;
+        learner.buffer.take(&mut saved.file, counters.transitions)?;
+        learner.base.spec.action_space.check(&learner.buffer.actions).map_err(|e| saved.file.learner(e))?;
+        (learner.gradient_steps, learner.carry) = (counters.gradient_steps, counters.carry);
+        saved.finish(&mut learner.base)?;
+        Ok(learner)
+    }
+}
+
+impl Learner for SacLearner {
+    fn base(&self) -> &LearnerBase {
+        &self.base
     }
 
-    /// Where skills come from, by [`ScoreConfig::prior`]; `None` without a skill model.
-    pub fn prior(&self) -> Option<Prior> {
-        self.skill.as_ref().map(|skill| skill.prior(self.device))
-    }
-
-    /// Where the policy's skills come from, and its decoder; `None` without a skill model.
-    pub fn skills(&self) -> Option<SkillSource> {
-        self.skill.as_ref().map(|skill| skill.source(self.device))
-    }
-
-    /// A snapshot of the policy that shall play now: the actor, or random actions as [`SacConfig::random_start`] says.
-    /// It has no critic; its values are zeros.
-    pub fn policy(&self) -> Policy {
-        let copied = self.score_config().is_some_and(|score| score.init_from_decoder);
+    /// The actor, or random actions as [`SacConfig::random_start`] says. It has no critic; its values are zeros.
+    fn policy(&self) -> Policy {
+        let copied = self.base.copied_teacher().is_some();
         let warming_up = self.buffer.seen < self.config.learning_starts;
         if warming_up && self.config.random_start && !copied {
-            return self.snapshot(&explorer(self.spec.action_space, self.inputs(), &self.device.plain()));
+            let device = self.base.device.plain();
+            return self.base.snapshot(&explorer(self.base.spec.action_space, self.inputs(), &device), None);
         }
-        self.snapshot(&self.nets.actor)
+        self.base.snapshot(&self.nets.actor, None)
     }
 
-    fn snapshot(&self, actor: &Actor) -> Policy {
-        let stats = present_stats(self.skill.as_ref(), self.observations.as_ref());
-        let widths = (self.spec.obs, self.spec.latent);
-        Policy::new(actor, None, stats, self.spec.action_space, widths, self.device.plain())
+    fn learn(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError> {
+        Ok(LearnerMetrics::new(self.update(rollout)?.scalars()))
     }
 
-    /// Mean divergence between decoder and actor over `n` rows, in nats: exactly 0 for an actor that is still a copy of
-    /// the decoder. `None` without a skill model.
-    ///
-    /// # Errors
-    /// [`LearnError::InitialKl`] if the actor should be a copy (no gradient step was done, and
-    /// [`ScoreConfig::init_from_decoder`]) and the divergence is not exactly 0; [`LearnError::Shape`].
-    pub fn initial_kl<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Option<f32>, LearnError> {
-        let Some(skill) = &self.skill else { return Ok(None) };
-        let actor = self.snapshot(&self.nets.actor);
-        skill.initial_kl(&actor, self.gradient_steps == 0, (z, obs.into(), n), self.device).map(Some)
+    /// Of the actor, also while random actions are played.
+    fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
+        let actor = self.base.snapshot(&self.nets.actor, None);
+        self.base.initial_kl(&actor, self.gradient_steps == 0, States { z, obs, n })
     }
 
-    /// Takes in a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
-    /// [`SacConfig::learning_starts`] transitions, does the gradient steps that are due.
-    ///
-    /// # Errors
-    /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
-    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed;
-    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
-    /// then.
-    pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
-        rollout.check_for(&self.spec, self.rollout_latent())?;
-        check_ends(rollout)?;
-        if let Some(normalizer) = &mut self.rewards {
-            normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
-        }
-        if let Some(normalizer) = &mut self.observations {
-            normalizer.update(rollout.obs.as_slice().vectors("SAC")?);
-        }
-        self.buffer.push(rollout)?;
-        let mut sums = Sums::default();
-        let due = self.steps_due(rollout.rows());
-        for _ in 0..due {
-            self.gradient_step(&mut sums)?;
-        }
-        self.updates += 1;
-        let penalised = self.score_config().is_some_and(|score| score.kl);
-        let entropy_coef = if due > 0 { Some(self.alpha()? as f32) } else { None };
-        let (transitions, gradient_steps) = (self.buffer.seen, self.gradient_steps);
-        Ok(SacMetrics { transitions, gradient_steps, entropy_coef, ..sums.means(penalised) })
-    }
-
-    /// Width of what the actor reads.
-    pub(super) fn inputs(&self) -> usize {
-        self.spec.latent + self.buffer.obs_dim
-    }
-
-    /// Whole gradient steps for `rows` new transitions.
-    fn steps_due(&mut self, rows: usize) -> u64 {
-        if self.buffer.seen < self.config.learning_starts {
-            return 0;
-        }
-        let owed = self.carry + self.config.updates_per_step * rows as f64;
-        self.carry = owed.fract();
-        owed as u64
-    }
-
-    /// The critics' step, the actor's and α's where they are due, and the targets'.
-    fn gradient_step(&mut self, sums: &mut Sums) -> Result<(), LearnError> {
-        let number = self.gradient_steps;
-        let slots = self.buffer.draw(self.config.batch, &mut self.streams.stream("sac.batch", number));
-        let mut rng = self.streams.stream("sac.noise", number);
-        self.gradient_steps += 1;
-        let with_actor = self.gradient_steps.is_multiple_of(self.config.actor_every);
-        let batch = self.batch(&slots, with_actor)?;
-        let noise = self.noise(&mut rng);
-        let (alpha, config) = (self.alpha()?, &self.config);
-        let (nets, adams) = (&mut self.nets, &mut self.optimizers);
-        let coefficients = (alpha, config.gamma);
-        let step = critic_step(nets, &mut adams.critics, &batch, noise.as_ref(), coefficients, config.critic_lr)?;
-        sums.add_critics(&step);
-        if with_actor {
-            for _ in 0..self.config.actor_every {
-                self.actor_update(&batch, &mut rng, sums)?;
+    /// Weights are called `actor.l0.weight`, `q1.l0.weight`, `target.q1.l0.weight` and `log_alpha` (that of the
+    /// temperature), moments `adam.m.actor.l0.weight`, the replay buffer `buffer.obs` and so on.
+    fn save(&self, path: &Path) -> Result<(), FileError> {
+        let (nets, adams) = (&self.nets, &self.optimizers);
+        let counters = Counters {
+            gradient_steps: self.gradient_steps,
+            carry: self.carry,
+            transitions: self.buffer.seen,
+            critic_steps: adams.critics.steps,
+            actor_steps: adams.actor.steps,
+            temperature_steps: adams.temperature.steps,
+        };
+        self.base.save(path, FILE, &self.config, &counters, |file| {
+            file.put_network("actor", &nets.actor)?;
+            file.put_network("", &nets.critics)?;
+            file.put_network("target", &nets.targets)?;
+            file.put_network("", &nets.log_temperature)?;
+            for adam in [&adams.critics, &adams.actor, &adams.temperature] {
+                file.put_adam(adam);
             }
-        }
-        if self.gradient_steps.is_multiple_of(self.config.target_every) {
-            soft_update(&mut self.nets.targets, &self.nets.critics, self.config.tau);
-        }
-        Ok(())
-    }
-
-    /// A step of the actor and, if it is tuned, one of α.
-    fn actor_update(&mut self, batch: &SacBatch, rng: &mut ChaCha8Rng, sums: &mut Sums) -> Result<(), LearnError> {
-        let (alpha, noise) = (self.alpha()?, self.noise(rng));
-        let score = self.skill.as_ref().map(|skill| &skill.config);
-        let (nets, adams, config) = (&mut self.nets, &mut self.optimizers, &self.config);
-        let step = actor_step(nets, &mut adams.actor, batch, noise.as_ref(), alpha, score, config.actor_lr)?;
-        sums.add_actor(&step);
-        if let Some(target) = self.config.target_entropy(self.spec.action_space) {
-            let noise = self.noise(rng);
-            let (nets, adam) = (&mut self.nets, &mut self.optimizers.alpha);
-            sums.add_alpha(&alpha_step(nets, adam, batch, noise.as_ref(), target, self.config.alpha_lr)?);
-        }
-        Ok(())
-    }
-
-    /// What the transitions' entropy is worth now.
-    fn alpha(&self) -> Result<f64, LearnError> {
-        match self.config.entropy {
-            EntropyCoef::Auto { .. } => self.nets.alpha(),
-            EntropyCoef::Fixed(alpha) => Ok(alpha),
-        }
+            self.buffer.put(file);
+            Ok(())
+        })
     }
 }

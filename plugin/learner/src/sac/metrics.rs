@@ -1,6 +1,6 @@
 //! What an update reports.
 
-use super::{ActorStep, AlphaStep, CriticStep};
+use super::{ActorStep, CriticStep, TemperatureStep};
 use serde::{Deserialize, Serialize};
 
 /// Means over all gradient steps of an update; `None` for what was not done or not measured.
@@ -22,14 +22,16 @@ pub struct SacMetrics {
     pub entropy: Option<f32>,
     /// Norm of the actor's gradient.
     pub actor_grad_norm: Option<f32>,
-    /// Loss of α; `None` where it is fixed.
-    pub alpha_loss: Option<f32>,
-    /// α at the end of the update; `None` without a gradient step.
+    /// Loss of the temperature; `None` where it is fixed.
+    #[serde(rename = "alpha_loss")]
+    pub temperature_loss: Option<f32>,
+    /// The temperature at the end of the update; `None` without a gradient step.
     pub entropy_coef: Option<f32>,
     /// Mean divergence between decoder and policy in nats, not weighted; `None` without a penalty.
     pub decoder_kl: Option<f32>,
     /// Mean of the decoder's confidence; `None` without a penalty.
-    pub alpha_mean: Option<f32>,
+    #[serde(rename = "alpha_mean")]
+    pub confidence: Option<f32>,
 }
 
 impl SacMetrics {
@@ -45,9 +47,9 @@ impl SacMetrics {
             ("losses/actor_loss", self.actor_loss),
             ("losses/entropy", self.entropy),
             ("losses/actor_grad_norm", self.actor_grad_norm),
-            ("losses/alpha_loss", self.alpha_loss),
+            ("losses/alpha_loss", self.temperature_loss),
             ("score/decoder_kl", self.decoder_kl),
-            ("score/alpha_mean", self.alpha_mean),
+            ("score/alpha_mean", self.confidence),
         ];
         let measured = measured.into_iter().filter_map(|(tag, value)| Some((tag, f64::from(value?))));
         counters.into_iter().chain(measured).collect()
@@ -56,13 +58,13 @@ impl SacMetrics {
 
 /// Sums over the gradient steps of an update.
 #[derive(Default)]
-pub(super) struct Sums {
+pub(super) struct MetricSums {
     critics: (CriticStep, u64),
     actor: (ActorStep, u64),
-    alpha: (AlphaStep, u64),
+    temperature: (TemperatureStep, u64),
 }
 
-impl Sums {
+impl MetricSums {
     pub(super) fn add_critics(&mut self, step: &CriticStep) {
         let (sum, count) = &mut self.critics;
         sum.q1_loss += step.q1_loss;
@@ -82,18 +84,18 @@ impl Sums {
         *count += 1;
     }
 
-    pub(super) fn add_alpha(&mut self, step: &AlphaStep) {
-        let (sum, count) = &mut self.alpha;
-        sum.alpha_loss += step.alpha_loss;
+    pub(super) fn add_temperature(&mut self, step: &TemperatureStep) {
+        let (sum, count) = &mut self.temperature;
+        sum.temperature_loss += step.temperature_loss;
         *count += 1;
     }
 
-    /// The means; counters and α are left to the caller.
+    /// The means; counters and the temperature are left to the caller.
     pub(super) fn means(&self, penalised: bool) -> SacMetrics {
         let mean = |total: f64, count: u64| (count > 0).then(|| (total / count as f64) as f32);
         let (critics, n) = &self.critics;
         let (actor, m) = &self.actor;
-        let (alpha, k) = &self.alpha;
+        let (temperature, k) = &self.temperature;
         SacMetrics {
             qf_loss: mean(0.5 * (critics.q1_loss + critics.q2_loss), *n),
             qf_values: mean(critics.q_values, *n),
@@ -101,9 +103,9 @@ impl Sums {
             actor_loss: mean(actor.actor_loss, *m),
             entropy: mean(actor.entropy, *m),
             actor_grad_norm: mean(actor.grad_norm, *m),
-            alpha_loss: mean(alpha.alpha_loss, *k),
+            temperature_loss: mean(temperature.temperature_loss, *k),
             decoder_kl: mean(actor.decoder_kl, *m).filter(|_| penalised),
-            alpha_mean: mean(actor.confidence, *m).filter(|_| penalised),
+            confidence: mean(actor.confidence, *m).filter(|_| penalised),
             ..SacMetrics::default()
         }
     }

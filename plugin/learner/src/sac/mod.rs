@@ -5,22 +5,22 @@
 
 mod batch;
 mod buffer;
-mod checkpoint;
 mod config;
 mod explore;
 mod learner;
 mod loss;
 mod metrics;
 mod nets;
-mod target;
+mod soft_update;
+mod steps;
 mod transitions;
 mod update;
 
 pub use batch::SacBatch;
 pub use config::{EntropyCoef, SacConfig};
 pub use learner::SacLearner;
-pub use loss::{alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
+pub use loss::{critic_loss, q_target, soft_value, soft_value_of_choices, temperature_loss};
 pub use metrics::SacMetrics;
-pub use nets::{Critics, LogAlpha, SacNets};
-pub use target::soft_update;
-pub use update::{ActorStep, AlphaStep, CriticStep, actor_step, alpha_step, critic_step, target_of};
+pub use nets::{Critics, LogTemperature, SacNets};
+pub use soft_update::soft_update;
+pub use steps::{ActorStep, CriticStep, TemperatureStep, actor_step, critic_step, target_of, temperature_step};

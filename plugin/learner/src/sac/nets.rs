@@ -1,10 +1,11 @@
-//! The networks of SAC: an actor, two critics and their targets, and ln α.
+//! The networks of SAC: an actor, two critics and their targets, and the temperature.
 
-use crate::LearnError;
-use crate::nn::{ActionRows, Mlp, ParamVisitor, Parameters, frozen, path, tracked, vector};
-use crate::policy::{Actor, NetShape};
-use crate::rng::Streams;
-use crate::{ActionSpace, DeviceKind};
+use super::{EntropyCoef, SacConfig};
+use crate::file::TensorFile;
+use crate::learner::LearnerBase;
+use crate::nn::{ActionBatch, Fresh, Init, Mlp, ParamSource, ParamVisitor, Parameters, frozen, path, tracked, vector};
+use crate::policy::{Actor, ActorShape, NetShape, StdShape};
+use crate::{ActionSpace, FileError, LearnError};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
@@ -22,13 +23,24 @@ pub struct Critics {
 impl Critics {
     /// Orthogonal weights, gain √2 in the hidden layers and 1 in the heads.
     pub fn new<R: Rng + ?Sized>(shape: &NetShape, space: ActionSpace, rng: &mut R, device: &Device) -> Self {
-        let inputs = shape.latent + shape.obs_dim;
+        let Ok(critics) = Self::build(&mut Fresh { rng, device }, "", shape, space);
+        critics
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        shape: &NetShape,
+        space: ActionSpace,
+    ) -> Result<Self, S::Error> {
         let (inputs, outputs) = match space {
-            ActionSpace::Discrete(choices) => (inputs, choices),
-            ActionSpace::Continuous(dim) => (inputs + dim, 1),
+            ActionSpace::Discrete(choices) => (shape.inputs(), choices),
+            ActionSpace::Continuous(dim) => (shape.inputs().saturating_add(dim), 1),
         };
-        let mut net = || Mlp::new(inputs, &shape.hidden, outputs, shape.activation, 1.0, rng, device);
-        Self { q1: net(), q2: net() }
+        let mut net =
+            |name: &str| Mlp::build(source, &path(prefix, name), inputs, &shape.hidden, outputs, shape.activation, 1.0);
+        Ok(Self { q1: net("q1")?, q2: net("q2")? })
     }
 
     /// Q₁ and Q₂ of all choices in each state `[z, s]`, `[n, choices]` each.
@@ -43,10 +55,10 @@ impl Critics {
     }
 
     /// Q₁ and Q₂ of the actions taken, `[n]` each.
-    pub fn of_actions(&self, inputs: Tensor<2>, actions: &ActionRows) -> (Tensor<1>, Tensor<1>) {
+    pub fn of_actions(&self, inputs: Tensor<2>, actions: &ActionBatch) -> (Tensor<1>, Tensor<1>) {
         match actions {
-            ActionRows::Continuous(vectors) => self.of_vectors(inputs, vectors.clone()),
-            ActionRows::Discrete(index) => {
+            ActionBatch::Continuous(vectors) => self.of_vectors(inputs, vectors.clone()),
+            ActionBatch::Discrete(index) => {
                 let (q1, q2) = self.of_choices(inputs);
                 (q1.gather(1, index.clone()).squeeze_dim(1), q2.gather(1, index.clone()).squeeze_dim(1))
             }
@@ -61,11 +73,11 @@ impl Parameters for Critics {
     }
 }
 
-/// ln α, `[1]`.
+/// The logarithm of the temperature, `[1]`; `log_alpha` in files.
 #[derive(Clone, Debug)]
-pub struct LogAlpha(pub Tensor<1>);
+pub struct LogTemperature(pub Tensor<1>);
 
-impl Parameters for LogAlpha {
+impl Parameters for LogTemperature {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         visitor.visit(&path(prefix, "log_alpha"), &mut self.0);
     }
@@ -80,39 +92,78 @@ pub struct SacNets {
     pub critics: Critics,
     /// Their slow copies, not tracked.
     pub targets: Critics,
-    /// ln α, tracked; does nothing where α is fixed.
-    pub log_alpha: LogAlpha,
+    /// The logarithm of the temperature, tracked; does nothing where that is fixed.
+    pub log_temperature: LogTemperature,
 }
 
 impl SacNets {
-    /// Starting weights, from streams of their own for actor and critics; `copy` takes the place of a fresh actor.
-    pub fn new(
-        shape: &NetShape,
-        space: ActionSpace,
-        log_std: (f64, f64),
-        copy: Option<Actor>,
-        initial_alpha: f64,
-        streams: &Streams,
-        device: DeviceKind,
-    ) -> Self {
-        let plain = device.plain();
-        let actor =
-            copy.unwrap_or_else(|| Actor::squashed(shape, space, log_std, &mut streams.stream("sac.actor", 0), &plain));
-        let critics = Critics::new(shape, space, &mut streams.stream("sac.critics", 0), &plain);
-        let log_alpha = LogAlpha(vector(vec![initial_alpha.ln() as f32], &plain));
+    /// A copy of the decoder, or starting weights from the stream `sac.actor`, and critics with some from `sac.critics`.
+    ///
+    /// # Errors
+    /// None, as long as observations are vectors.
+    pub(super) fn fresh(config: &SacConfig, base: &LearnerBase) -> Result<Self, LearnError> {
+        let (shape, device) = (actor_shape(config, base), base.device.plain());
+        let actor = match base.copied_teacher() {
+            Some(teacher) => teacher.decoder().clone(),
+            None => shape.fresh(&base.spec, &base.streams, "sac.actor", &device)?,
+        };
+        let mut rng = base.streams.stream("sac.critics", 0);
+        let critics = Critics::new(&critic_shape(config, base), base.spec.action_space, &mut rng, &device);
+        let initial = match config.entropy {
+            EntropyCoef::Auto { initial, .. } => initial,
+            EntropyCoef::Fixed(_) => 1.0,
+        };
+        let log_temperature = LogTemperature(vector(vec![initial.ln() as f32], &device));
+        Ok(Self::tracked(&actor, &critics, &critics, &log_temperature))
+    }
+
+    /// Those of a checkpoint.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first tensor that is missing or misshapen.
+    pub(super) fn stored(config: &SacConfig, base: &LearnerBase, file: &mut TensorFile) -> Result<Self, FileError> {
+        let (device, space) = (base.device.plain(), base.spec.action_space);
+        let actor = actor_shape(config, base).stored(&base.spec, file, "actor", &device)?;
+        let (shape, source) = (critic_shape(config, base), &mut file.params(&device));
+        let critics = Critics::build(source, "", &shape, space)?;
+        let targets = Critics::build(source, "target", &shape, space)?;
+        let log_temperature = LogTemperature(source.param("log_alpha", [1], Init::Zeros)?);
+        Ok(Self::tracked(&actor, &critics, &targets, &log_temperature))
+    }
+
+    fn tracked(actor: &Actor, critics: &Critics, targets: &Critics, log_temperature: &LogTemperature) -> Self {
         Self {
-            actor: tracked(&actor),
-            targets: frozen(&critics),
-            critics: tracked(&critics),
-            log_alpha: tracked(&log_alpha),
+            actor: tracked(actor),
+            critics: tracked(critics),
+            targets: frozen(targets),
+            log_temperature: tracked(log_temperature),
         }
     }
 
-    /// α = exp(ln α).
+    /// How much entropy is worth now.
     ///
     /// # Errors
     /// [`LearnError::Device`] if it cannot be read.
-    pub fn alpha(&self) -> Result<f64, LearnError> {
-        Ok(f64::from(crate::nn::scalar(self.log_alpha.0.clone().inner())?).exp())
+    pub fn temperature(&self) -> Result<f64, LearnError> {
+        Ok(f64::from(crate::nn::scalar(self.log_temperature.0.clone().inner())?).exp())
+    }
+}
+
+/// The decoder's layers for a copy of it, else those of the settings.
+fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
+    let (low, high) = config.log_std;
+    match base.copied_teacher() {
+        Some(teacher) => teacher.description.decoder_shape(),
+        None => ActorShape { net: critic_shape(config, base), std: StdShape::Squashed(low, high), cnn: None },
+    }
+}
+
+/// What a critic reads beside a continuous action, and its hidden layers.
+fn critic_shape(config: &SacConfig, base: &LearnerBase) -> NetShape {
+    NetShape {
+        obs_dim: base.spec.obs.numbers(),
+        latent: base.spec.latent,
+        hidden: config.hidden.clone(),
+        activation: config.activation,
     }
 }

@@ -9,7 +9,7 @@ pub(super) struct Transition<'a> {
     pub(super) row: usize,
     /// The observation after the action; `None` after a termination, where there is none.
     pub(super) next_obs: Option<&'a [f32]>,
-    /// The skill under which that observation is judged; `None` likewise.
+    /// The skill under which that observation is valued; `None` likewise.
     pub(super) next_z: Option<&'a [f32]>,
 }
 
@@ -120,7 +120,7 @@ pub(super) mod tests {
             .map(|t| t.next_obs.zip(t.next_z).map(|(obs, z)| (obs[0], z[0])))
             .collect();
         let expected = [
-            Some((50.0, 60.0)), // cut off: not the row below, which shows the next episode
+            Some((50.0, 60.0)), // cut off: not the row below, which belongs to the next episode
             Some((3.0, 13.0)),
             Some((4.0, 14.0)),
             None, // terminated, though also cut off

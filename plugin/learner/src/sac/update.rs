@@ -1,207 +1,119 @@
-//! The gradient steps of SAC: critics, actor, α.
+//! One update from top to bottom: rollout → replay buffer → batches → steps of critics, actor and temperature → targets.
+//! The losses and their steps are in `loss.rs` and `steps.rs`.
 
-use super::{Critics, SacBatch, SacNets, alpha_loss, critic_loss, q_target, soft_value, soft_value_of_choices};
-use crate::LearnError;
-use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
-use crate::score::{Penalty, ScoreConfig, penalty};
-use burn::tensor::{Gradients, Tensor};
+use super::metrics::MetricSums;
+use super::transitions::check_ends;
+use super::{EntropyCoef, SacBatch, SacLearner, SacMetrics, actor_step, critic_step, soft_update, temperature_step};
+use crate::nn::matrix;
+use crate::rng::{ChaCha8Rng, normal};
+use crate::{ActionSpace, LearnError, Rollout};
+use burn::tensor::Tensor;
 
-/// What a step of the critics looked like, before it was taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CriticStep {
-    /// Mean squared error of Q₁.
-    pub q1_loss: f64,
-    /// Mean squared error of Q₂.
-    pub q2_loss: f64,
-    /// Mean of Q₁ and Q₂ over the batch.
-    pub q_values: f64,
-    /// Norm of the gradient.
-    pub grad_norm: f64,
-}
+impl SacLearner {
+    /// Takes in a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
+    /// [`SacConfig::learning_starts`](super::SacConfig::learning_starts) transitions, does the gradient steps that are
+    /// due.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
+    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed;
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
+    /// then.
+    pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
+        let base = &mut self.base;
+        rollout.check_for(&base.spec, base.rollout_latent())?;
+        check_ends(rollout)?;
+        if let Some(normalizer) = &mut base.rewards {
+            normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
+        }
+        if let Some(normalizer) = &mut base.observations {
+            normalizer.update(rollout.obs.as_slice().vectors("SAC")?);
+        }
+        self.buffer.push(rollout)?;
+        let mut sums = MetricSums::default();
+        let due = self.steps_due(rollout.rows());
+        for _ in 0..due {
+            self.gradient_step(&mut sums)?;
+        }
+        self.base.updates += 1;
+        let penalised = self.base.score_config().is_some_and(|score| score.kl);
+        let entropy_coef = if due > 0 { Some(self.temperature()? as f32) } else { None };
+        let (transitions, gradient_steps) = (self.buffer.seen, self.gradient_steps);
+        Ok(SacMetrics { transitions, gradient_steps, entropy_coef, ..sums.means(penalised) })
+    }
 
-/// What a step of the actor looked like, before it was taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ActorStep {
-    /// -mean(V), without the penalty.
-    pub actor_loss: f64,
-    /// Estimate of the entropy in nats, -mean(ln π): exact for discrete actions.
-    pub entropy: f64,
-    /// Mean divergence between decoder and policy, not weighted.
-    pub decoder_kl: f64,
-    /// The penalty that is added to the loss, in the form of [`ScoreConfig::penalty`], without kl_coef.
-    pub kl_penalty: f64,
-    /// Mean of the decoder's confidence.
-    pub confidence: f64,
-    /// Norm of the gradient.
-    pub grad_norm: f64,
-}
+    /// Whole gradient steps for `rows` new transitions.
+    fn steps_due(&mut self, rows: usize) -> u64 {
+        if self.buffer.seen < self.config.learning_starts {
+            return 0;
+        }
+        let owed = self.carry + self.config.updates_per_step * rows as f64;
+        self.carry = owed.fract();
+        owed as u64
+    }
 
-/// What a step of α looked like, before it was taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AlphaStep {
-    /// mean(-α (ln π + target entropy)).
-    pub alpha_loss: f64,
-    /// Mean of ln π.
-    pub log_prob: f64,
-}
-
-/// What the policy does in each row.
-#[expect(clippy::large_enum_variant, reason = "there is one per gradient step")]
-enum Choice {
-    /// ln π of all choices.
-    Choices(Tensor<2>),
-    /// A draw.
-    Draw(SquashedDraw),
-}
-
-impl Choice {
-    fn new(dist: Dist, noise: Option<&Tensor<2>>) -> Result<Self, LearnError> {
-        match (dist, noise) {
-            (Dist::Categorical { log_probs }, _) => Ok(Self::Choices(log_probs)),
-            (Dist::Gaussian { mean, log_std }, Some(noise)) => {
-                let device = noise.device();
-                let squashed = SquashedGaussian::unit(mean, log_std, &device);
-                Ok(Self::Draw(squashed.draw(noise.clone(), LogProbForm::Eps)))
+    /// The critics' step, the actor's and the temperature's where they are due, and the targets'.
+    fn gradient_step(&mut self, sums: &mut MetricSums) -> Result<(), LearnError> {
+        let number = self.gradient_steps;
+        let slots = self.buffer.draw(self.config.batch, &mut self.base.streams.stream("sac.batch", number));
+        let mut rng = self.base.streams.stream("sac.noise", number);
+        self.gradient_steps += 1;
+        let with_actor = self.gradient_steps.is_multiple_of(self.config.actor_every);
+        let batch = self.batch(&slots, with_actor)?;
+        let noise = self.noise(&mut rng);
+        let (temperature, config) = (self.temperature()?, &self.config);
+        let (nets, adam) = (&mut self.nets, &mut self.optimizers.critics);
+        sums.add_critics(&critic_step(
+            nets,
+            adam,
+            &batch,
+            noise.as_ref(),
+            temperature,
+            config.gamma,
+            config.critic_lr,
+        )?);
+        if with_actor {
+            for _ in 0..self.config.actor_every {
+                self.actor_update(&batch, &mut rng, sums)?;
             }
-            _ => Err(LearnError::Action("noise is needed to draw continuous actions".to_owned())),
+        }
+        if self.gradient_steps.is_multiple_of(self.config.target_every) {
+            soft_update(&mut self.nets.targets, &self.nets.critics, self.config.tau);
+        }
+        Ok(())
+    }
+
+    /// A step of the actor and, if it is tuned, one of the temperature.
+    fn actor_update(
+        &mut self,
+        batch: &SacBatch,
+        rng: &mut ChaCha8Rng,
+        sums: &mut MetricSums,
+    ) -> Result<(), LearnError> {
+        let (temperature, noise) = (self.temperature()?, self.noise(rng));
+        let (score, lr) = (self.base.score_config(), self.config.actor_lr);
+        let (nets, adam) = (&mut self.nets, &mut self.optimizers.actor);
+        sums.add_actor(&actor_step(nets, adam, batch, noise.as_ref(), temperature, score, lr)?);
+        if let Some(target) = self.config.target_entropy(self.base.spec.action_space) {
+            let noise = self.noise(rng);
+            let (nets, adam, lr) = (&mut self.nets, &mut self.optimizers.temperature, self.config.temperature_lr);
+            sums.add_temperature(&temperature_step(nets, adam, batch, noise.as_ref(), target, lr)?);
+        }
+        Ok(())
+    }
+
+    /// What the transitions' entropy is worth now.
+    fn temperature(&self) -> Result<f64, LearnError> {
+        match self.config.entropy {
+            EntropyCoef::Auto { .. } => self.nets.temperature(),
+            EntropyCoef::Fixed(temperature) => Ok(temperature),
         }
     }
 
-    /// V under `critics`, `[n]`.
-    fn soft_value(&self, critics: &Critics, inputs: Tensor<2>, alpha: f64) -> Tensor<1> {
-        match self {
-            Self::Choices(log_probs) => {
-                let (q1, q2) = critics.of_choices(inputs);
-                soft_value_of_choices(log_probs.clone(), q1, q2, alpha)
-            }
-            Self::Draw(draw) => {
-                let (q1, q2) = critics.of_vectors(inputs, draw.action.clone());
-                soft_value(draw.log_prob.clone(), q1, q2, alpha)
-            }
-        }
+    /// Standard normal numbers for a batch of draws; discrete actions need none.
+    fn noise(&self, rng: &mut ChaCha8Rng) -> Option<Tensor<2>> {
+        let ActionSpace::Continuous(dim) = self.base.spec.action_space else { return None };
+        let n = self.config.batch;
+        Some(matrix((0..n * dim).map(|_| normal(rng)).collect(), n, dim, &self.base.device.plain()))
     }
-
-    /// ln π of the draw, or E\[ln π\], `[n]`.
-    fn log_prob(&self) -> Tensor<1> {
-        match self {
-            Self::Choices(log_probs) => (log_probs.clone().exp() * log_probs.clone()).sum_dim(1).squeeze_dim(1),
-            Self::Draw(draw) => draw.log_prob.clone(),
-        }
-    }
-}
-
-/// y = r + γ V' of each row, V' being the target critics' soft value of the actor's choice in the next state.
-///
-/// `noise` is standard normal, `[n, dim]`, and needed for continuous actions only (here and below).
-///
-/// # Errors
-/// [`LearnError::Action`] without the noise that is needed.
-pub fn target_of(
-    nets: &SacNets,
-    batch: &SacBatch,
-    noise: Option<&Tensor<2>>,
-    alpha: f64,
-    gamma: f64,
-) -> Result<Tensor<1>, LearnError> {
-    let choice = Choice::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), noise)?;
-    let next = choice.soft_value(&nets.targets, batch.next_inputs.clone(), alpha);
-    Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
-}
-
-/// One step of Adam on both critics.
-///
-/// # Errors
-/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
-/// first loss beyond all bounds; [`LearnError::Action`] as [`target_of`].
-pub fn critic_step(
-    nets: &mut SacNets,
-    adam: &mut Adam,
-    batch: &SacBatch,
-    noise: Option<&Tensor<2>>,
-    (alpha, gamma): (f64, f64),
-    lr: f64,
-) -> Result<CriticStep, LearnError> {
-    let target = target_of(nets, batch, noise, alpha, gamma)?;
-    let (q1, q2) = nets.critics.of_actions(batch.inputs.clone(), &batch.actions);
-    let values = ((q1.clone() + q2.clone()) * 0.5).mean();
-    let (loss1, loss2) = (critic_loss(q1, target.clone()), critic_loss(q2, target));
-    let steps = adam.steps();
-    let (q1_loss, q2_loss) = (finite("q1_loss", &loss1, steps)?, finite("q2_loss", &loss2, steps)?);
-    let q_values = finite("q_values", &values, steps)?;
-    let grad_norm = descend(&mut nets.critics, "", adam, (loss1 + loss2).backward(), lr)?;
-    Ok(CriticStep { q1_loss, q2_loss, q_values, grad_norm })
-}
-
-/// One step of Adam on the actor, under the present critics.
-///
-/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss. A squashed policy is compared before its tanh (see [`crate::score::unsquashed`]).
-///
-/// # Errors
-/// As [`critic_step`].
-pub fn actor_step(
-    nets: &mut SacNets,
-    adam: &mut Adam,
-    batch: &SacBatch,
-    noise: Option<&Tensor<2>>,
-    alpha: f64,
-    score: Option<&ScoreConfig>,
-    lr: f64,
-) -> Result<ActorStep, LearnError> {
-    let dist = nets.actor.forward(batch.inputs.clone());
-    let choice = Choice::new(dist.clone(), noise)?;
-    let loss = choice.soft_value(&frozen(&nets.critics), batch.inputs.clone(), alpha).mean().neg();
-    let steps = adam.steps();
-    let mut metrics = ActorStep {
-        actor_loss: finite("actor_loss", &loss, steps)?,
-        entropy: -finite("log_prob", &choice.log_prob().mean(), steps)?,
-        ..ActorStep::default()
-    };
-    let mut total = loss;
-    if let (Some(decoder), Some(score)) = (&batch.decoder, score) {
-        let Penalty { kl, term } = penalty(score, &decoder.dist, &dist, decoder.alpha.clone())?;
-        metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
-        metrics.kl_penalty = finite("kl_penalty", &term, steps)?;
-        metrics.confidence = decoder.alpha_mean;
-        total = total + term * score.kl_coef;
-    }
-    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, total.backward(), lr)?;
-    Ok(metrics)
-}
-
-/// One step of Adam on ln α, under the present actor.
-///
-/// # Errors
-/// As [`critic_step`].
-pub fn alpha_step(
-    nets: &mut SacNets,
-    adam: &mut Adam,
-    batch: &SacBatch,
-    noise: Option<&Tensor<2>>,
-    target_entropy: f64,
-    lr: f64,
-) -> Result<AlphaStep, LearnError> {
-    let choice = Choice::new(frozen(&nets.actor).forward(batch.inputs.clone()), noise)?;
-    let log_prob = choice.log_prob();
-    let loss = alpha_loss(nets.log_alpha.0.clone(), log_prob.clone(), target_entropy);
-    let steps = adam.steps();
-    let metrics = AlphaStep {
-        alpha_loss: finite("alpha_loss", &loss, steps)?,
-        log_prob: finite("log_prob", &log_prob.mean(), steps)?,
-    };
-    descend(&mut nets.log_alpha, "", adam, loss.backward(), lr)?;
-    Ok(metrics)
-}
-
-/// One step of Adam without clipping; gives the gradient's norm.
-fn descend<M: Parameters>(
-    network: &mut M,
-    prefix: &str,
-    adam: &mut Adam,
-    gradients: Gradients,
-    lr: f64,
-) -> Result<f64, LearnError> {
-    let grads = NamedGrads::take(network, prefix, gradients)?;
-    let (norm, scale) = grads.clip_factor(f64::INFINITY, adam.steps())?;
-    adam.step(network, prefix, &grads, lr, scale)?;
-    Ok(norm)
 }

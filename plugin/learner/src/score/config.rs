@@ -13,9 +13,9 @@ pub enum KlDirection {
     PolicyDecoder,
 }
 
-/// The weight of each row's divergence: how sure the decoder is.
+/// The weight of each row's divergence, α in the paper: how sure the decoder is of an action.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
-pub enum AlphaKind {
+pub enum ConfidenceKind {
     /// Always 1.
     Off,
     /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous. The latter
@@ -39,10 +39,10 @@ pub enum PenaltyForm {
     Mean,
     /// The released code's for mazes: -w · clamp(Σ KL(policy ‖ decoder), ±100), where w is the sum over rows and
     /// dimensions of the decoder's one-dimensional densities at the rollout's actions. The sign is as released: it
-    /// rewards the divergence. Its kl_coef is 0.001. `kl_direction` and `alpha` are not used. Continuous actions only.
+    /// rewards the divergence. Its kl_coef is 0.001. `kl_direction` and `confidence` are not used. Continuous actions only.
     LegacyD4rl,
     /// The released code's for CoinRun: Σ p(a) clamp(KL(policy ‖ decoder), ±100), where p(a) is the decoder's
-    /// probability of the rollout's action. Its kl_coef is 1e-8. `kl_direction` and `alpha` are not used. Discrete
+    /// probability of the rollout's action. Its kl_coef is 1e-8. `kl_direction` and `confidence` are not used. Discrete
     /// actions only.
     LegacyCoinrun,
 }
@@ -70,8 +70,9 @@ pub struct ScoreConfig {
     pub kl_coef: f64,
     /// Which divergence is penalised.
     pub kl_direction: KlDirection,
-    /// The weight of each row.
-    pub alpha: AlphaKind,
+    /// The weight of each row, α in the paper.
+    #[serde(rename = "alpha")]
+    pub confidence: ConfidenceKind,
     /// How the rows are put together.
     pub penalty: PenaltyForm,
     /// Whether skills are drawn or are the prior's mean.
@@ -90,7 +91,7 @@ impl Default for ScoreConfig {
             kl: true,
             kl_coef: 0.1,
             kl_direction: KlDirection::DecoderPolicy,
-            alpha: AlphaKind::OwnSample,
+            confidence: ConfidenceKind::OwnSample,
             penalty: PenaltyForm::Mean,
             skill_draw: SkillDraw::Sample,
             horizon: 8,

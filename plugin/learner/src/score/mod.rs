@@ -3,21 +3,19 @@
 //! Three switches over PPO or SAC: the policy reads the skill z ([`ScoreConfig::condition`]), starts as a copy of the
 //! decoder ([`ScoreConfig::init_from_decoder`]; not where SAC squashes actions), and its loss gains kl_coef times a
 //! penalty ([`ScoreConfig::kl`]). The penalty is mean(α KL(decoder ‖ policy)) (the SCORE paper's Eq. 3 as a loss to
-//! minimise), where α is the decoder's confidence, or one of the other forms of [`PenaltyForm`].
+//! minimise), where α is the decoder's confidence in the row, or one of the other forms of [`PenaltyForm`].
 
-mod alpha;
+mod confidence;
 mod config;
-mod decoder;
-mod frozen;
-mod legacy;
 mod penalty;
+mod released;
+mod teacher;
 mod unsquash;
 
-pub use alpha::{alphas, own_samples, row_weights};
-pub use config::{AlphaKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
-pub use decoder::DecoderBatch;
-pub(crate) use decoder::DecoderRows;
-pub(crate) use frozen::{FrozenSkill, present_stats};
-pub use legacy::{legacy_coinrun, legacy_d4rl, marginal_densities};
+pub use confidence::{confidences, own_samples, penalty_weights};
+pub use config::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use penalty::{Penalty, decoder_kl, penalty};
+pub use released::{legacy_coinrun, legacy_d4rl, marginal_densities};
+pub use teacher::TeacherBatch;
+pub(crate) use teacher::{Teacher, TeacherOutput};
 pub use unsquash::unsquashed;

@@ -26,17 +26,17 @@ pub struct Penalty {
     pub term: Tensor<1>,
 }
 
-/// The penalty by [`ScoreConfig::penalty`], from the constant `decoder`, the `policy`, and the weight α of each row `[n]`
-/// that [`row_weights`](super::row_weights) gives.
+/// The penalty by [`ScoreConfig::penalty`], from the constant `decoder`, the `policy`, and the `weight` of each row `[n]`
+/// that [`penalty_weights`](super::penalty_weights) gives.
 ///
 /// # Errors
 /// [`LearnError::Action`] if decoder and policy act in different kinds of spaces.
-pub fn penalty(config: &ScoreConfig, decoder: &Dist, policy: &Dist, alpha: Tensor<1>) -> Result<Penalty, LearnError> {
+pub fn penalty(config: &ScoreConfig, decoder: &Dist, policy: &Dist, weight: Tensor<1>) -> Result<Penalty, LearnError> {
     let kl = decoder_kl(decoder, policy, config.direction())?;
     let term = match config.penalty {
-        PenaltyForm::Mean => (kl.clone() * alpha).mean(),
-        PenaltyForm::LegacyD4rl => legacy_d4rl(kl.clone(), alpha),
-        PenaltyForm::LegacyCoinrun => legacy_coinrun(kl.clone(), alpha),
+        PenaltyForm::Mean => (kl.clone() * weight).mean(),
+        PenaltyForm::LegacyD4rl => legacy_d4rl(kl.clone(), weight),
+        PenaltyForm::LegacyCoinrun => legacy_coinrun(kl.clone(), weight),
     };
     Ok(Penalty { kl, term })
 }

@@ -1,16 +1,14 @@
 //! A trainer's complete state in one file.
 
-use super::{Dataset, SkillDescription, SkillTrainer};
-use crate::file::TensorFile;
-use crate::nn::tracked;
+use super::{Dataset, SkillDescription, SkillNets, SkillTrainer};
+use crate::file::{FileKind, TensorFile};
 use crate::norm::{put_obs_stats, take_obs_stats};
 use crate::{DeviceKind, FileError, LearnError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-const KIND: &str = "skill checkpoint";
-const VERSION: u32 = 1;
+const FILE: FileKind = FileKind { name: "skill checkpoint", version: 1 };
 
 /// The JSON in the file's header.
 ///
@@ -18,8 +16,6 @@ const VERSION: u32 = 1;
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Header {
-    kind: String,
-    version: u32,
     skill: SkillDescription,
     seed: u64,
     epoch: u64,
@@ -41,8 +37,6 @@ impl SkillTrainer {
     /// [`FileError::Io`] if it cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let header = Header {
-            kind: KIND.to_owned(),
-            version: VERSION,
             skill: self.description(),
             seed: self.streams.seed(),
             epoch: self.epoch,
@@ -53,7 +47,7 @@ impl SkillTrainer {
             demo_steps: self.dataset.steps(),
             demo_hash: Some(self.fingerprint),
         };
-        let mut file = TensorFile::new(path, &header)?;
+        let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("", &self.nets)?;
         file.put_adam(&self.adam);
         if let Some(stats) = &self.stats {
@@ -69,7 +63,7 @@ impl SkillTrainer {
     /// [`FileError`] says what is wrong with the file or does not fit the demonstrations.
     pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
-        let header: Header = file.description(KIND, VERSION)?;
+        let header: Header = file.header(FILE)?;
         let skill = header.skill;
         for (what, expected, found) in [
             ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),
@@ -84,14 +78,13 @@ impl SkillTrainer {
         if skill.action_space != dataset.action_space() {
             return Err(file.format(format!("acts in {:?}, the demonstrations do not", skill.action_space)));
         }
-        skill.check(&file)?;
-        let mut trainer = Self::new(skill.config, dataset, header.seed, device).map_err(|e| file.learner(e))?;
+        let nets = SkillNets::stored(&skill, &mut file, &device.plain())?;
+        let trainer = Self::with_nets(skill.config, dataset, &nets, header.seed, device);
+        let mut trainer = trainer.map_err(|e| file.learner(e))?;
         if header.demo_hash.is_some_and(|hash| hash != trainer.fingerprint) {
             let text = "the demonstrations are not those of this training: as many episodes and steps, but other ones";
             return Err(file.format(text.to_owned()));
         }
-        file.take_network("", &mut trainer.nets, &device.plain())?;
-        trainer.nets = tracked(&trainer.nets);
         file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;
         if let Some(stats) = &mut trainer.stats {
             *stats = Arc::new(take_obs_stats(&mut file, "obs_norm", trainer.dataset.obs_dim())?);

@@ -1,7 +1,9 @@
 //! q(z | τ): from a window of states and actions to a latent skill.
 
 use super::SkillConfig;
-use crate::nn::{Activation, Dist, Gru, ImageNet, Linear, Mlp, ObsRows, ParamVisitor, Parameters, path};
+use crate::nn::{
+    Activation, Dist, Fresh, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, path,
+};
 use crate::{LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
@@ -42,24 +44,40 @@ impl Encoder {
         rng: &mut R,
         device: &Device,
     ) -> Result<Self, LearnError> {
-        let width = config.encoder_hidden;
+        if let ObsKind::Image(image) = observation {
+            config.cnn.check_image(image)?;
+        }
+        let Ok(encoder) = Self::build(&mut Fresh { rng, device }, "", config, observation, action_width);
+        Ok(encoder)
+    }
+
+    /// [`Self::new`] with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        config: &SkillConfig,
+        observation: ObsKind,
+        action_width: usize,
+    ) -> Result<Self, S::Error> {
         let (state, features) = match observation {
             ObsKind::Vector(obs_dim) => {
-                let net = Mlp::new(obs_dim, &[width; 2], width, Activation::Relu, 1.0, rng, device);
+                let (name, width) = (path(prefix, "state"), config.encoder_hidden);
+                let net = Mlp::build(source, &name, obs_dim, &[width; 2], width, Activation::Relu, 1.0)?;
                 (StateNet::Vector(net), width)
             }
-            ObsKind::Image(shape) => {
-                (StateNet::Image(ImageNet::new(&config.cnn, shape, rng, device)?), config.cnn.features())
+            ObsKind::Image(image) => {
+                let net = ImageNet::build(source, &path(prefix, "cnn"), &config.cnn, image)?;
+                (StateNet::Image(net), config.cnn.features())
             }
         };
-        let inputs = features + action_width;
-        let gru = Gru::new(inputs, config.gru_hidden, config.gru_layers, true, rng, device);
-        let summary = 2 * config.gru_hidden;
+        let inputs = features.saturating_add(action_width);
+        let gru = Gru::build(source, &path(prefix, "gru"), inputs, config.gru_hidden, config.gru_layers, true)?;
+        let summary = config.gru_hidden.saturating_mul(2);
         Ok(Self {
             state,
             gru,
-            mean: Linear::new(summary, config.latent, 1.0, rng, device),
-            log_std: Linear::new(summary, config.latent, 0.01, rng, device),
+            mean: Linear::build(source, &path(prefix, "mean"), summary, config.latent, 1.0)?,
+            log_std: Linear::build(source, &path(prefix, "log_std"), summary, config.latent, 0.01)?,
         })
     }
 
@@ -70,13 +88,13 @@ impl Encoder {
     ///
     /// # Errors
     /// [`LearnError::Config`] if the observations are of the other kind than the network.
-    pub fn forward(&self, states: &ObsRows, actions: Tensor<2>, steps: usize) -> Result<Dist, LearnError> {
+    pub fn forward(&self, states: &ObsBatch, actions: Tensor<2>, steps: usize) -> Result<Dist, LearnError> {
         let summary = self.summary(states, actions, steps)?;
         Ok(Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) })
     }
 
     /// What the recurrent layers make of each window, `[B, 2 * gru_hidden]`; inputs and errors as [`Self::forward`].
-    pub fn summary(&self, states: &ObsRows, actions: Tensor<2>, steps: usize) -> Result<Tensor<2>, LearnError> {
+    pub fn summary(&self, states: &ObsBatch, actions: Tensor<2>, steps: usize) -> Result<Tensor<2>, LearnError> {
         let joined = Tensor::cat(vec![self.state.forward(states)?, actions], 1);
         Ok(self.gru.summary(joined, steps))
     }
@@ -87,10 +105,10 @@ impl StateNet {
     ///
     /// # Errors
     /// [`LearnError::Config`] if the observations are of the other kind than the network.
-    pub fn forward(&self, states: &ObsRows) -> Result<Tensor<2>, LearnError> {
+    pub fn forward(&self, states: &ObsBatch) -> Result<Tensor<2>, LearnError> {
         match (self, states) {
-            (Self::Vector(net), ObsRows::Vector(x)) => Ok(net.forward(x.clone())),
-            (Self::Image(net), ObsRows::Image(x)) => Ok(net.forward(x.clone())),
+            (Self::Vector(net), ObsBatch::Vector(x)) => Ok(net.forward(x.clone())),
+            (Self::Image(net), ObsBatch::Image(x)) => Ok(net.forward(x.clone())),
             _ => Err(LearnError::Config("the encoder got observations of the other kind".to_owned())),
         }
     }

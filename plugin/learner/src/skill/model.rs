@@ -1,41 +1,25 @@
 //! A trained skill model and its file.
 
-use super::{Prior, SkillConfig, SkillNets};
-use crate::file::TensorFile;
-use crate::layout::{check_actor, check_cnn, check_mlp, check_tensor, product};
-use crate::nn::{Activation, frozen};
-use crate::norm::{ObsStats, put_obs_stats, take_obs_stats};
-use crate::policy::{Actor, NetShape, PictureCard, Policy, StdKind};
-use crate::rng::Streams;
-use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsKind};
+use super::{Prior, SkillConfig, SkillDescription, SkillNets};
+use crate::file::{FileKind, TensorFile};
+use crate::nn::frozen;
+use crate::norm::{ObsStats, put_obs_stats};
+use crate::policy::{Actor, Policy};
+use crate::{ActionSpace, DeviceKind, FileError, ObsKind, PictureCard};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
-
-/// What a skill model's weights need to be understood.
-#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SkillDescription {
-    pub(crate) config: SkillConfig,
-    // Files of vectors were written before there were images.
-    #[serde(alias = "obs_dim")]
-    pub(crate) observation: ObsKind,
-    pub(crate) action_space: ActionSpace,
-}
 
 /// The JSON in the file's header.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Header {
-    kind: String,
-    version: u32,
     skill: SkillDescription,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     picture: Option<PictureCard>,
 }
 
-const KIND: &str = "skill model";
-const VERSION: u32 = 1;
+const FILE: FileKind = FileKind { name: "skill model", version: 1 };
 
 /// Encoder, decoder and prior after training, with the settings they were trained with.
 ///
@@ -113,17 +97,14 @@ impl SkillModel {
 
     /// The prior p(z | s) of raw observations, giving skills as the decoder takes them.
     pub fn prior(&self) -> Prior {
-        let config = self.config();
-        let device = self.device.plain();
-        let (stats, latent) = (self.stats.clone(), (config.latent, config.tanh_latent));
-        Prior::learned(&self.nets.prior, stats, self.observation(), latent, device)
+        let (config, stats, device) = (self.config(), self.stats.clone(), self.device.plain());
+        Prior::learned(&self.nets.prior, stats, self.observation(), config.latent, config.tanh_latent, device)
     }
 
     /// The decoder as a policy of raw observations without a critic. Under the prior this is behaviour cloning.
     pub fn policy(&self) -> Policy {
-        let widths = (self.observation(), self.latent());
-        let stats = self.stats.clone();
-        Policy::new(self.decoder(), None, stats, self.action_space(), widths, self.device.plain())
+        let spec = self.description.decoder_spec();
+        Policy::new(self.decoder(), None, self.stats.clone(), spec, self.device.plain())
     }
 
     /// Writes the file, in one step: under a temporary name first.
@@ -136,8 +117,7 @@ impl SkillModel {
             let learner = |source| FileError::Learner { path: path.to_owned(), source };
             picture.check(self.observation()).map_err(learner)?;
         }
-        let header = Header { kind: KIND.to_owned(), version: VERSION, skill, picture };
-        let mut file = TensorFile::new(path, &header)?;
+        let mut file = TensorFile::new(path, FILE, &Header { skill, picture })?;
         file.put_network("", &self.nets)?;
         if let Some(stats) = &self.stats {
             put_obs_stats(&mut file, "obs_norm", stats);
@@ -151,87 +131,14 @@ impl SkillModel {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
-        let header: Header = file.description(KIND, VERSION)?;
+        let header: Header = file.header(FILE)?;
         let description = header.skill;
-        description.check(&file)?;
+        let nets = SkillNets::stored(&description, &mut file, &device.plain())?;
         if let Some(picture) = &header.picture {
             picture.check(description.observation).map_err(|e| file.learner(e))?;
         }
-        let mut nets = description.nets(device).map_err(|e| file.learner(e))?;
-        file.take_network("", &mut nets, &device.plain())?;
         let stats = description.take_stats(&mut file, "obs_norm")?;
         file.finish()?;
         Ok(Self { description, nets, stats, device, picture: header.picture })
-    }
-}
-
-impl SkillDescription {
-    /// Networks of these sizes, to be filled from a file.
-    pub(crate) fn nets(&self, device: DeviceKind) -> Result<SkillNets, LearnError> {
-        self.config.validate()?;
-        let (config, space) = (&self.config, self.action_space);
-        SkillNets::new(config, self.observation, space, &Streams::new(0), &device.plain())
-    }
-
-    /// The frozen normaliser called `name` out of a file, if the networks read through one.
-    pub(crate) fn take_stats(&self, file: &mut TensorFile, name: &str) -> Result<Option<Arc<ObsStats>>, FileError> {
-        if !self.config.norm_obs {
-            return Ok(None);
-        }
-        Ok(Some(Arc::new(take_obs_stats(file, name, self.observation.numbers())?)))
-    }
-
-    /// Decoder and prior alone.
-    pub(crate) fn actors(&self, device: DeviceKind) -> Result<(Actor, Actor), LearnError> {
-        self.config.validate()?;
-        SkillNets::actors(&self.config, self.observation, self.action_space, &Streams::new(0), &device.plain())
-    }
-
-    /// `Ok` if `file` holds networks of these sizes.
-    pub(crate) fn check(&self, file: &TensorFile) -> Result<(), FileError> {
-        self.check_actors(file)?;
-        let config = &self.config;
-        let features = match self.observation {
-            ObsKind::Vector(obs_dim) => {
-                let width = config.encoder_hidden;
-                check_mlp(file, "encoder.state", (obs_dim, &[width; 2], width))?;
-                width
-            }
-            ObsKind::Image(image) => {
-                check_cnn(file, "encoder.cnn", &config.cnn, image)?;
-                config.cnn.features()
-            }
-        };
-        // Features and actions are as wide as tensors that are there.
-        let mut width = features + config.action_input.width(self.action_space);
-        let gates = product(file, "encoder.gru", &[3, config.gru_hidden])?;
-        for layer in 0..config.gru_layers {
-            check_tensor(file, &format!("encoder.gru.l{layer}.weight_ih"), &[2, width, gates])?;
-            check_tensor(file, &format!("encoder.gru.l{layer}.weight_hh"), &[2, config.gru_hidden, gates])?;
-            width = 2 * config.gru_hidden;
-        }
-        check_tensor(file, "encoder.mean.weight", &[width, config.latent])
-    }
-
-    /// `Ok` if `file` holds a decoder and a prior of these sizes.
-    pub(crate) fn check_actors(&self, file: &TensorFile) -> Result<(), FileError> {
-        let config = &self.config;
-        config.validate().map_err(|e| file.learner(e))?;
-        config.check_observation(self.observation).map_err(|e| file.learner(e))?;
-        let prior = (0, ActionSpace::Continuous(config.latent), config.prior_std);
-        for (name, (latent, space, std)) in
-            [("decoder", (config.latent, self.action_space, config.decoder_std)), ("prior", prior)]
-        {
-            let obs_dim = match self.observation {
-                ObsKind::Vector(width) => width,
-                ObsKind::Image(image) => {
-                    check_cnn(file, &format!("{name}.cnn"), &config.cnn, image)?;
-                    config.cnn.features()
-                }
-            };
-            let shape = NetShape { obs_dim, latent, hidden: config.hidden.clone(), activation: Activation::Relu };
-            check_actor(file, name, &shape, space, std == StdKind::State)?;
-        }
-        Ok(())
     }
 }

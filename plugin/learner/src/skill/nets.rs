@@ -1,10 +1,11 @@
 //! The three networks of the skill model together.
 
-use super::{Encoder, SkillConfig};
-use crate::nn::{ActionRows, Activation, Dist, ImageNet, ObsRows, ParamVisitor, Parameters, path};
-use crate::policy::{Actor, NetShape};
+use super::{Encoder, SkillConfig, SkillDescription};
+use crate::file::TensorFile;
+use crate::nn::{ActionBatch, Dist, ObsBatch, ParamVisitor, Parameters, path};
+use crate::policy::Actor;
 use crate::rng::Streams;
-use crate::{ActionSpace, LearnError, ObsKind};
+use crate::{ActionSpace, FileError, LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
 
 /// Encoder, decoder and prior.
@@ -46,43 +47,27 @@ impl SkillNets {
         streams: &Streams,
         device: &Device,
     ) -> Result<Self, LearnError> {
-        let action_width = config.action_input.width(space);
-        let (decoder, prior) = Self::actors(config, observation, space, streams, device)?;
+        let description = SkillDescription { config: config.clone(), observation, action_space: space };
+        let Actors { decoder, prior } = Actors::fresh(&description, streams, device)?;
         let mut rng = streams.stream("skill.encoder", 0);
-        Ok(Self {
-            encoder: Encoder::new(config, observation, action_width, &mut rng, device)?,
-            decoder,
-            prior,
-            tanh_latent: config.tanh_latent,
-        })
+        let encoder = Encoder::new(config, observation, config.action_input.width(space), &mut rng, device)?;
+        Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent })
     }
 
-    /// Decoder and prior alone, as in [`Self::new`].
+    /// The networks of a skill model out of a file.
     ///
     /// # Errors
-    /// As [`Self::new`].
-    pub(crate) fn actors(
-        config: &SkillConfig,
-        observation: ObsKind,
-        space: ActionSpace,
-        streams: &Streams,
+    /// [`FileError`] names the first tensor that is missing or misshapen.
+    pub(crate) fn stored(
+        description: &SkillDescription,
+        file: &mut TensorFile,
         device: &Device,
-    ) -> Result<(Actor, Actor), LearnError> {
-        let rng = |name: &str| streams.stream(name, 0);
-        let actor = |name: &str, latent, space, std| -> Result<Actor, LearnError> {
-            let obs_dim = match observation {
-                ObsKind::Vector(width) => width,
-                ObsKind::Image(_) => config.cnn.features(),
-            };
-            let hidden = config.hidden.clone();
-            let shape = NetShape { obs_dim, latent, hidden, activation: Activation::Relu };
-            let actor = Actor::new(&shape, space, std, &mut rng(name), device);
-            let ObsKind::Image(shape) = observation else { return Ok(actor) };
-            Ok(actor.with_cnn(ImageNet::new(&config.cnn, shape, &mut rng(&format!("{name}.cnn")), device)?))
-        };
-        let decoder = actor("skill.decoder", config.latent, space, config.decoder_std)?;
-        let prior = actor("skill.prior", 0, ActionSpace::Continuous(config.latent), config.prior_std)?;
-        Ok((decoder, prior))
+    ) -> Result<Self, FileError> {
+        let Actors { decoder, prior } = Actors::stored(description, file, device)?;
+        let (config, observation) = (&description.config, description.observation);
+        let action_width = config.action_input.width(description.action_space);
+        let encoder = Encoder::build(&mut file.params(device), "encoder", config, observation, action_width)?;
+        Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent })
     }
 
     /// Runs a batch of B windows through all three networks.
@@ -96,8 +81,8 @@ impl SkillNets {
     /// other kind than the networks.
     pub fn forward(
         &self,
-        states: &ObsRows,
-        actions: &ActionRows,
+        states: &ObsBatch,
+        actions: &ActionBatch,
         encoded_actions: Tensor<2>,
         noise: Tensor<2>,
         steps: usize,
@@ -113,6 +98,43 @@ impl SkillNets {
         let decoded = self.decoder.forward_held(decoder_latent.clone(), self.decoder.observe(states)?, steps);
         let nll_per_step = decoded.log_prob(actions)?.neg();
         Ok(SkillForward { nll_per_step, kl_per_sequence, decoder_latent, decoded })
+    }
+}
+
+/// Decoder and prior alone, which is all that is needed when a skill model is used.
+#[derive(Clone, Debug)]
+pub(crate) struct Actors {
+    pub(crate) decoder: Actor,
+    pub(crate) prior: Actor,
+}
+
+impl Actors {
+    /// Starting weights, from the streams that [`SkillNets::new`] names.
+    fn fresh(description: &SkillDescription, streams: &Streams, device: &Device) -> Result<Self, LearnError> {
+        let (decoder, prior) = (description.decoder_spec(), description.prior_spec());
+        Ok(Self {
+            decoder: description.decoder_shape().fresh(&decoder, streams, "skill.decoder", device)?,
+            prior: description.prior_shape().fresh(&prior, streams, "skill.prior", device)?,
+        })
+    }
+
+    /// Those of a file.
+    ///
+    /// # Errors
+    /// [`FileError::Learner`] for settings that cannot work; else as [`SkillNets::stored`].
+    pub(crate) fn stored(
+        description: &SkillDescription,
+        file: &mut TensorFile,
+        device: &Device,
+    ) -> Result<Self, FileError> {
+        let config = &description.config;
+        config.validate().map_err(|e| file.learner(e))?;
+        config.check_observation(description.observation).map_err(|e| file.learner(e))?;
+        let (decoder, prior) = (description.decoder_spec(), description.prior_spec());
+        Ok(Self {
+            decoder: description.decoder_shape().stored(&decoder, file, "decoder", device)?,
+            prior: description.prior_shape().stored(&prior, file, "prior", device)?,
+        })
     }
 }
 

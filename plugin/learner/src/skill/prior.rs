@@ -2,7 +2,7 @@
 
 use crate::nn::frozen;
 use crate::norm::ObsStats;
-use crate::policy::{Actor, HostStates};
+use crate::policy::{Actor, InputBuilder};
 use crate::{LearnError, ObsKind, ObsSlice};
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
@@ -36,12 +36,14 @@ pub(crate) struct PriorNet {
 }
 
 impl Prior {
-    /// The learned prior `actor`, which reads the given observations, normalised by `stats` if given.
+    /// The learned prior `actor`, which reads the given observations, normalised by `stats` if given; its skills are
+    /// squashed by tanh if `tanh`.
     pub(crate) fn learned(
         actor: &Actor,
         stats: Option<Arc<ObsStats>>,
         observation: ObsKind,
-        (latent, tanh): (usize, bool),
+        latent: usize,
+        tanh: bool,
         device: Device,
     ) -> Self {
         Self { net: Some(PriorNet { actor: frozen(actor), observation, stats, device }), latent, tanh }
@@ -87,8 +89,8 @@ impl Prior {
             Some(PriorNet { actor, observation: kind, stats, device }) => {
                 let obs = obs.into();
                 obs.check("observations of the prior", kind, n)?;
-                let states = HostStates { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
-                let mut x = actor.join(&states.input(&(0..n).collect::<Vec<_>>(), device))?;
+                let inputs = InputBuilder { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
+                let mut x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
                 if n == 1 {
                     // As in `Policy`: a single row would be summed in another order.
                     x = x.repeat_dim(0, 2);

@@ -2,7 +2,7 @@
 
 use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
 use crate::nn::{
-    ActionRows, Adam, AdamConfig, Dist, NamedGrads, ObsRows, argmax, check_loss, host, matrix, scalar, tracked,
+    ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, host, matrix, scalar, tracked,
 };
 use crate::norm::ObsStats;
 use crate::rng::{Streams, normal};
@@ -56,13 +56,13 @@ pub struct SkillTrainer {
     pub(super) epoch: u64,
     pub(super) windows: Vec<Window>,
     pub(super) next: usize,
-    pub(super) sums: Sums,
+    pub(super) sums: MetricSums,
     last_epoch: SkillMetrics,
 }
 
 /// What the running epoch's batches add up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Sums {
+pub(super) struct MetricSums {
     pub(super) count: usize,
     pub(super) total: [f64; 6],
 }
@@ -74,19 +74,37 @@ impl SkillTrainer {
     /// [`LearnError::Config`] for settings that cannot work or images too small for them, [`LearnError::NoWindow`] if no
     /// episode is long enough.
     pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
+        Self::check(&config, &dataset)?;
+        let (streams, plain) = (Streams::new(seed), device.plain());
+        let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &plain)?;
+        Self::with_nets(config, dataset, &nets, seed, device)
+    }
+
+    /// `Ok` if a model of these settings can be learned from `dataset`.
+    fn check(config: &SkillConfig, dataset: &Dataset) -> Result<(), LearnError> {
         config.validate()?;
         config.check_observation(dataset.observation)?;
-        config.check_space(dataset.space)?;
+        config.check_space(dataset.space)
+    }
+
+    /// A trainer of `nets`, which has not trained them yet.
+    pub(super) fn with_nets(
+        config: SkillConfig,
+        dataset: Dataset,
+        nets: &SkillNets,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        Self::check(&config, &dataset)?;
         let streams = Streams::new(seed);
-        let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &device.plain())?;
         let windows = dataset.windows(config.window, config.windows, &streams, 0)?;
         Ok(Self {
             stats: if config.norm_obs { dataset.stats().map(Arc::new) } else { None },
-            nets: tracked(&nets),
+            nets: tracked(nets),
             adam: Adam::new(AdamConfig { eps: 1e-8, ..AdamConfig::default() }),
             epoch: 0,
             next: 0,
-            sums: Sums::default(),
+            sums: MetricSums::default(),
             last_epoch: SkillMetrics::default(),
             config,
             fingerprint: dataset.fingerprint(),
@@ -218,12 +236,12 @@ impl SkillTrainer {
         if let (Some(stats), Observations::Vector(values)) = (&self.stats, &mut observations) {
             *values = stats.normalize(values);
         }
-        let states = ObsRows::new(observations, &self.dataset.observation, &device);
+        let states = ObsBatch::new(observations, &self.dataset.observation, &device);
         let encoded = matrix(input.encode(&actions, space)?, steps * batch, input.width(space), &device);
         let mut rng = self.streams.stream("skill.noise", self.adam.steps());
         let noise = (0..batch * self.config.latent).map(|_| normal(&mut rng)).collect();
         let noise = matrix(noise, batch, self.config.latent, &device);
-        let rows = ActionRows::new(&actions, &device);
+        let rows = ActionBatch::new(&actions, &device);
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
     }
@@ -239,7 +257,7 @@ fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError
     Ok(Some(hits as f32 / rows as f32))
 }
 
-impl Sums {
+impl MetricSums {
     fn add(&mut self, m: &SkillMetrics) {
         let values = [m.loss, m.nll, m.kl, m.latent_norm, m.accuracy.unwrap_or(0.0), m.grad_norm];
         self.count += 1;

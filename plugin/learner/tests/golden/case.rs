@@ -1,7 +1,9 @@
 //! One case: its file of numbers and its tolerances.
 
+use crate::generated::generate;
+use crate::names::their_name;
 use burn::tensor::{Device, Tensor, TensorData};
-use playbot_learner::nn::{ParamVisitor, Parameters};
+use playbot_learner::nn::{Activation, ParamVisitor, Parameters};
 use playbot_learner::{Actions, DeviceKind};
 use safetensors::{Dtype, SafeTensors};
 use serde_json::Value;
@@ -61,6 +63,25 @@ impl Case {
     pub fn expected(&self, name: &str) -> &Value {
         self.checked.borrow_mut().insert(name.to_owned());
         &self.json["expected"][name]
+    }
+
+    /// Whether there is an expected number `name`.
+    pub fn expects(&self, name: &str) -> bool {
+        self.json["expected"].get(name).is_some()
+    }
+
+    /// The widths of the hidden layers of the network whose weights are `prefix.l0.weight`, `prefix.l1.weight`, ...
+    pub fn hidden_layers(&self, prefix: &str) -> Vec<usize> {
+        let layers = (0..).map_while(|i| self.tensors.get(&format!("{prefix}.l{i}.weight")));
+        layers.map(|(shape, _)| shape[0]).collect()
+    }
+
+    pub fn activation(&self) -> Activation {
+        match self.hyper("activation").as_str() {
+            Some("relu") => Activation::Relu,
+            Some("tanh") => Activation::Tanh,
+            other => panic!("{}: unknown activation {other:?}", self.name),
+        }
     }
 
     pub fn has(&self, name: &str) -> bool {
@@ -218,47 +239,6 @@ impl Case {
             }
         }
     }
-}
-
-/// A tensor that is made by rule instead of stored (SplitMix64 over the element numbers).
-fn generate(rule: &Value) -> (String, (Vec<usize>, Vec<f64>)) {
-    let shape: Vec<usize> =
-        rule["shape"].as_array().into_iter().flatten().map(|n| n.as_u64().expect("size") as usize).collect();
-    let seed = rule["seed"].as_u64().expect("seed");
-    let bound = rule["bound"].as_f64();
-    let element = |i: usize| {
-        let mut z = seed.wrapping_add((i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        match bound {
-            Some(bound) => f64::from((((z >> 40) as f64 / 8_388_608.0 - 1.0) * bound) as f32),
-            // Bytes have no bound.
-            None => (z >> 56) as f64,
-        }
-    };
-    let values: Vec<f64> = (0..shape.iter().product()).map(element).collect();
-    for (bits, x) in rule["first_bits"].as_array().into_iter().flatten().zip(&values) {
-        assert_eq!(bits.as_u64(), Some(u64::from((*x as f32).to_bits())));
-    }
-    for (first, x) in rule["first"].as_array().into_iter().flatten().zip(&values) {
-        assert_eq!(first.as_f64(), Some(*x));
-    }
-    (rule["name"].as_str().expect("name").to_owned(), (shape, values))
-}
-
-fn their_name(name: &str, decoder_head: &str) -> String {
-    let name = name
-        .replace("encoder.state.head", "enc.state.l2")
-        .replace("encoder.", "enc.")
-        .replace("decoder.head", decoder_head)
-        .replace("decoder.", "dec.")
-        .replace("prior.head", "prior.mean")
-        .replace("sac_actor.head", "actor.mean")
-        .replace("sac_actor.", "actor.")
-        .replace("target.q1.", "q1_target.")
-        .replace("target.q2.", "q2_target.");
-    name.replace("frozen.", "decoder.").replace("gru.uni", "uni").replace("gru.bi", "bi")
 }
 
 struct Fill<'a> {

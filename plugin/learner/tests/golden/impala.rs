@@ -3,7 +3,7 @@
 use crate::case::{Case, host, number};
 use burn::tensor::Tensor;
 use playbot_learner::nn::{
-    ActionRows, Activation, CnnKind, Dist, ImageNet, NamedGrads, ObsRows, parameter_count, tracked,
+    ActionBatch, Activation, CnnKind, Dist, ImageNet, NamedGrads, ObsBatch, parameter_count, tracked,
 };
 use playbot_learner::policy::{Actor, NetShape};
 use playbot_learner::rng::Streams;
@@ -19,7 +19,7 @@ fn actor(case: &Case, device: DeviceKind) -> Actor {
     let shape = NetShape {
         obs_dim: cnn.features(),
         latent: case.dim("skill"),
-        hidden: vec![case.dim("hidden"); 2],
+        hidden: case.hidden_layers("param.dec"),
         activation: Activation::Relu,
     };
     let space = ActionSpace::Discrete(case.dim("K"));
@@ -30,9 +30,9 @@ fn actor(case: &Case, device: DeviceKind) -> Actor {
     actor.with_cnn(cnn)
 }
 
-fn images(case: &Case, device: DeviceKind) -> ObsRows {
+fn images(case: &Case, device: DeviceKind) -> ObsBatch {
     let shape = case.shape("in.images").try_into().expect("four sizes");
-    ObsRows::pixels(case.bytes("in.images"), shape, &device.plain())
+    ObsBatch::pixels(case.bytes("in.images"), shape, &device.plain())
 }
 
 fn decode(case: &Case, actor: &Actor, features: Tensor<2>) -> Tensor<2> {
@@ -63,7 +63,7 @@ fn golden_impala_small() {
         let dist = Dist::categorical(logits);
         let Dist::Categorical { log_probs } = &dist else { panic!("made so") };
         case.check("out.log_probs", &host(log_probs.clone()));
-        let actions = ActionRows::new(&case.actions("in.actions"), &device.plain());
+        let actions = ActionBatch::new(&case.actions("in.actions"), &device.plain());
         let nll = dist.log_prob(&actions).expect("discrete").mean().neg();
         case.check_number("nll.loss", number(nll.clone()));
         let grads = nll.backward();
@@ -76,8 +76,8 @@ fn golden_impala_small() {
     case.finish(&[]);
 }
 
-fn stages(case: &Case, actor: &Actor, images: &ObsRows) {
-    let (Some(ImageNet::Impala(net)), ObsRows::Image(pixels)) = (&actor.cnn, images) else {
+fn stages(case: &Case, actor: &Actor, images: &ObsBatch) {
+    let (Some(ImageNet::Impala(net)), ObsBatch::Image(pixels)) = (&actor.cnn, images) else {
         panic!("an IMPALA over images");
     };
     let mut x = pixels.clone();

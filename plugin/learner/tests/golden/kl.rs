@@ -1,11 +1,11 @@
-//! The penalty of SCORE: divergences, α, and the gradient with respect to the policy.
+//! The penalty of SCORE: divergences, the decoder's confidence α, and the gradient with respect to the policy.
 
 use crate::case::{Case, host, number};
 use burn::tensor::Tensor;
 use playbot_learner::nn::Dist;
 use playbot_learner::rng::Streams;
-use playbot_learner::score::{alphas, decoder_kl, penalty, row_weights};
-use playbot_learner::{AlphaKind, DeviceKind, KlDirection, PenaltyForm, ScoreConfig};
+use playbot_learner::score::{confidences, decoder_kl, penalty, penalty_weights};
+use playbot_learner::{ConfidenceKind, DeviceKind, KlDirection, PenaltyForm, ScoreConfig};
 
 type Leaves = Vec<(&'static str, Tensor<2>)>;
 
@@ -30,32 +30,32 @@ fn decoder(case: &Case, kind: DeviceKind) -> Dist {
     Dist::Gaussian { mean: case.tensor("in.dec_mean", &device), log_std: case.tensor("in.dec_log_std", &device) }
 }
 
-fn check(case: &Case, kinds: &[(&str, AlphaKind)]) {
+fn check(case: &Case, kinds: &[(&str, ConfidenceKind)]) {
     for device in DeviceKind::ALL {
         let decoder = decoder(case, device);
         let rows = decoder.clone().to_host().expect("readable");
-        for (alpha_name, alpha_kind) in kinds {
-            let actions = match alpha_kind {
-                AlphaKind::OwnSample => case.actions("in.decoder_action"),
+        for (name, confidence_kind) in kinds {
+            let actions = match confidence_kind {
+                ConfidenceKind::OwnSample => case.actions("in.decoder_action"),
                 _ => case.actions("in.policy_action"),
             };
-            let alpha = alphas(*alpha_kind, &rows, &actions).expect("they fit");
-            if *alpha_kind != AlphaKind::Off {
-                case.check(&format!("out.alpha.{alpha_name}"), &alpha);
+            let weights = confidences(*confidence_kind, &rows, &actions).expect("they fit");
+            if *confidence_kind != ConfidenceKind::Off {
+                case.check(&format!("out.alpha.{name}"), &weights);
             }
             for (kl_direction, short) in
                 [(KlDirection::DecoderPolicy, "dec_pol"), (KlDirection::PolicyDecoder, "pol_dec")]
             {
                 let (policy, leaves) = policy(case, device);
                 let config = ScoreConfig { kl_direction, ..ScoreConfig::default() };
-                let alpha = Tensor::<1>::from_floats(alpha.as_slice(), &device.plain());
-                let penalty = penalty(&config, &decoder, &policy, alpha).expect("same kind");
+                let weights = Tensor::<1>::from_floats(weights.as_slice(), &device.plain());
+                let penalty = penalty(&config, &decoder, &policy, weights).expect("same kind");
                 case.check(&format!("out.kl_{short}"), &host(penalty.kl));
                 let term = penalty.term;
-                case.check_number(&format!("reg.{short}.{alpha_name}"), number(term.clone()));
+                case.check_number(&format!("reg.{short}.{name}"), number(term.clone()));
                 let scaled = number(term.clone() * case.number("kl_coef"));
-                case.check_number(&format!("loss_term.{short}.{alpha_name}"), scaled);
-                check_gradients(case, &format!("grad.{short}.{alpha_name}"), &leaves, term);
+                case.check_number(&format!("loss_term.{short}.{name}"), scaled);
+                check_gradients(case, &format!("grad.{short}.{name}"), &leaves, term);
             }
         }
     }
@@ -75,10 +75,10 @@ fn legacy(case: &Case, form: PenaltyForm, device: DeviceKind) -> (Tensor<1>, Vec
     let decoder = decoder(case, device);
     let rows = decoder.clone().to_host().expect("readable");
     let mut rng = Streams::new(0).stream("unused", 0);
-    let weights = row_weights(&config, &rows, &case.actions("in.policy_action"), &mut rng).expect("they fit");
+    let weights = penalty_weights(&config, &rows, &case.actions("in.policy_action"), &mut rng).expect("they fit");
     let (policy, leaves) = policy(case, device);
-    let alpha = Tensor::<1>::from_floats(weights.as_slice(), &device.plain());
-    (penalty(&config, &decoder, &policy, alpha).expect("same kind").term, weights, leaves)
+    let weight = Tensor::<1>::from_floats(weights.as_slice(), &device.plain());
+    (penalty(&config, &decoder, &policy, weight).expect("same kind").term, weights, leaves)
 }
 
 #[test]
@@ -87,10 +87,10 @@ fn golden_kl_gaussian() {
     check(
         &case,
         &[
-            ("off", AlphaKind::Off),
-            ("score_policy_action", AlphaKind::PolicyAction),
-            ("score_own_sample", AlphaKind::OwnSample),
-            ("density_policy_action", AlphaKind::Density),
+            ("off", ConfidenceKind::Off),
+            ("score_policy_action", ConfidenceKind::PolicyAction),
+            ("score_own_sample", ConfidenceKind::OwnSample),
+            ("density_policy_action", ConfidenceKind::Density),
         ],
     );
     for device in DeviceKind::ALL {
@@ -114,9 +114,9 @@ fn golden_kl_categorical() {
     check(
         &case,
         &[
-            ("off", AlphaKind::Off),
-            ("prob_policy_action", AlphaKind::PolicyAction),
-            ("prob_own_sample", AlphaKind::OwnSample),
+            ("off", ConfidenceKind::Off),
+            ("prob_policy_action", ConfidenceKind::PolicyAction),
+            ("prob_own_sample", ConfidenceKind::OwnSample),
         ],
     );
     for device in DeviceKind::ALL {

@@ -5,9 +5,11 @@
 mod adam;
 mod case;
 mod gae;
+mod generated;
 mod gru;
 mod impala;
 mod kl;
+mod names;
 mod norm;
 mod ppo_loss;
 mod sac;

@@ -3,7 +3,7 @@
 use crate::case::{Case, host, number};
 use burn::tensor::Tensor;
 use playbot_learner::DeviceKind;
-use playbot_learner::nn::{ActionRows, Dist};
+use playbot_learner::nn::{ActionBatch, Dist};
 use playbot_learner::ppo::{PpoBatch, normalize_advantages, ppo_loss, ratio_stats};
 
 fn check(name: &str) {
@@ -27,7 +27,7 @@ fn check(name: &str) {
         case.check("out.normalized_advantages", &normalized);
         let advantages = |v: &[f32]| Tensor::<1>::from_floats(v, &device);
         let batch = PpoBatch {
-            actions: ActionRows::new(&case.actions("in.actions"), &device),
+            actions: ActionBatch::new(&case.actions("in.actions"), &device),
             old_log_probs: case.tensor("in.old_log_probs", &device),
             advantages: advantages(&normalized),
             old_values: case.tensor("in.old_values", &device),

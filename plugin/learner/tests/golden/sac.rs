@@ -4,14 +4,13 @@ use crate::case::{Case, host, number};
 use crate::update::{After, Names};
 use burn::tensor::Tensor;
 use playbot_learner::nn::{
-    ActionRows, Activation, Adam, AdamConfig, Dist, LogProbForm, Parameters, SquashedGaussian, bounded_log_std, frozen,
-    tracked,
+    ActionBatch, Adam, AdamConfig, Dist, LogProbForm, Parameters, SquashedGaussian, bounded_log_std, frozen, tracked,
 };
 use playbot_learner::policy::{Actor, NetShape};
 use playbot_learner::rng::Streams;
 use playbot_learner::sac::{
-    Critics, LogAlpha, SacBatch, SacNets, actor_step, alpha_loss, alpha_step, critic_loss, critic_step, q_target,
-    soft_update, soft_value_of_choices, target_of,
+    Critics, LogTemperature, SacBatch, SacNets, actor_step, critic_loss, critic_step, q_target, soft_update,
+    soft_value_of_choices, target_of, temperature_loss, temperature_step,
 };
 use playbot_learner::{ActionSpace, DeviceKind, EntropyCoef, SacConfig};
 
@@ -72,8 +71,8 @@ impl Continuous {
         let shape = NetShape {
             obs_dim: case.dim("obs"),
             latent: 0,
-            hidden: vec![case.dim("hidden"); 2],
-            activation: Activation::Relu,
+            hidden: case.hidden_layers("param.actor"),
+            activation: case.activation(),
         };
         let space = ActionSpace::Continuous(case.dim("A"));
         let range = (case.number("log_std_min"), case.number("log_std_max"));
@@ -84,12 +83,12 @@ impl Continuous {
         case.fill(&mut critics, "param.", "", kind);
         let mut targets = Critics::new(&shape, space, &mut rng, &device);
         case.fill(&mut targets, "param.", "target", kind);
-        let log_alpha = LogAlpha(case.tensor("param.log_alpha", &device));
+        let log_temperature = LogTemperature(case.tensor("param.log_alpha", &device));
         SacNets {
             actor: tracked(&actor),
             critics: tracked(&critics),
             targets: frozen(&targets),
-            log_alpha: tracked(&log_alpha),
+            log_temperature: tracked(&log_temperature),
         }
     }
 
@@ -97,11 +96,11 @@ impl Continuous {
         let (case, device) = (&self.case, self.kind.plain());
         SacBatch {
             inputs: case.tensor("in.obs", &device),
-            actions: ActionRows::new(&case.actions("in.actions"), &device),
+            actions: ActionBatch::new(&case.actions("in.actions"), &device),
             rewards: case.tensor("in.rewards", &device),
             continues: case.tensor::<1>("in.terminations", &device).neg() + 1.0,
             next_inputs: case.tensor("in.next_obs", &device),
-            decoder: None,
+            teacher: None,
         }
     }
 
@@ -139,19 +138,24 @@ impl Continuous {
     fn run(&self) {
         let case = &self.case;
         let (mut nets, batch) = (self.nets(), self.batch());
-        let config = AdamConfig { eps: case.number("adam_eps"), ..AdamConfig::default() };
+        let config = AdamConfig {
+            beta1: case.number("adam_beta1"),
+            beta2: case.number("adam_beta2"),
+            eps: case.number("adam_eps"),
+            ..AdamConfig::default()
+        };
         let still = AdamConfig { beta1: 0.0, beta2: 0.0, ..config };
-        let alpha = nets.alpha().expect("readable");
+        let alpha = nets.temperature().expect("readable");
         case.check_number("alpha_before", alpha);
         self.check_values(&nets, &batch, alpha);
 
-        let (noise, coefficients) = (self.noise("in.noise_next"), (alpha, case.number("gamma")));
+        let (noise, gamma) = (self.noise("in.noise_next"), case.number("gamma"));
         let (mut copy, mut adam) = (nets.clone(), Adam::new(still));
-        critic_step(&mut copy, &mut adam, &batch, Some(&noise), coefficients, 0.0).expect("finite");
+        critic_step(&mut copy, &mut adam, &batch, Some(&noise), alpha, gamma, 0.0).expect("finite");
         self.check_gradients("grad_critic.", "", &mut copy.critics, &adam, "");
         let mut adam = Adam::new(config);
         let lr = case.number("q_lr");
-        let step = critic_step(&mut nets, &mut adam, &batch, Some(&noise), coefficients, lr).expect("finite");
+        let step = critic_step(&mut nets, &mut adam, &batch, Some(&noise), alpha, gamma, lr).expect("finite");
         case.check_number("q1_loss", step.q1_loss);
         case.check_number("q2_loss", step.q2_loss);
         case.check_number("critic_loss", step.q1_loss + step.q2_loss);
@@ -175,21 +179,21 @@ impl Continuous {
             SacConfig { entropy: EntropyCoef::Auto { initial: 1.0, target_scale: None }, ..Default::default() };
         assert_eq!(settings.target_entropy(ActionSpace::Continuous(case.dim("A"))), Some(target));
         let (mut copy, mut adam) = (nets.clone(), Adam::new(still));
-        alpha_step(&mut copy, &mut adam, &batch, Some(&noise), target, 0.0).expect("finite");
+        temperature_step(&mut copy, &mut adam, &batch, Some(&noise), target, 0.0).expect("finite");
         case.check_number("alpha_grad", f64::from(adam.moments("log_alpha").expect("updated").0[0]));
         let mut adam = Adam::new(config);
-        let step =
-            alpha_step(&mut nets, &mut adam, &batch, Some(&noise), target, case.number("alpha_lr")).expect("finite");
-        case.check_number("alpha_loss", step.alpha_loss);
+        let step = temperature_step(&mut nets, &mut adam, &batch, Some(&noise), target, case.number("alpha_lr"))
+            .expect("finite");
+        case.check_number("alpha_loss", step.temperature_loss);
         case.check_number("mean_log_prob_alpha", step.log_prob);
         case.check_number("alpha_loss_log_form", -alpha.ln() * (step.log_prob + target));
-        case.check_number("alpha_after", nets.alpha().expect("readable"));
+        case.check_number("alpha_after", nets.temperature().expect("readable"));
 
         soft_update(&mut nets.targets, &nets.critics, case.number("tau"));
         nets.actor.visit("sac_actor", &mut After(case));
         nets.critics.visit("", &mut After(case));
         nets.targets.visit("target", &mut After(case));
-        nets.log_alpha.visit("", &mut After(case));
+        nets.log_temperature.visit("", &mut After(case));
     }
 }
 
@@ -208,7 +212,9 @@ fn golden_sac_update_continuous() {
 fn golden_sac_discrete_losses() {
     let case = Case::load("sac_discrete_losses");
     let choices = case.dim("K") as f64;
-    let target_entropy = SacConfig::default().target_entropy(ActionSpace::Discrete(case.dim("K"))).expect("tuned");
+    let target_scale = Some(case.number("target_entropy_scale"));
+    let settings = SacConfig { entropy: EntropyCoef::Auto { initial: 1.0, target_scale }, ..SacConfig::default() };
+    let target_entropy = settings.target_entropy(ActionSpace::Discrete(case.dim("K"))).expect("tuned");
     assert!((target_entropy - case.number("target_entropy")).abs() < 1e-12);
     for kind in DeviceKind::ALL {
         let device = kind.plain();
@@ -232,7 +238,7 @@ fn golden_sac_discrete_losses() {
         case.check("out.q_target", &host(target.clone()));
 
         let (q1, q2) = (leaf(case.tensor("param.q1", &device)), leaf(case.tensor("param.q2", &device)));
-        let ActionRows::Discrete(index) = ActionRows::new(&case.actions("in.actions"), &device) else {
+        let ActionBatch::Discrete(index) = ActionBatch::new(&case.actions("in.actions"), &device) else {
             panic!("discrete")
         };
         let taken = |q: &Tensor<2>| q.clone().gather(1, index.clone()).squeeze_dim::<1>(1);
@@ -258,7 +264,7 @@ fn golden_sac_discrete_losses() {
         let policy = Dist::Categorical { log_probs: policy.inner() };
         let entropy = policy.entropy();
         case.check_number("entropy_mean", number(entropy.clone().mean()));
-        let loss = alpha_loss(log_alpha.clone(), entropy.neg(), target_entropy);
+        let loss = temperature_loss(log_alpha.clone(), entropy.neg(), target_entropy);
         case.check_number("alpha_loss", number(loss.clone()));
         case.check_number("legacy_alpha_loss_mean_over_actions", number(loss.clone()) / choices);
         let grads = loss.backward();

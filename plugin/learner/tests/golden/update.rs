@@ -2,14 +2,14 @@
 
 use crate::case::{Case, host};
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionRows, Activation, Adam, AdamConfig, ParamVisitor, Parameters, tracked};
+use playbot_learner::nn::{ActionBatch, Adam, AdamConfig, ParamVisitor, Parameters, tracked};
 use playbot_learner::policy::{Actor, Critic, NetShape};
 use playbot_learner::ppo::{
     Minibatch, PpoBatch, PpoNets, StepMetrics, gradient_step, normalize_advantages, ratio_stats,
 };
 use playbot_learner::rng::Streams;
-use playbot_learner::score::{DecoderBatch, alphas};
-use playbot_learner::{ActionSpace, Actions, AlphaKind, DeviceKind, PpoConfig, ScoreConfig, StdKind};
+use playbot_learner::score::{TeacherBatch, confidences};
+use playbot_learner::{ActionSpace, Actions, ConfidenceKind, DeviceKind, PpoConfig, ScoreConfig, StdKind};
 
 fn check(name: &str) {
     let case = Case::load(name);
@@ -37,8 +37,8 @@ impl<'a> Update<'a> {
         let shape = NetShape {
             obs_dim: case.dim("obs"),
             latent: case.dim("skill"),
-            hidden: vec![case.dim("hidden"); 2],
-            activation: Activation::Tanh,
+            hidden: case.hidden_layers("param.actor"),
+            activation: case.activation(),
         };
         let mut rng = Streams::new(0).stream("nets", 0);
         let device = kind.plain();
@@ -53,9 +53,9 @@ impl<'a> Update<'a> {
         });
         let score = decoder.is_some().then(|| ScoreConfig {
             kl_coef: case.number("kl_coef"),
-            alpha: match case.hyper("alpha").as_str() {
-                Some("prob_own_sample") => AlphaKind::OwnSample,
-                Some("score_policy_action" | "prob_policy_action") => AlphaKind::PolicyAction,
+            confidence: match case.hyper("alpha").as_str() {
+                Some("prob_own_sample") => ConfidenceKind::OwnSample,
+                Some("score_policy_action" | "prob_policy_action") => ConfidenceKind::PolicyAction,
                 other => panic!("unknown alpha {other:?}"),
             },
             ..ScoreConfig::default()
@@ -73,7 +73,12 @@ impl<'a> Update<'a> {
 
     fn run(mut self) {
         let case = self.case;
-        let adam = AdamConfig { eps: self.config.adam_eps, ..AdamConfig::default() };
+        let adam = AdamConfig {
+            beta1: case.number("adam_beta1"),
+            beta2: case.number("adam_beta2"),
+            eps: self.config.adam_eps,
+            ..AdamConfig::default()
+        };
         let mut adam = Adam::new(adam);
         let size = case.dim("minibatch");
         for (i, rows) in case.indices("in.permutations").chunks_exact(size).enumerate() {
@@ -119,27 +124,27 @@ impl<'a> Update<'a> {
         }
         let mut advantages = pick("in.advantages");
         normalize_advantages(&mut advantages);
-        let decoder = self.decoder.as_ref().zip(self.score.as_ref()).map(|(decoder, score)| {
+        let teacher = self.decoder.as_ref().zip(self.score.as_ref()).map(|(decoder, score)| {
             let dist = decoder.forward(inputs.clone());
-            let actions = match score.alpha {
-                AlphaKind::OwnSample => actions("in.decoder_action"),
+            let actions = match score.confidence {
+                ConfidenceKind::OwnSample => actions("in.decoder_action"),
                 _ => actions("in.actions"),
             };
             let host = dist.clone().to_host().expect("readable");
-            let alpha = alphas(score.alpha, &host, &actions).expect("they fit");
-            let sum: f64 = alpha.iter().map(|&a| f64::from(a)).sum();
-            DecoderBatch { dist, alpha_mean: sum / alpha.len() as f64, alpha: vector(alpha) }
+            let confidence = confidences(score.confidence, &host, &actions).expect("they fit");
+            let sum: f64 = confidence.iter().map(|&x| f64::from(x)).sum();
+            TeacherBatch { dist, mean_confidence: sum / confidence.len() as f64, confidence: vector(confidence) }
         });
         Minibatch {
             inputs: inputs.into(),
             ppo: PpoBatch {
-                actions: ActionRows::new(&actions("in.actions"), &device),
+                actions: ActionBatch::new(&actions("in.actions"), &device),
                 old_log_probs: vector(pick("in.old_log_probs")),
                 advantages: vector(advantages),
                 old_values: vector(pick("in.old_values")),
                 returns: vector(pick("in.returns")),
             },
-            decoder,
+            teacher,
         }
     }
 
@@ -162,7 +167,7 @@ impl<'a> Update<'a> {
         if self.score.is_some() {
             entries.push(("kl_mean", step.decoder_kl));
             entries.push(("kl_reg", step.kl_penalty));
-            entries.push(("alpha_mean", step.alpha_mean));
+            entries.push(("alpha_mean", step.confidence));
         }
         for (name, got) in entries {
             self.case.check_entry(name, i, got);
@@ -234,7 +239,7 @@ fn an_exact_copy_of_the_decoder_pays_nothing() {
         let decoder = update.decoder.clone().expect("a SCORE case");
         update.nets.actor = decoder;
         update.nets = tracked(&update.nets);
-        let batch = update.minibatch(&[0, 1, 2, 3, 4, 5, 6, 7]);
+        let batch = update.minibatch(&(0..case.dim("minibatch")).collect::<Vec<_>>());
         let mut adam = Adam::new(AdamConfig::default());
         let (config, score) = (&update.config, update.score.as_ref());
         let step = gradient_step(&mut update.nets, &mut adam, &batch, config, score, 1e-3);

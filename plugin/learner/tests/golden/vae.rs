@@ -2,7 +2,7 @@
 
 use crate::case::{Case, host, norm, number};
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionRows, CnnKind, Dist, NamedGrads, ObsRows, parameter_count, tracked};
+use playbot_learner::nn::{ActionBatch, CnnKind, Dist, NamedGrads, ObsBatch, parameter_count, tracked};
 use playbot_learner::rng::Streams;
 use playbot_learner::skill::{SkillForward, SkillNets, skill_loss};
 use playbot_learner::{
@@ -28,7 +28,7 @@ fn config(case: &Case) -> SkillConfig {
         latent: case.dim("latent"),
         window: case.dim("T"),
         beta: case.number("beta"),
-        hidden: vec![hidden; 2],
+        hidden: case.hidden_layers("param.dec"),
         encoder_hidden: hidden,
         gru_hidden: hidden,
         gru_layers: case.dim("layers"),
@@ -87,15 +87,15 @@ impl<'a> Run<'a> {
         Tensor::from_data(TensorData::new(values.to_vec(), [rows, values.len() / rows]), &self.kind.plain())
     }
 
-    fn states(&self) -> ObsRows {
+    fn states(&self) -> ObsBatch {
         let (case, rows) = (self.case, self.steps * self.batch);
         match observation(case) {
             ObsKind::Vector(_) => {
-                ObsRows::Vector(self.matrix(&time_major(&case.f32s("in.states"), self.batch, self.steps), rows))
+                ObsBatch::Vector(self.matrix(&time_major(&case.f32s("in.states"), self.batch, self.steps), rows))
             }
             ObsKind::Image(ImageShape { channels, height, width }) => {
                 let pixels = time_major(&case.bytes("in.images"), self.batch, self.steps);
-                ObsRows::pixels(pixels, [rows, channels, height, width], &self.kind.plain())
+                ObsBatch::pixels(pixels, [rows, channels, height, width], &self.kind.plain())
             }
         }
     }
@@ -122,7 +122,7 @@ impl<'a> Run<'a> {
         let noise = self.matrix(&case.f32s("in.eps"), self.batch);
         self.check_inner(&states, &encoded, &noise);
 
-        let rows = ActionRows::new(&actions, &self.kind.plain());
+        let rows = ActionBatch::new(&actions, &self.kind.plain());
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps).expect("they fit");
         self.check_forward(&states, &forward);
         let loss = skill_loss(&forward, &self.config);
@@ -139,7 +139,7 @@ impl<'a> Run<'a> {
     }
 
     /// What the networks compute on their way.
-    fn check_inner(&self, states: &ObsRows, encoded: &Tensor<2>, noise: &Tensor<2>) {
+    fn check_inner(&self, states: &ObsBatch, encoded: &Tensor<2>, noise: &Tensor<2>) {
         let (case, nets) = (self.case, &self.nets);
         if case.has("out.enc_feature") {
             let summary = nets.encoder.summary(states, encoded.clone(), self.steps).expect("they fit");
@@ -164,7 +164,7 @@ impl<'a> Run<'a> {
         case.check("out.prior_log_std", &prior.log_std.expect("Gaussian"));
     }
 
-    fn check_forward(&self, states: &ObsRows, forward: &SkillForward) {
+    fn check_forward(&self, states: &ObsBatch, forward: &SkillForward) {
         let case = self.case;
         let batch_major = |values: &[f32]| batch_major(values, self.batch, self.steps);
         case.check("out.decoder_latent", &host(forward.decoder_latent.clone()));
@@ -199,9 +199,9 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The one case that gives its sizes and norms for each network.
+/// Whether the case gives sizes and norms of each network, and not of every tensor.
 fn is_paper_size(case: &Case) -> bool {
-    case.dim("hidden") == 200
+    case.expects("param_count.enc")
 }
 
 fn check(name: &str) {

@@ -3,7 +3,7 @@
 use crate::corridor::config;
 use crate::score::model;
 use crate::toy::{Driver, OBS, SPACE};
-use playbot_learner::{DeviceKind, PolicySpec, PpoConfig, PpoLearner, ScoreConfig};
+use playbot_learner::{DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner, ScoreConfig};
 
 fn learners() -> Vec<PpoLearner> {
     let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };

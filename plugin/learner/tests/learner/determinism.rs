@@ -7,8 +7,8 @@ use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::nn::{Activation, CnnKind};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Policy, PolicyOutput, PolicySpec, PpoConfig,
-    PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Learner, Policy, PolicyOutput, PolicySpec,
+    PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
 };
 
 fn numbers(n: usize) -> Vec<f32> {

@@ -2,7 +2,9 @@
 
 use crate::corridor::config;
 use crate::toy::{Driver, OBS, SPACE};
-use playbot_learner::{Actions, DeviceKind, LearnError, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout};
+use playbot_learner::{
+    Actions, DeviceKind, LearnError, Learner, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout,
+};
 
 fn learner(config: PpoConfig) -> PpoLearner {
     let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };

@@ -5,8 +5,8 @@ use crate::score::model;
 use crate::skill::{config, corridor_demos};
 use crate::toy::OBS;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, PolicyCard, PolicyFile, PpoLearner, ScoreConfig,
-    SkillModel, SkillTrainer,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, Learner, PolicyCard, PolicyFile, PpoLearner,
+    ScoreConfig, SkillModel, SkillTrainer,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde_json::{Value, json};
@@ -116,6 +116,15 @@ fn a_file_of_a_newer_version_or_another_kind_says_so() {
         let foreign = |c: &mut Contents| c.description = c.description.replacen(r#""kind":""#, r#""kind":"other "#, 1);
         let error = after(&path, load, foreign).to_string();
         assert!(error.contains("kind `other ") && error.contains("expected `"), "{error}");
+    }
+}
+
+#[test]
+fn an_entry_that_this_version_does_not_know_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (path, load, _) in files(folder.path()) {
+        let error = after(&path, load, |c| c.description = c.description.replacen('{', r#"{"colour":"red","#, 1));
+        assert!(error.to_string().contains("unknown field `colour`"), "{error}");
     }
 }
 

@@ -2,8 +2,8 @@
 
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, PpoConfig, PpoLearner, Rollout, ScoreConfig,
-    SkillConfig, SkillDraw, SkillModel, SkillTrainer, StdKind,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, Learner, PpoConfig, PpoLearner, Rollout,
+    ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, StdKind,
 };
 use std::ops::ControlFlow;
 
@@ -81,7 +81,7 @@ fn the_decoder_is_as_noisy_as_the_players_and_so_is_its_copy() {
         assert!(metrics.approx_kl.abs() < 1e-6 && metrics.clip_fraction == 0.0, "{metrics:?}");
         assert_eq!(metrics.decoder_kl, Some(0.0));
         // Around (1 + 1/2)^(-1) in every state.
-        let alpha = metrics.alpha_mean.expect("penalised");
+        let alpha = metrics.confidence.expect("penalised");
         assert!((alpha - 1.0 / 1.5).abs() < 0.1, "{alpha}");
     }
 }

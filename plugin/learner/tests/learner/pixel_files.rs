@@ -1,12 +1,13 @@
 //! Policies and checkpoints of images in files, and older files of vectors.
 
 use crate::files::{Contents, HUGE, after, describe, load_policy, policy_file};
+use crate::image_task::{Driver, SHAPE, config, image, model};
 use crate::pixels::{ppo, score};
 use crate::score::model as vector_model;
-use crate::spots::{Driver, SHAPE, config, image, model};
 use playbot_learner::rng::Streams;
 use playbot_learner::{
-    DeviceKind, FileError, PictureCard, PolicyCard, PolicyFile, PpoLearner, ScoreConfig, SkillDraw, SkillSource,
+    DeviceKind, FileError, Learner, PictureCard, PolicyCard, PolicyFile, PpoLearner, ScoreConfig, SkillDraw,
+    SkillSource,
 };
 use safetensors::tensor::Dtype;
 use serde_json::json;

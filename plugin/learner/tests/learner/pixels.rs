@@ -1,17 +1,17 @@
 //! PPO and SCORE-PPO from pixels: they learn, exactly, what a shared trunk must see.
 
-use crate::spots::{self, Driver, SHAPE, SPACE, config, image, model};
+use crate::image_task::{self, Driver, SHAPE, SPACE, config, image, model};
 use crate::toy;
 use burn::tensor::{Tensor, TensorData};
 use playbot_learner::nn::{
-    ActionRows, Activation, Adam, AdamConfig, CnnKind, ImageNet, ParamVisitor, Parameters, tracked,
+    ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, ParamVisitor, Parameters, tracked,
 };
 use playbot_learner::policy::{Actor, Critic, NetInput, NetShape};
 use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, gradient_step};
 use playbot_learner::rng::{Streams, below, normal};
 use playbot_learner::{
-    Actions, DeviceKind, ImageShape, LearnError, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig,
-    SkillModel, StdKind,
+    Actions, DeviceKind, ImageShape, LearnError, Learner, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout,
+    ScoreConfig, SkillModel, StdKind,
 };
 
 pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Image(SHAPE), latent: 0, action_space: SPACE };
@@ -65,10 +65,10 @@ fn the_first_policy_is_the_decoder_exactly() {
     let width = SHAPE.numbers();
     for rows in [0..1, 0..2, 255..257, 0..n] {
         let (z, pixels) = (&z[rows.start * 2..rows.end * 2], &pixels[rows.start * width..rows.end * width]);
-        assert_eq!(learner.initial_kl(z, pixels, rows.len()).expect("a copy"), Some(0.0));
+        assert_eq!(learner.initial_kl(z, pixels.into(), rows.len()).expect("a copy"), Some(0.0));
         let score = ScoreConfig { init_from_decoder: false, ..ScoreConfig::default() };
         let free = PpoLearner::with_skill(config(), score, &model(1, 1), 1, DeviceKind::Flex).expect("good settings");
-        assert!(free.initial_kl(z, pixels, rows.len()).expect("no copy") > Some(0.0));
+        assert!(free.initial_kl(z, pixels.into(), rows.len()).expect("no copy") > Some(0.0));
     }
     let whole = learner.policy().forward(&z, &pixels, n).expect("finite");
     for row in [0, 255, 256, 299] {
@@ -179,7 +179,7 @@ fn images_of_another_kind_are_refused() {
     assert!(matches!(shape, LearnError::Shape { expected: 144, found: 288, .. }), "{shape}");
     let vector = policy.values(&[], &[0.0; 144], 1).expect_err("a vector");
     assert!(matches!(vector, LearnError::Config(_)), "{vector}");
-    assert_eq!((policy.observation(), policy.cnn()), (SPEC.obs, Some(spots::cnn())));
+    assert_eq!((policy.observation(), policy.cnn()), (SPEC.obs, Some(image_task::cnn())));
 
     let refused = |config| PpoLearner::new(config, SPEC, 1, DeviceKind::Flex).expect_err("cannot work").to_string();
     let text = refused(PpoConfig { cnn: CnnKind::Nature { feature: 8 }, ..config() });
@@ -210,13 +210,13 @@ fn minibatch(rows: usize) -> Minibatch {
             pixels: Tensor::from_data(TensorData::new(pixels, [rows, 1, SHAPE.height, SHAPE.width]), &device),
         },
         ppo: PpoBatch {
-            actions: ActionRows::new(&Actions::Discrete(actions), &device),
+            actions: ActionBatch::new(&Actions::Discrete(actions), &device),
             old_log_probs: column() * 0.0 - 4.0f32.ln(),
             advantages: column(),
             old_values: column(),
             returns: column(),
         },
-        decoder: None,
+        teacher: None,
     }
 }
 
@@ -224,7 +224,7 @@ fn nets() -> PpoNets {
     let (mut rng, device) = (Streams::new(1).stream("nets", 0), DeviceKind::Flex.plain());
     let shape = NetShape { obs_dim: 8, latent: 0, hidden: vec![16], activation: Activation::Tanh };
     let actor = Actor::new(&shape, SPACE, StdKind::Vector, &mut rng, &device);
-    let cnn = ImageNet::new(&spots::cnn(), SHAPE, &mut rng, &device).expect("it fits");
+    let cnn = ImageNet::new(&image_task::cnn(), SHAPE, &mut rng, &device).expect("it fits");
     let critic = Critic::new(&shape, &mut rng, &device);
     let mut nets = PpoNets { actor: actor.with_cnn(cnn), critic };
     // The head is small at the start, and so is what it tells the trunk.

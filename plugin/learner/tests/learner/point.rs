@@ -1,10 +1,9 @@
 //! PPO and SAC bring a point to a goal in the plane.
 
-use crate::toy::Plays;
 use playbot_learner::rng::{ChaCha8Rng, Streams, unit};
 use playbot_learner::{
-    Action, ActionSpace, Actions, DeviceKind, EntropyCoef, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout,
-    RolloutStep, SacConfig, SacLearner, TimeLimit,
+    Action, ActionSpace, Actions, DeviceKind, EntropyCoef, Learner, ObsKind, PolicySpec, PpoConfig, PpoLearner,
+    Rollout, RolloutStep, SacConfig, SacLearner, TimeLimit,
 };
 
 pub const OBS: usize = 4;
@@ -65,7 +64,7 @@ impl Field {
     }
 
     /// Plays `steps` ticks with the learner's policy.
-    pub fn rollout(&mut self, learner: &impl Plays, steps: usize) -> Rollout {
+    pub fn rollout(&mut self, learner: &impl Learner, steps: usize) -> Rollout {
         let (envs, policy) = (self.points.len(), learner.policy());
         let mut rollout = Rollout::new(envs, OBS, 0, &SPACE);
         let mut obs = self.observe();
@@ -113,7 +112,7 @@ impl Field {
     }
 
     /// Share of the episodes of `ticks` ticks of play that reach their goals.
-    fn success(learner: &impl Plays, ticks: usize) -> f64 {
+    fn success(learner: &impl Learner, ticks: usize) -> f64 {
         let mut field = Self::new(32, 99);
         field.rollout(learner, ticks);
         field.reached.iter().filter(|reached| **reached).count() as f64 / field.reached.len() as f64
@@ -124,7 +123,7 @@ pub fn sac_config() -> SacConfig {
     SacConfig {
         actor_lr: 2e-3,
         critic_lr: 2e-3,
-        alpha_lr: 2e-3,
+        temperature_lr: 2e-3,
         batch: 64,
         buffer: 10_000,
         learning_starts: 256,

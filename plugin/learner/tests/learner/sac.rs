@@ -4,8 +4,8 @@ use crate::errors::vectors;
 use crate::point::{self, Field};
 use crate::toy::{BEST, Driver, OBS, SPACE};
 use playbot_learner::{
-    ActionSpace, Actions, DeviceKind, EndStates, EntropyCoef, FileError, LearnError, ObsKind, PolicySpec, PpoLearner,
-    Rollout, SacConfig, SacLearner, SacMetrics, TimeLimit,
+    ActionSpace, Actions, DeviceKind, EndStates, EntropyCoef, FileError, LearnError, Learner, ObsKind, PolicySpec,
+    PpoLearner, Rollout, SacConfig, SacLearner, SacMetrics, TimeLimit,
 };
 
 pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(OBS), latent: 0, action_space: SPACE };

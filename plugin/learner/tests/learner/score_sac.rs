@@ -5,9 +5,9 @@ use crate::score::model;
 use crate::toy::{Driver, OBS};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    Action, ActionSpace, Actions, AlphaKind, Dataset, DemoEpisode, DeviceKind, EndStates, EntropyCoef, KlDirection,
-    LearnError, ObsKind, Observations, PriorKind, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
-    SkillTrainer,
+    Action, ActionSpace, Actions, ConfidenceKind, Dataset, DemoEpisode, DeviceKind, EndStates, EntropyCoef,
+    KlDirection, LearnError, Learner, ObsKind, Observations, PriorKind, Rollout, SacConfig, SacLearner, ScoreConfig,
+    SkillModel, SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -26,12 +26,12 @@ fn a_discrete_actor_starts_as_the_decoder_exactly() {
     let model = model(1);
     let (z, obs) = inputs(33, OBS);
     let tied = learner(config(), ScoreConfig::default(), &model);
-    assert_eq!(tied.initial_kl(&z, &obs, 33).expect("a copy"), Some(0.0));
+    assert_eq!(tied.initial_kl(&z, (&obs).into(), 33).expect("a copy"), Some(0.0));
     // It plays itself though learning has not started.
     let (played, decoded) = (tied.policy().forward(&z, &obs, 33), model.policy().forward(&z, &obs, 33));
     assert_eq!(played.expect("finite").head, decoded.expect("finite").head);
     let free = learner(config(), ScoreConfig { init_from_decoder: false, ..ScoreConfig::default() }, &model);
-    assert!(free.initial_kl(&z, &obs, 33).expect("no copy") > Some(0.0));
+    assert!(free.initial_kl(&z, (&obs).into(), 33).expect("no copy") > Some(0.0));
 }
 
 /// After 1000 transitions with a given penalty: the divergence between decoder and actor.
@@ -43,12 +43,12 @@ fn divergence(model: &SkillModel, score: ScoreConfig) -> f32 {
         let rollout = driver.rollout(&learner, 8);
         let metrics = learner.update(&rollout).expect("finite");
         assert_eq!(metrics.decoder_kl.is_some(), score.kl && metrics.actor_loss.is_some());
-        let alpha = metrics.alpha_mean.unwrap_or(0.5);
+        let alpha = metrics.confidence.unwrap_or(0.5);
         assert!((0.0..=1.0).contains(&alpha), "a probability, not {alpha}");
         observed = (rollout.z, rollout.obs);
     }
     let (z, obs) = observed;
-    learner.initial_kl(&z, &obs, obs.numbers() / OBS).expect("updated").expect("a skill model")
+    learner.initial_kl(&z, (&obs).into(), obs.numbers() / OBS).expect("updated").expect("a skill model")
 }
 
 #[test]
@@ -70,8 +70,8 @@ fn every_switch_works() {
         ScoreConfig { condition: false, init_from_decoder: false, ..base() },
         ScoreConfig { kl: false, ..base() },
         ScoreConfig { prior: PriorKind::StandardNormal, ..base() },
-        ScoreConfig { alpha: AlphaKind::PolicyAction, ..base() },
-        ScoreConfig { alpha: AlphaKind::Off, ..base() },
+        ScoreConfig { confidence: ConfidenceKind::PolicyAction, ..base() },
+        ScoreConfig { confidence: ConfidenceKind::Off, ..base() },
     ] {
         let mut learner = learner(SacConfig { learning_starts: 1, ..config() }, score.clone(), &model);
         let rollout = Driver::new(4, 1).rollout(&learner, 4);
@@ -144,13 +144,13 @@ fn distance(model: &SkillModel, score: ScoreConfig) -> (f32, f32) {
         };
         sum += a.iter().zip(&b).map(|(x, y)| (x - y.clamp(-1.0, 1.0)).abs()).sum::<f32>() / 128.0;
     }
-    (sum, learner.initial_kl(&probe.z, &probe.obs, 64).expect("updated").expect("a skill model"))
+    (sum, learner.initial_kl(&probe.z, (&probe.obs).into(), 64).expect("updated").expect("a skill model"))
 }
 
 #[test]
 fn the_penalty_leads_a_continuous_actor_to_the_decoder() {
     let model = continuous_model();
-    let base = || ScoreConfig { init_from_decoder: false, alpha: AlphaKind::Off, ..ScoreConfig::default() };
+    let base = || ScoreConfig { init_from_decoder: false, confidence: ConfidenceKind::Off, ..ScoreConfig::default() };
     let free = distance(&model, ScoreConfig { kl: false, ..base() });
     assert!(free.0 > 0.4, "without a penalty it goes where the reward is: {free:?}");
     for kl_direction in [KlDirection::DecoderPolicy, KlDirection::PolicyDecoder] {

@@ -1,9 +1,7 @@
 //! A corridor, and a driver that plays it.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal};
-use playbot_learner::{
-    Action, ActionSpace, Actions, Policy, PolicyOutput, PpoLearner, Prior, Rollout, RolloutStep, SacLearner, SkillDraw,
-};
+use playbot_learner::{Action, ActionSpace, Actions, Learner, PolicyOutput, Rollout, RolloutStep, SkillDraw};
 
 /// Steps until an episode is cut off.
 const LIMIT: usize = 40;
@@ -52,41 +50,6 @@ impl Corridor {
     }
 }
 
-/// A learner whose policy can be played.
-pub trait Plays {
-    fn policy(&self) -> Policy;
-    fn rollout_latent(&self) -> usize;
-    fn prior(&self) -> Option<Prior>;
-}
-
-impl Plays for PpoLearner {
-    fn policy(&self) -> Policy {
-        self.policy()
-    }
-
-    fn rollout_latent(&self) -> usize {
-        self.rollout_latent()
-    }
-
-    fn prior(&self) -> Option<Prior> {
-        self.prior()
-    }
-}
-
-impl Plays for SacLearner {
-    fn policy(&self) -> Policy {
-        self.policy()
-    }
-
-    fn rollout_latent(&self) -> usize {
-        self.rollout_latent()
-    }
-
-    fn prior(&self) -> Option<Prior> {
-        self.prior()
-    }
-}
-
 /// Plays several corridors for a learner.
 pub struct Driver {
     corridors: Vec<Corridor>,
@@ -114,7 +77,7 @@ impl Driver {
     }
 
     /// Draws new skills where the time has come (or for all).
-    fn draw(&mut self, learner: &impl Plays, obs: &[f32], all: bool) {
+    fn draw(&mut self, learner: &impl Learner, obs: &[f32], all: bool) {
         let Some(prior) = learner.prior() else { return };
         let rngs = &mut self.rngs;
         let fresh = prior
@@ -131,7 +94,7 @@ impl Driver {
     }
 
     /// Plays `steps` ticks with the learner's policy.
-    pub fn rollout(&mut self, learner: &impl Plays, steps: usize) -> Rollout {
+    pub fn rollout(&mut self, learner: &impl Learner, steps: usize) -> Rollout {
         let envs = self.corridors.len();
         let policy = learner.policy();
         let latent = learner.rollout_latent();

@@ -1,1 +1,40 @@
-fn main() {}
+//! Bevy's example `alien_cake_addict`, as it is in the `bevy` package, with every verb of playbot.
+//!
+//! A level is where the cakes appear. An episode ends when the game is over, or after a minute.
+
+include!(concat!(env!("OUT_DIR"), "/game.rs"));
+
+use std::process::ExitCode;
+
+use KeyCode::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
+
+fn main() -> ExitCode {
+    // The game's own way to the same board every time.
+    unsafe { std::env::set_var("GITHUB_ACTIONS", "true") };
+    playbot_cli::main(&[&ForeignGame::new("alien_cake_addict", 1, game)
+        .hz(20.0)
+        .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
+        .observe(["i", "j", "cake_i", "cake_j", "cake"], |game: Res<Game>| {
+            let (at, cake) = (&game.player, &game.bonus);
+            [at.i, at.j, cake.i, cake.j, usize::from(cake.entity.is_some())].map(|it| it as f32 / 10.0)
+        })
+        .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
+        .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
+        .time_limit(1200)
+        .restart(Restart::state(GameState::Playing))
+        .level(refresh)
+        .demonstrator("glutton", |game: Res<Game>| {
+            let (at, cake) = (&game.player, &game.bonus);
+            [at.i < cake.i, at.i > cake.i, at.j < cake.j, at.j > cake.j].iter().position(|go| *go).unwrap_or(4) as u32
+        })])
+}
+
+/// What the game's own setup leaves as it is: the timer, an old cake, and where the camera looks.
+fn refresh(level: Res<LevelSeed>, mut rng: ResMut<Random>, mut timer: ResMut<BonusSpawnTimer>, mut game: ResMut<Game>) {
+    (rng.0, game.bonus.entity, game.camera_is_focus) = (ChaCha8Rng::seed_from_u64(level.0), None, RESET_FOCUS.into());
+    timer.0.reset();
+}

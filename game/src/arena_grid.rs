@@ -1,0 +1,37 @@
+//! Where the arenas of one World stand.
+
+use bevy::prelude::*;
+
+/// Arenas in a row.
+const COLUMNS: u32 = 8;
+
+/// Places for arenas side by side, so that no agent sees the arena of another. The first is at the origin.
+#[derive(Resource, Debug, Default)]
+pub(crate) struct ArenaGrid {
+    /// Places that have been given away.
+    taken: u32,
+}
+
+impl ArenaGrid {
+    /// The next free place, of squares that are `spacing` wide.
+    pub(crate) fn next(&mut self, spacing: f32) -> Transform {
+        let (column, row) = (self.taken % COLUMNS, self.taken / COLUMNS);
+        self.taken += 1;
+        Transform::from_xyz(column as f32 * spacing, row as f32 * spacing, 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arenas_fill_row_after_row() {
+        let mut grid = ArenaGrid::default();
+        let places: Vec<Vec3> = (0..10).map(|_| grid.next(96.0).translation).collect();
+        assert_eq!(places[0], Vec3::ZERO);
+        assert_eq!(places[7], Vec3::new(672.0, 0.0, 0.0));
+        assert_eq!(places[8], Vec3::new(0.0, 96.0, 0.0));
+        assert_eq!(places[9], Vec3::new(96.0, 96.0, 0.0));
+    }
+}

@@ -1,0 +1,52 @@
+//! What can be wrong with the mode of a game that is played in mazes.
+
+use bevy_playbot::unknown_name::UnknownName;
+use playbot_lab::mode::ModeError;
+use thiserror::Error;
+
+use super::{error::MazeError, spec_text::OptionError};
+
+/// The text is not a mode: a map with options, joined by `+`.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum MazeModeError {
+    /// An unknown map or option.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
+    /// The value of an option cannot be.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// There can be no such maze.
+    #[error(transparent)]
+    Maze(#[from] MazeError),
+    /// An option is given twice, or with its opposite.
+    #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
+    Twice(String),
+    /// Two options that cannot be together: which, and what to do.
+    #[error("{0}")]
+    Together(&'static str),
+}
+
+impl MazeModeError {
+    /// The error as games give it: for this mode.
+    pub fn of(self, mode: &str) -> ModeError {
+        match self {
+            Self::Name(unknown) => unknown.into(),
+            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
+        }
+    }
+
+    /// Checks that no two options are about the same `subject`.
+    ///
+    /// # Errors
+    ///
+    /// [`Twice`](Self::Twice) with the later one.
+    pub(crate) fn check_once<'a>(options: &[&'a str], subject: impl Fn(&'a str) -> &'a str) -> Result<(), Self> {
+        let repeats = |&(index, &option): &(usize, &&'a str)| {
+            options[..index].iter().any(|&earlier| subject(earlier) == subject(option))
+        };
+        match options.iter().enumerate().find(repeats) {
+            Some((_, &option)) => Err(Self::Twice(option.to_owned())),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Walls and free cells in rows.
+
+use super::{
+    cell::Cell,
+    error::MazeError,
+    limits::{MAX_CELLS, MAX_SIDE},
+};
+
+/// The walls alone, row by row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Walls {
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    free: Vec<bool>,
+}
+
+impl Walls {
+    /// Nothing but walls.
+    pub(super) fn solid(rows: usize, columns: usize) -> Result<Self, MazeError> {
+        check_size(rows, columns)?;
+        Ok(Self { rows, columns, free: vec![false; rows * columns] })
+    }
+
+    /// The place of a cell in row-major lists.
+    pub(super) fn index(&self, cell: Cell) -> usize {
+        cell.row * self.columns + cell.col
+    }
+
+    pub(super) fn is_free(&self, cell: Cell) -> bool {
+        cell.row < self.rows && cell.col < self.columns && self.free[self.index(cell)]
+    }
+
+    pub(super) fn open(&mut self, cell: Cell) {
+        let index = self.index(cell);
+        self.free[index] = true;
+    }
+
+    pub(super) fn cells(&self) -> impl Iterator<Item = Cell> + use<> {
+        let (rows, columns) = (self.rows, self.columns);
+        (0..rows).flat_map(move |row| (0..columns).map(move |col| Cell { row, col }))
+    }
+
+    pub(super) fn free_cells(&self) -> impl Iterator<Item = Cell> + '_ {
+        self.cells().filter(|&cell| self.is_free(cell))
+    }
+
+    pub(super) fn neighbours(&self, cell: Cell) -> impl Iterator<Item = Cell> + '_ {
+        let Cell { row, col } = cell;
+        let up = row.checked_sub(1).map(|row| Cell { row, col });
+        let left = col.checked_sub(1).map(|col| Cell { row, col });
+        let around = [up, Some(Cell { row: row + 1, col }), left, Some(Cell { row, col: col + 1 })];
+        around.into_iter().flatten().filter(|&cell| self.is_free(cell))
+    }
+}
+
+/// Refuses sizes that are nothing or too much.
+pub(super) fn check_size(rows: usize, columns: usize) -> Result<(), MazeError> {
+    if rows == 0 || columns == 0 {
+        return Err(MazeError::Empty);
+    }
+    let fits = rows <= MAX_SIDE && columns <= MAX_SIDE && rows * columns <= MAX_CELLS;
+    if fits { Ok(()) } else { Err(MazeError::TooLarge { rows, columns }) }
+}

@@ -1,0 +1,7 @@
+//! The program as its users call it.
+
+mod eval;
+mod program;
+mod trace;
+mod usage;
+mod work;

@@ -1,0 +1,93 @@
+//! Mistakes on the command line and in experiments.
+
+use crate::program::{code, errors, lines, playbot};
+
+#[test]
+fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (args, words) in [
+        (&["level", "coinrunn"][..], "did you mean `coinrun`?"),
+        (&["level", "coinrun", "--mode", "hrad"], "did you mean `hard`?"),
+        (&["trace", "coinrun", "--mode", "medium", "--actions", "7"], "valid: easy, hard"),
+        (&["eval", "--bot", "serch"], "did you mean `search`?"),
+        (&["eval"], "nobody to measure"),
+        (&["eval", "--bot", "random", "--levels", "hard"], "mode:first..last"),
+        (&["bench", "--case", "nonsense"], "sim/coinrun/vector"),
+        (&["train", "--run", "r", "--algorithm", "pp"], "did you mean `ppo`?"),
+        (&["trace", "maze2d", "--map", "medum", "--actions-file", "f"], "did you mean `medium`?"),
+        (&["trace", "maze2d", "--map", "medium+limt=3", "--actions-file", "f"], "did you mean `limit=1000`?"),
+        (&["record", "maze2d", "--levels", "medium+sprse:0..1", "--out", "o"], "did you mean `sparse`?"),
+        (&["record", "maze2d", "--noise=-0.5", "--out", "o"], "a standard deviation is a finite number"),
+        (&["record", "coinrun", "--noise", "1.5", "--out", "o"], "a probability lies between 0 and 1"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random", "--levels", "random+size=3x3:0..1"], "size=3x3"),
+        (&["fly"], "unrecognized subcommand"),
+        (&["train", "--run", "r", "--set", "ppo.gama=1"], "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
+        (&["train", "--run", "r", "--set", "ppo.lr"], "write key=value"),
+        (&["quickstart", "--set", "ppo.lr=fast"], "`ppo.lr` must be a number such as 0.0005, not fast"),
+        (&["learn-skills", "--out", "s", "--epochs", "0"], "epochs must be at least 1"),
+        (&["learn-skills", "--out", "s", "--threads", "0"], "it must be at least 1"),
+        (&["eval", "--bot", "random", "--threads", "0"], "it must be at least 1"),
+        (&["train", "--run", "r", "--threads", "0"], "it must be at least 1"),
+        (&["study", "--out", "o", "--threads", "0"], "it must be at least 1"),
+        (&["quickstart", "--threads", "0"], "it must be at least 1"),
+        (&["view", "coinrun", "--out", "x.svg"], "written as .png"),
+        (&["level", "coinrun", "--png", "a.svg"], "written as .png"),
+        (&["runs", "show", "r", "--plot", "x.png"], "written as .svg"),
+        (&["runs", "compare", "r", "--plot", "x.png"], "written as .svg"),
+        (&["learn-skills", "--out", "s", "--set", "skills.prior_std=Sate"], "did you mean `State`?"),
+        (&["eval", "--bot", "random", "--set", "eval.episodes_per_level=0"], "at least one episode"),
+        (&["eval", "--bot", "random", "--set", "test=hard"], "mode:first..last"),
+        (&["train", "--run", "r", "--algorithm", "bc"], "playbot eval --skills"),
+        (&["config", "show", "--set", "ppo.minibatches=7"], "64 × 128 = 8192; 8 does"),
+        (&["config", "show", "--set", "arenas=0"], "`arenas=0`: `arenas` is 0"),
+        (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: ppo lr must be"),
+        (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
+        (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..127: unknown map `hard`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "or with --levels"),
+        (&["eval", "--bot", "random", "--plot", "plot.gif"], "is written as .png or .svg"),
+        (&["config", "presets", "skil-paper"], "did you mean `skill-paper`?"),
+        (&["study", "--out", "o", "--seeds", "1,1"], "seed 1 is there twice"),
+        (&["study", "--out", "o", "--set", "variants=[(name: \"a\", set: [\"kl=false\"])]"], "variant `a`"),
+    ] {
+        let output = playbot(folder.path(), args);
+        assert_eq!(code(&output), 3, "{args:?}: {}", errors(&output));
+        assert!(errors(&output).contains(words), "{args:?}: {}", errors(&output));
+    }
+}
+
+#[test]
+fn an_unknown_key_names_file_line_and_neighbour() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = folder.path().join("bad.ron");
+    let text = "(\n    game: \"coinrun\",\n    trian: \"hard:0..63\",\n)\n";
+    std::fs::write(&config, text).expect("writable");
+    let output = playbot(folder.path(), &["train", "--run", "r", "--experiment", "bad.ron"]);
+    assert_eq!(code(&output), 3);
+    let errors = errors(&output);
+    assert!(errors.contains("bad.ron:3:") && errors.contains("`trian`") && errors.contains("`train`"), "{errors}");
+    assert!(!folder.path().join("r").exists(), "nothing is written for a bad experiment");
+}
+
+#[test]
+fn an_experiment_can_be_shown_with_all_its_values_and_read_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let show = |args: &[&str]| {
+        let output = playbot(folder.path(), &[&["config", "show"], args].concat());
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        String::from_utf8(output.stdout).expect("Unicode")
+    };
+    std::fs::write(folder.path().join("least.ron"), "(base: [\"d4rl-ppo\"], game: \"coinrun\", train: \"hard:0..3\", test: \"hard:4..5\", demos: \"d\", steps: 9, ppo: (epochs: 2))").expect("writable");
+    let shown = show(&["--experiment", "least.ron", "--set", "score.kl_coef=0.25"]);
+    let warned = playbot(folder.path(), &["config", "show", "--experiment", "least.ron"]);
+    assert!(errors(&warned).contains("there are no recordings at d"), "{}", errors(&warned));
+    for line in
+        ["steps: 9,", "epochs: 2,", "num_steps: 2048,", "kl_coef: 0.25,", "algorithm: \"score-ppo\",", "horizon: 8,"]
+    {
+        assert!(shown.contains(line), "{line}: {shown}");
+    }
+    std::fs::write(folder.path().join("shown.ron"), &shown).expect("writable");
+    assert_eq!(show(&["--experiment", "shown.ron"]), shown);
+    let presets = playbot(folder.path(), &["config", "presets", "--json"]);
+    assert!(lines(&presets).iter().any(|preset| preset["name"] == "skill-paper"));
+}

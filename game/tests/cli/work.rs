@@ -1,0 +1,112 @@
+//! From recordings to reports.
+
+use std::process::{Command, Output};
+
+use crate::program::{code, errors, lines, playbot, said};
+
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_listening_stops_no_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let deaf = |args: &[&str]| {
+        let full = std::fs::File::create("/dev/full").expect("a disk that is always full");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+        command.args(args).current_dir(folder.path()).stderr(full).output().expect("the program starts")
+    };
+    let recorded = deaf(&["record", "coinrun", "--levels", "easy:0..3", "--out", "a.demo"]);
+    assert_eq!(code(&recorded), 0);
+    let learned = deaf(&["learn-skills", "--demos", "a.demo", "--epochs", "1", "--out", "skills"]);
+    assert_eq!(code(&learned), 0);
+    assert!(folder.path().join("skills").exists());
+    assert_eq!(code(&deaf(&["level", "maze2d", "--map", "nope"])), 3, "a mistake is one even if nobody is told");
+}
+
+#[test]
+fn recording_verifying_and_repairing_from_the_shell() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| playbot(folder.path(), args);
+    let output = run(&["record", "coinrun", "--levels", "easy:0..3", "--noise", "0.2", "--out", "a.demo"]);
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let again = run(&["record", "coinrun", "--levels", "easy:0..3", "--out", "a.demo"]);
+    assert_eq!(code(&again), 3, "an existing recording is not overwritten");
+    let verified = run(&["demo", "verify", "a.demo", "--json"]);
+    assert_eq!(code(&verified), 0, "{}", errors(&verified));
+    assert_eq!(lines(&verified)[0]["report"]["episodes"], 4);
+    assert_eq!(lines(&run(&["demo", "ls", "a.demo", "--json"]))[0]["episodes"], 4);
+    assert_eq!(lines(&run(&["demo", "show", "a.demo", "--json"])).len(), 4);
+
+    let bytes = std::fs::read(folder.path().join("a.demo")).expect("readable");
+    std::fs::write(folder.path().join("torn.demo"), &bytes[..bytes.len() - 5]).expect("writable");
+    let torn = run(&["demo", "verify", "torn.demo"]);
+    assert_eq!(code(&torn), 1, "damage is a finding: {}", errors(&torn));
+    assert!(said(&torn).contains("playbot demo repair"), "{}", said(&torn));
+    let mended = run(&["demo", "repair", "torn.demo", "--out", "mended.demo", "--json"]);
+    assert_eq!(lines(&mended)[0]["kept_episodes"], 3);
+    assert_eq!(code(&run(&["demo", "verify", "mended.demo"])), 0);
+
+    let mut flipped = bytes;
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 16;
+    std::fs::write(folder.path().join("flipped.demo"), flipped).expect("writable");
+    let flipped = run(&["demo", "verify", "flipped.demo"]);
+    assert_eq!(code(&flipped), 1);
+    assert!(said(&flipped).contains("byte"), "{}", said(&flipped));
+}
+
+#[test]
+fn a_small_run_from_demonstrations_to_evaluation() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| playbot(folder.path(), args);
+    let config = r#"(
+        game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "demos", steps: 512, arenas: 8, worlds: 2,
+        skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+        ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
+        eval: (episodes_per_level: 1),
+    )"#;
+    std::fs::write(folder.path().join("tiny.ron"), config).expect("writable");
+    std::fs::create_dir(folder.path().join("demos")).expect("writable");
+    let ok = |output: Output| {
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        output
+    };
+    ok(run(&["record", "coinrun", "--levels", "easy:0..7", "--out", "demos/a.demo"]));
+    ok(run(&["learn-skills", "--experiment", "tiny.ron", "--out", "skills.safetensors"]));
+    let train = ["train", "--experiment", "tiny.ron", "--skills", "skills.safetensors", "--run", "runs/a"];
+    ok(run(&train));
+    let again = run(&train);
+    assert_eq!(code(&again), 3);
+    assert!(errors(&again).contains("--force"), "{}", errors(&again));
+    ok(run(&["train", "--run", "runs/a", "--resume", "--steps", "1024"]));
+    let rows =
+        lines(&ok(run(&["eval", "--run", "runs/a", "--skills", "skills.safetensors", "--bot", "random", "--json"])));
+    let methods: Vec<_> = rows.iter().filter_map(|row| row["method"].as_str()).collect();
+    assert_eq!(methods, ["score-ppo", "bc", "random"]);
+    assert!(rows.iter().all(|row| row["split"] == "hard:64..65" && row["episodes"] == 2));
+
+    let mut swapped = vec!["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--run", "runs/b"];
+    swapped.extend(["--set", "train=hard:64..65", "--set", "test=hard:0..3", "--steps", "128"]);
+    ok(run(&swapped));
+    let eval = |more: &[&str]| run(&[&["eval", "--run", "runs/a", "--run", "runs/b", "--json"], more].concat());
+    let seen = eval(&[]);
+    assert_eq!(code(&seen), 3);
+    for words in ["runs/b was trained on hard:64..65", "held-out levels hard:64..65", "--levels"] {
+        assert!(errors(&seen).contains(words), "{}", errors(&seen));
+    }
+    assert_eq!(lines(&ok(eval(&["--levels", "hard:64..65"]))).len(), 2, "on purpose");
+    let saved = folder.path().join("runs/b/experiment.ron");
+    let text = std::fs::read_to_string(&saved).expect("written").replace("\"coinrun\"", "\"maze\"");
+    std::fs::write(&saved, text).expect("writable");
+    let foreign = eval(&["--levels", "hard:64..65"]);
+    assert_eq!(code(&foreign), 3);
+    assert!(errors(&foreign).contains("runs/b is a run of `maze`"), "{}", errors(&foreign));
+
+    let quick = ok(run(&["quickstart", "--experiment", "tiny.ron", "--run", "runs/quick", "--json"]));
+    let methods: Vec<_> = lines(&quick).iter().filter_map(|row| row["method"].as_str().map(str::to_owned)).collect();
+    assert_eq!(methods, ["score-ppo", "ppo", "bc", "right-jump", "random"]);
+    let report = std::fs::read_to_string(folder.path().join("runs/quick/report.html")).expect("written");
+    assert!(report.contains("score-ppo") && report.contains("<svg"));
+
+    std::fs::write(folder.path().join("not.safetensors"), b"nothing of the kind").expect("writable");
+    let foreign = run(&["eval", "--skills", "not.safetensors"]);
+    assert_eq!(code(&foreign), 3, "{}", errors(&foreign));
+}

@@ -1,0 +1,42 @@
+//! How arenas are spread over Worlds.
+
+use crate::game::Game;
+
+/// Worlds of equal size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arrangement {
+    /// Number of Worlds.
+    pub worlds: u32,
+    /// Arenas in each of them, with one agent each.
+    pub arenas: u32,
+}
+
+impl Arrangement {
+    /// `arenas` spread over `worlds`, or over more of them if the game does not bear so many in one: see
+    /// [`Game::arenas_per_world`].
+    pub fn new(game: &dyn Game, arenas: u32, worlds: u32) -> Self {
+        let wanted = (arenas / worlds.max(1)).max(1);
+        let most = game.arenas_per_world().unwrap_or(u32::MAX).max(1);
+        if wanted <= most {
+            return Self { worlds: worlds.max(1), arenas: wanted };
+        }
+        let total = wanted * worlds.max(1);
+        let fitting = (1..=most).rev().find(|arenas| total.is_multiple_of(*arenas)).unwrap_or(1);
+        Self { worlds: total / fitting, arenas: fitting }
+    }
+
+    /// Number of the first agent of each World.
+    pub fn first_agents(self) -> impl Iterator<Item = u32> {
+        (0..self.worlds).map(move |world| world * self.arenas)
+    }
+
+    /// Arenas of all Worlds together.
+    pub fn total(self) -> u32 {
+        self.worlds * self.arenas
+    }
+}
+
+/// The largest number of arenas, up to `wanted`, that one World of the game bears.
+pub fn at_most(game: &dyn Game, wanted: usize) -> usize {
+    game.arenas_per_world().map_or(wanted, |most| wanted.min(most.max(1) as usize))
+}

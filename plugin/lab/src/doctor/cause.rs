@@ -1,0 +1,136 @@
+//! Usual causes of a difference, and what to do about them.
+
+use serde::Serialize;
+
+use super::report::{Comparison, Difference, DifferenceKind};
+
+/// A usual cause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CauseKind {
+    /// Random numbers that no seed decides.
+    Randomness,
+    /// The order of a `HashMap` or `HashSet`.
+    HashOrder,
+    /// The clock on the wall.
+    WallClock,
+    /// Something that belongs to a thread or to the whole process.
+    ThreadState,
+    /// A resource of which two arenas have only one.
+    SharedByArenas,
+    /// Something that a restart does not reset.
+    SurvivesRestart,
+    /// Files that are loaded while the game already runs.
+    Loading,
+}
+
+impl CauseKind {
+    /// The cause in words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Randomness => "random numbers without a seed",
+            Self::HashOrder => "iteration over a HashMap or HashSet of std, whose order is another one in every run",
+            Self::WallClock => "the clock on the wall: Time<Real>, Instant or SystemTime",
+            Self::ThreadState => "a static, a thread_local! or a task on another thread",
+            Self::SharedByArenas => "a resource, static or query that all arenas of a World share",
+            Self::SurvivesRestart => {
+                "state that survives a restart: a resource, a Local or an entity that is not reset"
+            }
+            Self::Loading => "assets that are still loading when the game begins",
+        }
+    }
+
+    /// What to do about it.
+    pub fn advice(self) -> &'static str {
+        match self {
+            Self::Randomness => {
+                "keep a seeded generator in a resource or on the arena, seed it from the level's number when an episode \
+                 starts, and draw from nothing else (no thread_rng, no RandomState, no address of anything)"
+            }
+            Self::HashOrder => {
+                "take a BTreeMap, an IndexMap or Bevy's own `bevy::platform::collections::HashMap`, or sort the entries \
+                 before anything depends on their order"
+            }
+            Self::WallClock => {
+                "take `Res<Time>` (game time) for everything that moves or counts, and leave Time<Real> and Instant to \
+                 what is only shown"
+            }
+            Self::ThreadState => {
+                "put it into the World, as a resource or a component; let a task's result arrive at a tick that does not \
+                 depend on when it was ready"
+            }
+            Self::SharedByArenas => {
+                "put it on the arena or the agent as a component, or let the game have one arena per World"
+            }
+            Self::SurvivesRestart => {
+                "set it back when an episode starts: insert the resource anew, despawn what the level spawned, keep no \
+                 state of the simulation in a Local; what is meant to last, such as a high score, can be left out with \
+                 --ignore"
+            }
+            Self::Loading => {
+                "wait for the files before an episode starts, with a `ready` that says when they are there"
+            }
+        }
+    }
+}
+
+/// A cause that fits a difference.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Cause {
+    /// Which.
+    pub kind: CauseKind,
+    /// What in the game points to it.
+    pub evidence: Vec<String>,
+    /// What to do.
+    pub advice: &'static str,
+}
+
+/// The causes that fit a difference, likeliest first. Which comparison differs says most; among several, types that the game
+/// holds decide.
+pub(super) fn causes(
+    comparison: Comparison,
+    difference: Option<&Difference>,
+    suspicions: &[(CauseKind, String)],
+) -> Vec<Cause> {
+    let kinds: &[CauseKind] = match comparison {
+        Comparison::Repeat => &[CauseKind::Randomness, CauseKind::HashOrder, CauseKind::WallClock],
+        Comparison::Clock => &[CauseKind::WallClock],
+        Comparison::Threads => &[CauseKind::ThreadState],
+        Comparison::Arenas => &[CauseKind::SharedByArenas],
+        Comparison::Restart => &[CauseKind::SurvivesRestart],
+    };
+    let counts_differ = difference.is_some_and(|difference| difference.kind == DifferenceKind::Entities);
+    let is_of_loading = counts_differ && matches!(comparison, Comparison::Repeat | Comparison::Threads);
+    let all = kinds.iter().copied().chain(is_of_loading.then_some(CauseKind::Loading));
+    let mut causes: Vec<_> = all
+        .map(|kind| {
+            let evidence = suspicions.iter().filter(|(of, _)| *of == kind).map(|(_, why)| why.clone()).collect();
+            Cause { kind, evidence, advice: kind.advice() }
+        })
+        .collect();
+    causes.sort_by_key(|cause| cause.evidence.is_empty());
+    causes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(comparison: Comparison, suspicions: &[(CauseKind, String)]) -> Vec<CauseKind> {
+        causes(comparison, None, suspicions).into_iter().map(|cause| cause.kind).collect()
+    }
+
+    #[test]
+    fn the_comparison_that_differs_tells_causes_apart() {
+        assert_eq!(kinds(Comparison::Clock, &[]), [CauseKind::WallClock]);
+        assert_eq!(kinds(Comparison::Arenas, &[]), [CauseKind::SharedByArenas]);
+        assert_eq!(kinds(Comparison::Restart, &[]), [CauseKind::SurvivesRestart]);
+        assert_eq!(kinds(Comparison::Repeat, &[])[0], CauseKind::Randomness);
+    }
+
+    #[test]
+    fn what_the_game_holds_comes_first() {
+        let suspicions = [(CauseKind::HashOrder, "`Bag.0` is a `HashMap`".to_owned())];
+        assert_eq!(kinds(Comparison::Repeat, &suspicions)[0], CauseKind::HashOrder);
+    }
+}

@@ -1,0 +1,219 @@
+//! Two copies of a game after the same tick, component by component and resource by resource.
+
+use std::{
+    any::TypeId,
+    collections::{BTreeMap, BTreeSet},
+};
+
+use bevy::{
+    ecs::{component::ComponentId, entity::EntityHashMap},
+    prelude::*,
+};
+
+use super::{
+    census::types_of,
+    field::{FieldComparison, FieldDifference},
+    game_copy::GameCopy,
+    pairs::Pairs,
+    report::{Comparison, Difference, DifferenceKind},
+    scope,
+    types::{KnownType, TypeBook},
+};
+
+/// How copies are compared.
+pub(super) struct Comparer<'a> {
+    pub book: &'a TypeBook,
+    pub comparison: Comparison,
+    /// Parts of paths of types that nobody wants to hear of.
+    pub ignored: &'a [String],
+    /// Types of fields that could not be compared.
+    pub incomparable: BTreeSet<String>,
+}
+
+/// What differs after a tick.
+#[derive(Default)]
+pub(super) struct Found {
+    pub differences: Vec<Difference>,
+    pub unmatched: usize,
+}
+
+/// In which group an entity is, and at which place.
+type Places = EntityHashMap<(usize, usize)>;
+
+impl Comparer<'_> {
+    /// Everything that differs, nearest to its cause first: types of the game before those of the engine, resources before
+    /// components, whose values often come from them.
+    pub fn compare(&mut self, left: &GameCopy, right: &GameCopy, tick: u32) -> Found {
+        let mut found = Found::default();
+        let pairs = self.pair_up(left, right, tick, &mut found);
+        let places = |side: fn(&Pairs) -> &Vec<Entity>| -> Places {
+            let numbered = pairs.iter().enumerate();
+            let placed = numbered
+                .flat_map(|(group, pairs)| side(pairs).iter().enumerate().map(move |(at, e)| (*e, (group, at))));
+            placed.collect()
+        };
+        let (left_places, right_places) = (places(|pairs| &pairs.left), places(|pairs| &pairs.right));
+        let loose = self.is_loose();
+        let same_entity = |a: Entity, b: Entity| match (left_places.get(&a), right_places.get(&b)) {
+            // A list of entities is in the order of their spawning, which need not be that of a first episode.
+            (Some(a), Some(b)) => {
+                if loose {
+                    a.0 == b.0
+                } else {
+                    a == b
+                }
+            }
+            // Of an entity that is no part of the game nothing is known.
+            _ => true,
+        };
+        self.compare_resources(left, right, tick, &same_entity, &mut found);
+        for group in &pairs {
+            found.differences.extend(self.compare_group(left, right, tick, group, &same_entity));
+        }
+        // What a restart left over is a cause; elsewhere a number of entities follows from something.
+        let is_cause = self.comparison == Comparison::Restart;
+        let rank = |difference: &Difference| match difference.kind {
+            DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
+            DifferenceKind::Resource => (scope::is_engine(&difference.name), 0),
+            _ => (scope::is_engine(&difference.name), 2),
+        };
+        found.differences.sort_by_key(rank);
+        found
+    }
+
+    /// Whether entities of one kind may stand in another order.
+    fn is_loose(&self) -> bool {
+        matches!(self.comparison, Comparison::Restart | Comparison::Arenas)
+    }
+
+    fn is_wanted(&self, known: &KnownType) -> bool {
+        let path = known.path.as_deref().unwrap_or_default();
+        known.is_compared()
+            && scope::is_compared_in(self.comparison, path)
+            && !self.ignored.iter().any(|part| path.contains(part.as_str()))
+    }
+
+    fn compare_resources(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        tick: u32,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+        found: &mut Found,
+    ) {
+        // The second agent of a shared World finds itself at another place of every list than when it is alone.
+        if self.comparison == Comparison::Arenas && left.number(0) != right.number(0) {
+            return;
+        }
+        let (lefts, rights) = (self.resources(left), self.resources(right));
+        let all: BTreeSet<TypeId> = lefts.keys().chain(rights.keys()).copied().collect();
+        for id in all {
+            let Some(known) = self.book.get(id).filter(|known| self.is_wanted(known)) else { continue };
+            let name = known.path.clone().unwrap_or_default();
+            let difference = match (lefts.get(&id), rights.get(&id)) {
+                (Some(&a), Some(&b)) => self.field(known, (&left.world, a), (&right.world, b), same_entity),
+                (a, b) => presence(a.is_some(), b.is_some()),
+            };
+            found.differences.extend(difference.map(|field| Difference {
+                tick,
+                kind: DifferenceKind::Resource,
+                name,
+                entity: None,
+                field: field.path,
+                left: field.left,
+                right: field.right,
+            }));
+        }
+    }
+
+    fn resources(&self, copy: &GameCopy) -> BTreeMap<TypeId, Entity> {
+        let typed =
+            |(id, entity): (ComponentId, Entity)| Some((copy.world.components().get_info(id)?.type_id()?, entity));
+        copy.world.resource_entities().iter().filter_map(typed).collect()
+    }
+
+    /// The first field in which a component or resource of two entities differs.
+    fn field(
+        &mut self,
+        known: &KnownType,
+        left: (&World, Entity),
+        right: (&World, Entity),
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> Option<FieldDifference> {
+        let reflect = known.reflect.as_ref()?;
+        let (a, b) = (reflect.reflect(left.0.entity(left.1)), reflect.reflect(right.0.entity(right.1)));
+        let (Some(a), Some(b)) = (a, b) else { return presence(a.is_some(), b.is_some()) };
+        let mut comparison = FieldComparison {
+            same_entity,
+            handles: !self.is_loose(),
+            right_may_hold_more: self.comparison == Comparison::Arenas,
+            incomparable: &mut self.incomparable,
+        };
+        comparison.first(a.as_partial_reflect(), b.as_partial_reflect())
+    }
+
+    fn compare_group(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        tick: u32,
+        group: &Pairs,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> Vec<Difference> {
+        let mut differences = Vec::new();
+        for (place, (&a, &b)) in group.left.iter().zip(&group.right).enumerate() {
+            for (name, field) in self.components(left, a, right, b, same_entity) {
+                let entity = self.describe(group, place, a);
+                let (kind, FieldDifference { path, left, right }) = (DifferenceKind::Component, field);
+                differences.push(Difference { tick, kind, name, entity: Some(entity), field: path, left, right });
+            }
+        }
+        let in_another_order =
+            self.is_loose() && !differences.is_empty() && self.is_reordered(left, right, group, same_entity);
+        if in_another_order { Vec::new() } else { differences }
+    }
+
+    /// Whether every entity on the left has an equal one on the right, whatever the order.
+    fn is_reordered(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        group: &Pairs,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> bool {
+        let mut free = group.right.clone();
+        group.left.iter().all(|&a| {
+            let equal = free.iter().position(|&b| self.components(left, a, right, b, same_entity).is_empty());
+            equal.map(|at| free.remove(at)).is_some()
+        })
+    }
+
+    /// Components of two entities that differ, and the first field in which they do. Components that only one of them has
+    /// are the engine's: those of the game decided which entities were matched.
+    fn components(
+        &mut self,
+        left: &GameCopy,
+        a: Entity,
+        right: &GameCopy,
+        b: Entity,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> Vec<(String, FieldDifference)> {
+        let types = types_of(&left.world, left.world.entity(a).archetype().components());
+        let shared = types.into_iter().filter(|id| right.world.entity(b).contains_type_id(*id));
+        let book = self.book;
+        let mut differences = Vec::new();
+        for known in shared.filter_map(|id| book.get(id)) {
+            if self.is_wanted(known)
+                && let Some(field) = self.field(known, (&left.world, a), (&right.world, b), same_entity)
+            {
+                differences.push((known.path.clone().unwrap_or_default(), field));
+            }
+        }
+        differences
+    }
+}
+
+fn presence(left: bool, right: bool) -> Option<FieldDifference> {
+    let word = |there: bool| if there { "there" } else { "not there" }.to_owned();
+    (left != right).then(|| FieldDifference { path: String::new(), left: word(left), right: word(right) })
+}

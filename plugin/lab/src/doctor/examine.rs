@@ -1,0 +1,108 @@
+//! The whole examination.
+
+use super::{
+    finding::findings,
+    game_copy::{Plan, bare_world},
+    observed::{ObservationReport, Watch},
+    report::{Comparison, ComparisonReport, DoctorReport},
+    safety::judge,
+    trial::Trial,
+    types::{TypeBook, TypesReport},
+};
+use crate::{game::Game, mode::ModeError};
+
+/// How a game is examined.
+#[derive(Clone, Debug)]
+pub struct DoctorOptions {
+    /// Mode of the game.
+    pub mode: String,
+    /// Ticks that each comparison plays.
+    pub ticks: u32,
+    /// The level, and the seed of the actions.
+    pub seed: u64,
+    /// Whether the game can have several arenas in one World.
+    pub several_arenas: bool,
+    /// Components and resources whose path contains one of these are left out, such as a high score that is meant to last.
+    pub ignored: Vec<String>,
+}
+
+impl DoctorOptions {
+    /// 300 ticks of a mode.
+    pub fn new(mode: impl Into<String>) -> Self {
+        Self { mode: mode.into(), ticks: 300, seed: 0, several_arenas: true, ignored: Vec::new() }
+    }
+}
+
+/// Plays copies of a game with the same random actions, compares them after every tick, and says what is wrong.
+/// `progress` hears what is compared next.
+///
+/// # Errors
+///
+/// The game has no such mode. Whatever else is wrong with the game is in the report.
+pub fn examine(
+    game: &dyn Game,
+    options: &DoctorOptions,
+    mut progress: impl FnMut(Comparison),
+) -> Result<DoctorReport, ModeError> {
+    game.check_mode(&options.mode)?;
+    let plan = Plan { mode: &options.mode, seed: options.seed };
+    let mut book = TypeBook::new(&bare_world());
+    let mut comparisons: Vec<ComparisonReport> = Vec::new();
+    let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
+    let mut suspicions = Vec::new();
+    for comparison in Comparison::ALL {
+        if let Some(why) = reason_to_skip(comparison, options, &comparisons) {
+            comparisons.push(skipped(comparison, why));
+            continue;
+        }
+        progress(comparison);
+        let mut trial = Trial::new(comparison, game, &plan, options.ticks);
+        let is_first = comparison == Comparison::Repeat;
+        let mut watch = is_first.then(|| Watch::new(trial.copies[0].observed_names()));
+        let ran = trial.run(options.ticks, &mut book, &options.ignored, watch.as_mut());
+        if let Some(watch) = watch {
+            observation = watch.report();
+            types = book.report(&trial.copies[0], &ran.incomparable);
+            suspicions = book.suspicions(&trial.copies[0]);
+        }
+        comparisons.push(ran.report);
+    }
+    Ok(DoctorReport {
+        game: game.name().to_owned(),
+        version: game.version(),
+        mode: options.mode.clone(),
+        seed: options.seed,
+        ticks: options.ticks,
+        safety: judge(&comparisons, &observation),
+        findings: findings(&comparisons, &observation, &suspicions),
+        comparisons,
+        observation,
+        types,
+        ticks_per_second: None,
+    })
+}
+
+/// A game that differs from itself differs everywhere, and no comparison could tell why.
+fn reason_to_skip(comparison: Comparison, options: &DoctorOptions, done: &[ComparisonReport]) -> Option<String> {
+    if comparison == Comparison::Arenas && !options.several_arenas {
+        return Some("the game has one arena per World, by its own word".to_owned());
+    }
+    let broken = done.iter().find(|report| report.comparison == Comparison::Repeat && report.same() == Some(false))?;
+    Some(match broken.fault.is_some() {
+        true => "the game has a fault, which comes first".to_owned(),
+        false => "the game already differs from itself, which comes first".to_owned(),
+    })
+}
+
+fn skipped(comparison: Comparison, why: String) -> ComparisonReport {
+    ComparisonReport {
+        comparison,
+        skipped: Some(why),
+        ticks: 0,
+        first: None,
+        others: Vec::new(),
+        effect: None,
+        unmatched: 0,
+        fault: None,
+    }
+}

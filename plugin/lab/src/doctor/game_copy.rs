@@ -1,0 +1,163 @@
+//! One running copy of a game, whose agents do what a script of random actions says.
+
+use std::{
+    any::TypeId,
+    collections::BTreeSet,
+    panic::{AssertUnwindSafe, catch_unwind},
+};
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    action::{Action, ActionSpace},
+    agent::Agent,
+    bot::uniform,
+    control::Control,
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    headless::{headless_app, into_world, tick_world},
+    level::LevelQueue,
+    observation::{Observation, VectorSensor},
+    policy::AgentStreams,
+    reward::Reward,
+    state_hash::StateHash,
+};
+
+use super::census::{Census, types_of};
+use crate::{game::Game, worlds::build_world};
+
+/// Ends of episodes in this tick.
+#[derive(Resource, Default)]
+struct Ends(Vec<(Entity, EpisodeEnd)>);
+
+/// What an agent saw, got and came to in a tick.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Outcome {
+    pub observation: Vec<f32>,
+    pub image: Vec<u8>,
+    pub reward: f32,
+    pub hash: u64,
+    pub end: Option<EpisodeEnd>,
+}
+
+/// A World with its agents.
+pub(super) struct GameCopy {
+    pub world: World,
+    pub agents: Vec<Entity>,
+    pub census: Census,
+    /// What went wrong, after which the copy is not ticked any more.
+    pub fault: Option<String>,
+    first: u32,
+    space: ActionSpace,
+    scripts: Vec<AgentStreams>,
+    in_prelude: bool,
+}
+
+/// What is played.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan<'a> {
+    pub mode: &'a str,
+    /// The level, and the seed of the actions.
+    pub seed: u64,
+}
+
+impl GameCopy {
+    /// A World with agents `first..first + count`, all in the same level.
+    pub fn new(game: &dyn Game, plan: &Plan, first: u32, count: u32) -> Self {
+        let (mut world, agents) = build_world(game, plan.mode, plan.seed, first, count);
+        prepare(&mut world);
+        for &agent in &agents {
+            // Replay without a recording: nobody else decides, and virtual input acts.
+            world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(plan.seed)));
+        }
+        let scripts = (first..first + count).map(|number| AgentStreams::new(plan.seed, number)).collect();
+        let (census, fault, space) = (Census::default(), None, game.actions());
+        Self { world, agents, census, fault, first, space, scripts, in_prelude: false }
+    }
+
+    /// Number of an agent.
+    pub fn number(&self, agent: usize) -> u32 {
+        self.first + agent as u32
+    }
+
+    /// Draws everybody's action and runs one tick. A fault or a panic ends the play of this copy.
+    pub fn tick(&mut self) {
+        if self.fault.is_some() {
+            return;
+        }
+        for (&agent, script) in self.agents.iter().zip(&mut self.scripts) {
+            let draws = if self.in_prelude { &mut script.skill } else { &mut script.action };
+            self.world.entity_mut(agent).insert(Action(uniform(&self.space, draws)));
+        }
+        self.world.resource_mut::<Ends>().0.clear();
+        let world = &mut self.world;
+        // A copy that panicked is never touched again, whatever state it was left in.
+        self.fault = match catch_unwind(AssertUnwindSafe(|| tick_world(world))) {
+            Ok(Ok(())) => None,
+            Ok(Err(fault)) => Some(fault.to_string()),
+            Err(panic) => Some(format!("the game panicked: {}", message(&*panic))),
+        };
+        self.census.update(&self.world);
+    }
+
+    /// Plays another episode first, with other actions, to its end or for at most `limit` ticks.
+    pub fn play_prelude(&mut self, limit: u32) {
+        self.in_prelude = true;
+        for _ in 0..limit {
+            self.tick();
+            let ended = |agent: &Entity| self.world.get::<Episode>(*agent).is_some_and(|episode| !episode.is_running());
+            if self.fault.is_some() || self.agents.iter().all(ended) {
+                break;
+            }
+        }
+        for &agent in &self.agents {
+            if let Some(mut episode) = self.world.get_mut::<Episode>(agent) {
+                episode.abandon();
+            }
+        }
+        self.in_prelude = false;
+    }
+
+    /// What the tick brought an agent.
+    pub fn outcome(&self, agent: usize) -> Outcome {
+        let entity = self.agents[agent];
+        let observation = self.world.get::<Observation>(entity).cloned().unwrap_or_default();
+        let ends = &self.world.resource::<Ends>().0;
+        Outcome {
+            observation: observation.vector,
+            image: observation.image,
+            reward: self.world.get::<Reward>(entity).map_or(0.0, Reward::get),
+            hash: self.world.get::<StateHash>(entity).map_or(0, |hash| hash.0),
+            end: ends.iter().find(|(ended, _)| *ended == entity).map(|(_, end)| *end),
+        }
+    }
+
+    /// Names of the values that agents observe.
+    pub fn observed_names(&self) -> Vec<String> {
+        let sensor = self.agents.first().and_then(|&agent| self.world.get::<VectorSensor>(agent));
+        sensor.map(|sensor| sensor.space().names.clone()).unwrap_or_default()
+    }
+
+    /// Types of all components and resources that this World holds.
+    pub fn present_types(&self) -> BTreeSet<TypeId> {
+        let archetypes = self.world.archetypes().iter().filter(|archetype| !archetype.is_empty());
+        archetypes.flat_map(|archetype| types_of(&self.world, archetype.components())).collect()
+    }
+}
+
+/// Adds what a copy needs beside the game.
+fn prepare(world: &mut World) {
+    world.init_resource::<Ends>();
+    world.add_observer(|event: On<EpisodeEnded>, mut ends: ResMut<Ends>| ends.0.push((event.entity, event.end)));
+}
+
+/// A World with the plugin and an agent, without a game: to tell the game's types from the others.
+pub(super) fn bare_world() -> World {
+    let mut world = into_world(headless_app());
+    prepare(&mut world);
+    world.spawn((Agent::new(0, ActionSpace::Discrete(1)), VectorSensor::new(["nothing"])));
+    world
+}
+
+fn message(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a word".to_owned())
+}

@@ -1,0 +1,108 @@
+//! What agents observed: values that are no numbers, that are not always there, or that never change.
+
+use serde::Serialize;
+
+use super::game_copy::Outcome;
+
+/// What one agent observed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ObservationReport {
+    /// Number of values, by the game's own word.
+    pub values: usize,
+    /// Ticks that were watched.
+    pub ticks: u32,
+    /// Names of the values that were the same in all of them.
+    pub constant: Vec<String>,
+    /// The first value that was no finite number: the tick, from 0, its name and what it was.
+    pub not_finite: Option<(u32, String, String)>,
+    /// The first tick, from 0, with another number of values, and that number.
+    pub length: Option<(u32, usize)>,
+    /// Whether the game writes a state hash.
+    pub state_hash: bool,
+}
+
+/// Looks at one agent's observations.
+pub(super) struct Watch {
+    names: Vec<String>,
+    first: Option<Outcome>,
+    changed: Vec<bool>,
+    image_changed: bool,
+    report: ObservationReport,
+}
+
+impl Watch {
+    /// Values of these names are expected.
+    pub fn new(names: Vec<String>) -> Self {
+        let report = ObservationReport { values: names.len(), ..Default::default() };
+        Self { changed: vec![false; names.len()], names, first: None, image_changed: false, report }
+    }
+
+    /// Notes what a tick brought.
+    pub fn note(&mut self, tick: u32, seen: &Outcome) {
+        self.report.ticks += 1;
+        self.report.state_hash |= seen.hash != 0;
+        let (wanted, got) = (self.names.len(), seen.observation.len());
+        if got != wanted && self.report.length.is_none() {
+            self.report.length = Some((tick, got));
+        }
+        let bad = seen.observation.iter().position(|value| !value.is_finite());
+        if let (Some(at), None) = (bad, &self.report.not_finite) {
+            let name = self.names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
+            self.report.not_finite = Some((tick, name, seen.observation[at].to_string()));
+        }
+        let first = self.first.get_or_insert_with(|| seen.clone());
+        for ((now, then), changed) in seen.observation.iter().zip(&first.observation).zip(&mut self.changed) {
+            *changed |= now.to_bits() != then.to_bits();
+        }
+        self.image_changed |= seen.image != first.image;
+    }
+
+    /// What there was to see. Nothing can be said to be constant that was seen only once.
+    pub fn report(mut self) -> ObservationReport {
+        if self.report.ticks > 1 {
+            let same = self.names.into_iter().zip(self.changed).filter(|(_, changed)| !changed);
+            self.report.constant = same.map(|(name, _)| name).collect();
+        }
+        self.report
+    }
+}
+
+impl ObservationReport {
+    /// Whether there was nothing to see in all ticks.
+    pub fn is_blind(&self) -> bool {
+        self.values > 0 && self.ticks > 1 && self.constant.len() == self.values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn watch(rows: &[&[f32]]) -> ObservationReport {
+        let mut watch = Watch::new(vec!["x".to_owned(), "y".to_owned()]);
+        for (tick, row) in rows.iter().enumerate() {
+            let seen = Outcome { observation: row.to_vec(), image: Vec::new(), reward: 0.0, hash: 0, end: None };
+            watch.note(tick as u32, &seen);
+        }
+        watch.report()
+    }
+
+    #[test]
+    fn constant_values_are_named() {
+        let report = watch(&[&[1.0, 5.0], &[2.0, 5.0]]);
+        assert_eq!((report.constant.as_slice(), report.is_blind()), (&["y".to_owned()][..], false));
+        assert!(watch(&[&[1.0, 5.0], &[1.0, 5.0]]).is_blind());
+        assert!(!watch(&[&[1.0, 5.0]]).is_blind(), "one tick proves nothing");
+    }
+
+    #[test]
+    fn the_first_value_that_is_no_number_is_named_with_its_tick() {
+        let report = watch(&[&[1.0, 5.0], &[2.0, f32::NAN], &[f32::INFINITY, 5.0]]);
+        assert_eq!(report.not_finite, Some((1, "y".to_owned(), "NaN".to_owned())));
+    }
+
+    #[test]
+    fn another_number_of_values_is_noticed() {
+        assert_eq!(watch(&[&[1.0, 5.0], &[2.0], &[]]).length, Some((1, 1)));
+    }
+}

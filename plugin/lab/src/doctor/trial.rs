@@ -1,0 +1,146 @@
+//! One comparison: copies of the game that play the same actions, tick by tick.
+
+use super::{
+    compare::Comparer,
+    game_copy::{GameCopy, Outcome, Plan},
+    observed::Watch,
+    report::{Comparison, ComparisonReport, Difference, DifferenceKind},
+    slow_clock::slow_down,
+    types::TypeBook,
+};
+use crate::{game::Game, parallel::on_threads};
+
+/// Differences of one tick that a report names beside the first.
+const OTHERS: usize = 5;
+
+/// Copies of a game that are held side by side.
+pub(super) struct Trial {
+    comparison: Comparison,
+    /// The copies; the first one is watched.
+    pub copies: Vec<GameCopy>,
+    /// Which copies are compared with each other.
+    pairs: Vec<(usize, usize)>,
+    /// How many of the last copies are ticked on threads of their own.
+    on_threads: usize,
+}
+
+impl Trial {
+    /// Builds the copies.
+    pub fn new(comparison: Comparison, game: &dyn Game, plan: &Plan, ticks: u32) -> Self {
+        let one = |number: u32| GameCopy::new(game, plan, number, 1);
+        let (mut copies, pairs) = match comparison {
+            Comparison::Repeat | Comparison::Clock | Comparison::Restart => (vec![one(0), one(0)], vec![(0, 1)]),
+            Comparison::Threads => (vec![one(0), one(0), one(0)], vec![(0, 1), (0, 2)]),
+            Comparison::Arenas => (vec![one(0), one(1), GameCopy::new(game, plan, 0, 2)], vec![(0, 2), (1, 2)]),
+        };
+        match comparison {
+            Comparison::Clock => slow_down(&mut copies[1].world),
+            Comparison::Restart => copies[1].play_prelude(ticks),
+            _ => {}
+        }
+        let on_threads = if comparison == Comparison::Threads { 2 } else { 0 };
+        Self { comparison, copies, pairs, on_threads }
+    }
+
+    /// Plays, and compares after every tick.
+    pub fn run(&mut self, ticks: u32, book: &mut TypeBook, ignored: &[String], mut watch: Option<&mut Watch>) -> Ran {
+        let mut report = ComparisonReport {
+            comparison: self.comparison,
+            skipped: None,
+            ticks: 0,
+            first: None,
+            others: Vec::new(),
+            effect: None,
+            unmatched: 0,
+            fault: None,
+        };
+        let mut incomparable = Default::default();
+        for tick in 0..ticks {
+            self.tick();
+            if let Some(watch) = &mut watch {
+                watch.note(tick, &self.copies[0].outcome(0));
+            }
+            report.fault = self.copies.iter().find_map(|copy| copy.fault.clone());
+            if report.fault.is_some() {
+                break;
+            }
+            report.ticks += 1;
+            self.copies.iter().for_each(|copy| book.learn(&copy.world));
+            if report.first.is_none() {
+                let mut comparer = Comparer { book, comparison: self.comparison, ignored, incomparable };
+                self.compare(tick, &mut comparer, &mut report);
+                incomparable = comparer.incomparable;
+            }
+            if report.effect.is_none() {
+                let mut pairs = self.pairs.iter();
+                report.effect = pairs.find_map(|&(left, right)| effect(&self.copies[left], &self.copies[right], tick));
+            }
+        }
+        Ran { report, incomparable }
+    }
+
+    fn tick(&mut self) {
+        let here = self.copies.len() - self.on_threads;
+        let (here, threaded) = self.copies.split_at_mut(here);
+        here.iter_mut().for_each(GameCopy::tick);
+        on_threads(threaded, self.on_threads, GameCopy::tick);
+    }
+
+    fn compare(&self, tick: u32, comparer: &mut Comparer, report: &mut ComparisonReport) {
+        for &(left, right) in &self.pairs {
+            let found = comparer.compare(&self.copies[left], &self.copies[right], tick);
+            report.unmatched = report.unmatched.max(found.unmatched);
+            let mut differences = found.differences.into_iter();
+            if let Some(first) = differences.next() {
+                report.first = Some(first);
+                report.others = differences.take(OTHERS).collect();
+                return;
+            }
+        }
+    }
+}
+
+/// What came of a trial.
+pub(super) struct Ran {
+    pub report: ComparisonReport,
+    /// Types of fields that could not be compared.
+    pub incomparable: std::collections::BTreeSet<String>,
+}
+
+/// The first difference in what the left copy's agent and its double on the right observe, get and come to.
+fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
+    let number = left.number(0);
+    let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
+    let (a, b) = (left.outcome(0), right.outcome(double));
+    let (kind, name, field, left, right) = outcomes(&a, &b, &left.observed_names())?;
+    Some(Difference { tick, kind, name, entity: Some(format!("agent {number}")), field, left, right })
+}
+
+type OutcomeDifference = (DifferenceKind, String, String, String, String);
+
+fn outcomes(a: &Outcome, b: &Outcome, names: &[String]) -> Option<OutcomeDifference> {
+    let differs =
+        |kind, name: &str, left: String, right: String| Some((kind, name.to_owned(), String::new(), left, right));
+    let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
+    if let Some(at) = a.observation.iter().zip(&b.observation).position(|(a, b)| !same(a, b)) {
+        let name = names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
+        let (left, right) = (a.observation[at].to_string(), b.observation[at].to_string());
+        return differs(DifferenceKind::Observation, &name, left, right);
+    }
+    let (left, right) = (a.observation.len(), b.observation.len());
+    if left != right {
+        return differs(DifferenceKind::Observation, "number of values", left.to_string(), right.to_string());
+    }
+    if let Some(at) = (a.image != b.image).then(|| a.image.iter().zip(&b.image).position(|(a, b)| a != b)) {
+        let byte = |image: &[u8]| at.and_then(|at| image.get(at)).map_or("none".to_owned(), u8::to_string);
+        return differs(DifferenceKind::Observation, "image", byte(&a.image), byte(&b.image));
+    }
+    if !same(&a.reward, &b.reward) {
+        return differs(DifferenceKind::Reward, "reward", a.reward.to_string(), b.reward.to_string());
+    }
+    if a.end != b.end {
+        return differs(DifferenceKind::End, "end of the episode", format!("{:?}", a.end), format!("{:?}", b.end));
+    }
+    let hash = |hash: u64| format!("{hash:016x}");
+    if a.hash == b.hash { None } else { differs(DifferenceKind::StateHash, "state hash", hash(a.hash), hash(b.hash)) }
+}

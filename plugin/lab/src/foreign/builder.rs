@@ -1,0 +1,214 @@
+//! Describing a foreign game, part by part.
+
+use std::sync::Arc;
+
+use bevy::{app::PluginGroupBuilder, prelude::*};
+
+use super::{
+    convert::{IntoActionValue, IntoValues},
+    factory::SystemFactory,
+    game::{Description, ForeignGame},
+    input::Input,
+    restart_kind::Restart,
+};
+use bevy_playbot::{
+    action::ActionSpace,
+    episode::EpisodeEnd,
+    headless_plugins::HeadlessPlugins,
+    virtual_input::{ActionAxis, VirtualInput},
+};
+
+/// Frames that a level may take to be ready, unless the game says otherwise.
+const PATIENCE: u32 = 3600;
+
+impl ForeignGame {
+    /// A game that `plugin` adds to an app which has Bevy's `DefaultPlugins`. Raise the version whenever an old recording
+    /// would no longer replay.
+    pub fn new(name: &'static str, version: u32, plugin: impl Fn(&mut App) + Send + Sync + 'static) -> Self {
+        let description = Description {
+            name,
+            version,
+            plugin: Arc::new(plugin),
+            hz: 60.0,
+            levels: None,
+            input: Input::default(),
+            act: None,
+            names: Vec::new(),
+            observe: None,
+            paths: Vec::new(),
+            has_camera: false,
+            rewards: Vec::new(),
+            end: None,
+            limit: None,
+            restart: Restart::Startup,
+            ready: None,
+            patience: PATIENCE,
+            level: None,
+            demonstrator: None,
+            hash: None,
+            plugins: None,
+        };
+        Self { description: Arc::new(description) }
+    }
+
+    fn with(mut self, change: impl FnOnce(&mut Description)) -> Self {
+        change(Arc::make_mut(&mut self.description));
+        self
+    }
+
+    fn with_input(self, change: impl FnOnce(Option<VirtualInput>) -> VirtualInput) -> Self {
+        self.with(|description| {
+            let input = &mut description.input;
+            input.pressed = Some(change(input.pressed.take()));
+        })
+    }
+
+    /// Frames, and so ticks, in a second of game time; 60 unless said otherwise.
+    pub fn hz(self, hz: f64) -> Self {
+        self.with(|description| description.hz = hz)
+    }
+
+    /// Discrete actions: the keys that each of them holds.
+    pub fn keys(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
+        let sets: Vec<Vec<KeyCode>> = sets.into_iter().map(|set| set.into_iter().collect()).collect();
+        let input = VirtualInput::keys(sets.clone());
+        self.with(|description| description.input.keys = sets).with_input(|_| input)
+    }
+
+    /// Mouse buttons that discrete actions hold besides, in the order of the actions.
+    pub fn mouse_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = MouseButton>>) -> Self {
+        self.with_input(|input| input.unwrap_or_else(|| VirtualInput::discrete([])).mouse_buttons(sets))
+    }
+
+    /// Gamepad buttons that discrete actions hold besides, in the order of the actions.
+    pub fn gamepad_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = GamepadButton>>) -> Self {
+        self.with_input(|input| input.unwrap_or_else(|| VirtualInput::discrete([])).gamepad_buttons(sets))
+    }
+
+    /// Continuous actions: what each of their values moves.
+    pub fn axes(self, axes: impl IntoIterator<Item = ActionAxis>) -> Self {
+        self.with_input(|_| VirtualInput::axes(axes))
+    }
+
+    /// Actions that press what this says.
+    pub fn input(self, input: VirtualInput) -> Self {
+        self.with_input(|_| input)
+    }
+
+    /// Actions that a system hands to the game: it finds the agent's [`Action`](crate::action::Action) and runs in every
+    /// tick before the game, unless a person plays.
+    pub fn actions<M: 'static>(
+        self,
+        space: ActionSpace,
+        system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.input.space = Some(space);
+            description.act = Some(SystemFactory::new(system, |()| ()));
+        })
+    }
+
+    /// Names of the actions, for people. Those of keys name themselves.
+    pub fn action_names(self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.input.names = names.into_iter().map(Into::into).collect())
+    }
+
+    /// What the agent sees: one value per name. The system may run more than once in a tick, so it must only look.
+    pub fn observe<Values: IntoValues, M: 'static>(
+        self,
+        names: impl IntoIterator<Item = impl Into<String>>,
+        system: impl IntoSystem<(), Values, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.names = names.into_iter().map(Into::into).collect();
+            description.observe = Some(SystemFactory::new(system, Values::into_values));
+        })
+    }
+
+    /// What the agent sees: numbers by their paths, such as `Paddle.Transform.translation.x`, the field of a component of
+    /// the one entity that has another component or that has this `Name`; or `Score.0`, the field of a resource, or of the
+    /// only component of its kind. What is read must derive `Reflect`; a component that only finds an entity need not, if
+    /// Bevy is built with its feature `debug`.
+    pub fn observe_paths(self, paths: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.paths = paths.into_iter().map(Into::into).collect())
+    }
+
+    /// Agents may see pictures (`observation: Camera` of an experiment) through the game's own camera: of several active
+    /// ones, the one that draws first. Needs the feature `camera`.
+    pub fn camera(self) -> Self {
+        self.with(|description| description.has_camera = cfg!(feature = "camera"))
+    }
+
+    /// Reward of each tick, on top of other rewards.
+    pub fn reward<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.rewards.push((SystemFactory::new(system, |reward| reward), false)))
+    }
+
+    /// Reward by what a value, such as a score, has grown since the last tick, on top of other rewards. It need not begin
+    /// at 0 in an episode.
+    pub fn reward_delta<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.rewards.push((SystemFactory::new(system, |value| value), true)))
+    }
+
+    /// Whether the game is over after a tick, and how: asked in `Last`.
+    pub fn end<M: 'static>(
+        self,
+        system: impl IntoSystem<(), Option<EpisodeEnd>, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.end = Some(SystemFactory::new(system, |end| end)))
+    }
+
+    /// Ends episodes that are not over by then as [`Truncated`](EpisodeEnd::Truncated), after this many ticks.
+    pub fn time_limit(self, ticks: u32) -> Self {
+        self.with(|description| description.limit = Some(ticks))
+    }
+
+    /// How the game begins anew; [`Restart::Startup`] unless said otherwise.
+    pub fn restart(self, restart: Restart) -> Self {
+        self.with(|description| description.restart = restart)
+    }
+
+    /// Whether a level can be played, asked in each frame from the second after the restart on. Until then no tick passes.
+    pub fn ready<M: 'static>(self, system: impl IntoSystem<(), bool, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.ready = Some(SystemFactory::new(system, |is_ready| is_ready)))
+    }
+
+    /// Frames that a level may take to be ready; 3600 unless said otherwise.
+    pub fn ready_within(self, frames: u32) -> Self {
+        self.with(|description| description.patience = frames)
+    }
+
+    /// Makes a level of what the restart has left: a system that runs once after it and finds the level's number in
+    /// [`LevelSeed`](super::LevelSeed), to seed the game's generator, and to set back what the restart leaves as it was.
+    pub fn level<M: 'static>(self, system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level = Some(SystemFactory::new(system, |()| ())))
+    }
+
+    /// The number of levels: level n is the same as level 0, and so on. Endless unless said otherwise.
+    pub fn levels(self, number: u64) -> Self {
+        self.with(|description| description.levels = Some(number))
+    }
+
+    /// A scripted bot that sees the whole World: a system that returns the action of each tick.
+    pub fn demonstrator<Wanted: IntoActionValue, M: 'static>(
+        self,
+        name: &'static str,
+        system: impl IntoSystem<(), Wanted, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.demonstrator = Some((name, SystemFactory::new(system, Wanted::into_action)));
+        })
+    }
+
+    /// What a replay compares after each tick, instead of the transforms of everything that the game has spawned: for games
+    /// in which some of those come by the clock. Observation and reward are compared in any case.
+    pub fn state_hash<M: 'static>(self, system: impl IntoSystem<(), u64, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.hash = Some(SystemFactory::new(system, |hash| hash)))
+    }
+
+    /// Bevy's plugins for headless Worlds, where some of the usual ones have to be left out:
+    /// `|usual| usual.build().disable::<AudioPlugin>()`.
+    pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
+        self.with(|description| description.plugins = Some(Arc::new(plugins)))
+    }
+}

@@ -1,0 +1,28 @@
+//! A hash of a game whose state nobody has described.
+
+use bevy::prelude::*;
+
+use super::kept::Built;
+use bevy_playbot::{observation::Observation, reward::Reward, state_hash::StateHash};
+
+/// A hash of where everything of the game is. Neither the numbers of entities nor their order in memory count.
+pub(super) fn of_transforms(world: &World, built: &Built) -> u64 {
+    let mut sum = 0_u64;
+    for entity in built.spawned(world) {
+        let Some(transform) = world.get::<Transform>(entity) else { continue };
+        if !built.is_placed(world, entity) {
+            continue;
+        }
+        let Transform { translation, rotation, scale } = transform;
+        let numbers = [translation.to_array(), scale.to_array()].into_iter().flatten().chain(rotation.to_array());
+        sum = sum.wrapping_add(StateHash::of(numbers.map(|number| u64::from(number.to_bits()))).0);
+    }
+    sum
+}
+
+/// The hash of the state, with what the agent saw and got.
+pub(super) fn with_agent(state: u64, observation: Option<&Observation>, reward: Option<&Reward>) -> u64 {
+    let reward = reward.map_or(0, |reward| u64::from(reward.get().to_bits()));
+    let seen = observation.into_iter().flat_map(|seen| seen.vector.iter().map(|value| u64::from(value.to_bits())));
+    StateHash::of([state, reward].into_iter().chain(seen)).0
+}

@@ -1,0 +1,180 @@
+//! The description of a foreign game, as a [`Game`].
+
+use std::sync::Arc;
+
+use bevy::{app::PluginGroupBuilder, prelude::*};
+
+use super::{
+    demonstrator::ForeignBot,
+    factory::SystemFactory,
+    input::Input,
+    install::ForeignPlugin,
+    paths::ObservedPath,
+    restart_kind::Restart,
+    runtime::Sensor,
+};
+use crate::game::Game;
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    agent::has_no_actions,
+    agent::Agent,
+    episode::EpisodeEnd,
+    headless_plugins::HeadlessPlugins,
+    key_bindings::KeyBindings,
+    observation::{ObservationSpace, VectorSensor},
+    placement::TickPlacement,
+};
+
+/// A game that knows nothing of this plugin, with what an agent does, sees and gets there: see the
+/// [module](crate::foreign).
+///
+/// The game's one World has one arena with one agent, since its player and its resources are global. Its mode is called
+/// `default`.
+#[derive(Clone)]
+pub struct ForeignGame {
+    pub(super) description: Arc<Description>,
+}
+
+/// What a builder has been told.
+#[derive(Clone)]
+pub(super) struct Description {
+    pub(super) name: &'static str,
+    pub(super) version: u32,
+    pub(super) plugin: Arc<dyn Fn(&mut App) + Send + Sync>,
+    pub(super) hz: f64,
+    pub(super) levels: Option<u64>,
+    pub(super) input: Input,
+    pub(super) act: Option<SystemFactory<()>>,
+    pub(super) names: Vec<String>,
+    pub(super) observe: Option<SystemFactory<Vec<f32>>>,
+    pub(super) paths: Vec<String>,
+    pub(super) has_camera: bool,
+    /// With whether it pays the growth of its value.
+    pub(super) rewards: Vec<(SystemFactory<f32>, bool)>,
+    pub(super) end: Option<SystemFactory<Option<EpisodeEnd>>>,
+    pub(super) limit: Option<u32>,
+    pub(super) restart: Restart,
+    pub(super) ready: Option<SystemFactory<bool>>,
+    /// Frames that a level may take.
+    pub(super) patience: u32,
+    pub(super) level: Option<SystemFactory<()>>,
+    pub(super) demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
+    pub(super) hash: Option<SystemFactory<u64>>,
+    pub(super) plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
+}
+
+impl Description {
+    pub(super) fn sensor(&self) -> Sensor {
+        match &self.observe {
+            Some(system) => Sensor::System(system.make()),
+            None if self.paths.is_empty() => Sensor::Nothing,
+            None => Sensor::Paths(self.paths.iter().map(|path| ObservedPath::new(path)).collect()),
+        }
+    }
+
+    /// Name of the system that observes, for messages.
+    pub(super) fn sensor_name(&self) -> &'static str {
+        self.observe.as_ref().map_or("of the paths", SystemFactory::name)
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        let names = if self.observe.is_some() { &self.names } else { &self.paths };
+        ObservationSpace { names: names.clone() }
+    }
+}
+
+impl ForeignGame {
+    /// The number of levels, if the game has said it.
+    pub fn level_count(&self) -> Option<u64> {
+        self.description.levels
+    }
+}
+
+impl Game for ForeignGame {
+    fn name(&self) -> &'static str {
+        self.description.name
+    }
+
+    fn version(&self) -> u32 {
+        self.description.version
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &["default"]
+    }
+
+    fn tick_hz(&self) -> f64 {
+        self.description.hz
+    }
+
+    fn placement(&self) -> TickPlacement {
+        TickPlacement::Frame
+    }
+
+    fn headless_plugins(&self, usual: HeadlessPlugins) -> PluginGroupBuilder {
+        match &self.description.plugins {
+            Some(change) => change(usual),
+            None => usual.build(),
+        }
+    }
+
+    fn arenas_per_world(&self) -> Option<u32> {
+        Some(1)
+    }
+
+    fn problem(&self) -> Option<String> {
+        let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
+        if has_no_actions(&input.space()) {
+            return Some(format!("the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"));
+        }
+        if observe.is_none() && paths.is_empty() && !has_camera {
+            return Some(format!("nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"));
+        }
+        if observe.is_some() && names.is_empty() {
+            return Some(format!("`.observe` of the game `{name}` names no values"));
+        }
+        let is_sound = self.description.hz.is_finite() && self.description.hz > 0.0;
+        (!is_sound).then(|| format!("`.hz` of the game `{name}` is {}, not a number of frames", self.description.hz))
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.description.input.space()
+    }
+
+    fn action_names(&self) -> Vec<String> {
+        self.description.input.names()
+    }
+
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        self.description.input.bindings()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        self.description.observation()
+    }
+
+    fn has_camera(&self) -> bool {
+        self.description.has_camera
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        app.add_plugins(ForeignPlugin(self.clone()));
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let sensor = VectorSensor::new(self.description.observation().names);
+        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
+        if let Some(input) = &self.description.input.pressed {
+            agent.insert(input.clone());
+        }
+        agent.id()
+    }
+
+    fn demonstrator(&self) -> Option<&'static str> {
+        self.description.demonstrator.as_ref().map(|(name, _)| *name)
+    }
+
+    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        world.entity_mut(agent).insert(ForeignBot { noise });
+    }
+}

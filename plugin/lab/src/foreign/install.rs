@@ -1,0 +1,71 @@
+//! Adding a foreign game to an app.
+
+use bevy::{
+    app::MainScheduleOrder,
+    ecs::schedule::ScheduleLabel,
+    prelude::*,
+};
+
+use super::{
+    demonstrator,
+    game::ForeignGame,
+    input,
+    kept::Built,
+    outcome, ready, restart,
+    runtime::{Foreign, ForeignCell, LevelSeed},
+    sense,
+};
+use bevy_playbot::{
+    action::check_actions,
+    placement::{TickSchedules, is_tick},
+    systems::PlaybotSystems,
+    virtual_input::{InputRoute, VirtualInputPlugin},
+};
+
+/// Runs before everything that the game does when the program starts.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct BeforeGame;
+
+/// The game, with what stands between it and its agent.
+pub(super) struct ForeignPlugin(pub(super) ForeignGame);
+
+impl Plugin for ForeignPlugin {
+    fn build(&self, app: &mut App) {
+        let description = &self.0.description;
+        (description.plugin)(app);
+        if !app.is_plugin_added::<VirtualInputPlugin>() {
+            app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
+        }
+        app.register_type::<LevelSeed>()
+            .init_resource::<LevelSeed>()
+            .add_observer(restart::start)
+            .init_schedule(BeforeGame)
+            .add_systems(BeforeGame, note_what_is_built);
+        let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
+        app.add_systems(
+            decide,
+            (
+                ready::check.in_set(PlaybotSystems::Load),
+                demonstrator::decide.in_set(PlaybotSystems::Decide).ambiguous_with_all(),
+                input::act.in_set(PlaybotSystems::Act).after(check_actions).ambiguous_with_all(),
+            ),
+        )
+        .add_systems(judge, outcome::judge.before(PlaybotSystems::Judge).run_if(is_tick));
+        sense::build(app);
+    }
+
+    fn finish(&self, app: &mut App) {
+        let mut order = app.world_mut().resource_mut::<MainScheduleOrder>();
+        let startup = order.startup_labels.clone();
+        order.startup_labels.insert(0, BeforeGame.intern());
+        app.insert_resource(ForeignCell::new(Foreign::new(&self.0, startup)));
+    }
+}
+
+/// Whatever is there now is not the game's.
+fn note_what_is_built(world: &mut World) {
+    let built = Built::of(world);
+    if let Some(cell) = world.get_resource::<ForeignCell>().cloned() {
+        cell.lock().built = Some(built);
+    }
+}

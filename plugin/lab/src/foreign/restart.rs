@@ -1,0 +1,93 @@
+//! The beginning of an episode.
+
+use std::time::Duration;
+
+use bevy::prelude::*;
+
+use super::{
+    restart_kind::{Own, Restart},
+    runtime::{Foreign, LevelSeed, with_foreign},
+};
+use bevy_playbot::episode::{Episode, StartEpisode};
+
+/// Begins the game anew as soon as the schedule allows it.
+pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, mut commands: Commands) {
+    let StartEpisode { entity, level } = *event;
+    if let Ok(mut episode) = episodes.get_mut(entity) {
+        episode.wait();
+    }
+    commands.queue(move |world: &mut World| begin(world, entity, level));
+}
+
+fn begin(world: &mut World, agent: Entity, level: u64) {
+    with_foreign(world, agent, |world, foreign| {
+        let level = foreign.game.level_count().map_or(level, |levels| level % levels.max(1));
+        world.insert_resource(LevelSeed(level));
+        restart(world, foreign)?;
+        if let Some(system) = &mut foreign.level {
+            system.demand(world)?;
+        }
+        foreign.frames = 0;
+        foreign.rewards.iter_mut().for_each(|part| part.last = None);
+        Ok(())
+    });
+}
+
+fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
+    if let Some(system) = &mut foreign.restart {
+        discard_overstep(world);
+        return system.demand(world);
+    }
+    match foreign.game.description.restart.clone() {
+        Restart::Own(own) => {
+            discard_overstep(world);
+            match own.0 {
+                Own::State(enter) => enter(world),
+                Own::System(_) => Ok(()),
+            }
+        }
+        Restart::Startup => {
+            start_again(world, foreign);
+            Ok(())
+        }
+    }
+}
+
+/// Despawns what the game has spawned, and does again what is done once when a program starts.
+fn start_again(world: &mut World, foreign: &Foreign) {
+    let Some(built) = &foreign.built else { return };
+    for entity in built.spawned(world) {
+        // Some have gone along with their parents.
+        if let Ok(entity) = world.get_entity_mut(entity) {
+            entity.despawn();
+        }
+    }
+    world.flush();
+    set_clock_back(world);
+    for &label in &foreign.startup {
+        // Not every schedule that is named has been filled.
+        let _ = world.try_run_schedule(label);
+    }
+}
+
+/// The clock at the start of a program: this frame has no length, and the next one is the first that has.
+fn set_clock_back(world: &mut World) {
+    if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>() {
+        let mut fresh = Time::<Virtual>::from_max_delta(clock.max_delta());
+        fresh.set_relative_speed_f64(clock.relative_speed_f64());
+        *clock = fresh;
+    }
+    if let Some(mut clock) = world.get_resource_mut::<Time<Fixed>>() {
+        *clock = Time::<Fixed>::from_duration(clock.timestep());
+    }
+    if let Some(mut clock) = world.get_resource_mut::<Time>() {
+        *clock = Time::default();
+    }
+}
+
+/// Fixed steps begin anew with the episode, wherever the one before stopped between two of them.
+fn discard_overstep(world: &mut World) {
+    if let Some(mut clock) = world.get_resource_mut::<Time<Fixed>>() {
+        clock.discard_overstep(Duration::MAX);
+    }
+}

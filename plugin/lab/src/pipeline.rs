@@ -1,0 +1,147 @@
+//! The whole road as functions, for those who do not go it on the command line: [`record`], [`learn_skills`], [`train`],
+//! [`evaluate`](crate::eval::evaluate), [`policy`].
+//!
+//! ```no_run
+//! use playbot_lab::{pipeline, prelude::*, train::config_file::parse_experiment};
+//! use playbot_learner::DeviceKind;
+//! # fn road(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
+//! let text = r#"(game: "lander", train: "moon:0..63", test: "moon:64..127", demos: "lander.demo", steps: 100000)"#;
+//! let experiment = parse_experiment(text, "lander.ron".as_ref())?;
+//! pipeline::record(game, &"moon:128..255".parse()?, 0.1, "lander.demo".as_ref())?;
+//! let skills = pipeline::learn_skills(game, &experiment, DeviceKind::default(), 2)?;
+//! let trainer = pipeline::train(game, &experiment, Some(&skills), DeviceKind::default(), 2, |report| {
+//!     println!("{} steps, return {:?}", report.step, report.episodic_return);
+//! })?;
+//! let policy = pipeline::policy(game, &trainer);
+//! playbot_lab::policy_export::export_policy(game, &policy, &experiment.train, 1, "lander.policy".as_ref())?;
+//! # Ok(())
+//! # }
+//! ```
+
+use std::{ops::ControlFlow, path::Path};
+
+use bevy_playbot::{
+    demo::file::{DemoFileError, DemoWriter},
+    fault::Fault,
+    prelude::*,
+};
+use playbot_learner::{DeviceKind, LearnError, PolicyFile, SkillModel, SkillTrainer};
+use thiserror::Error;
+
+use crate::{
+    demo::{dataset::Demonstrations, verify::VerifyError},
+    game::Game,
+    mode::ModeError,
+    policy_export::policy_file,
+    split::LevelSplit,
+    train::{Experiment, Trainer, UpdateReport, config::ExperimentError, trainer::TrainError},
+    worlds::build_world,
+};
+
+/// A step of the road failed.
+#[derive(Debug, Error)]
+pub enum PipelineError {
+    /// Nobody demonstrates the game.
+    #[error("`{0}` has no demonstrator: play it yourself, or train without demonstrations")]
+    NoDemonstrator(&'static str),
+    /// There is no such mode.
+    #[error(transparent)]
+    Mode(#[from] ModeError),
+    /// The experiment makes no sense.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// The recording cannot be written.
+    #[error(transparent)]
+    Demo(#[from] DemoFileError),
+    /// The recordings cannot be learned from.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The learner failed.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// The training failed.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+}
+
+/// Records the game's demonstrator on each of these levels into a new file, and returns the number of episodes. `noise` is
+/// the share of random actions, or the deviation of continuous ones.
+///
+/// # Errors
+///
+/// Nobody demonstrates the game, it broke its contract, or the file exists or cannot be written.
+pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> Result<u64, PipelineError> {
+    game.check_mode(&levels.mode)?;
+    let name = game.demonstrator().ok_or(PipelineError::NoDemonstrator(game.name()))?;
+    let mut header = game.demo_header(&levels.mode);
+    header.demonstrator = name.to_owned();
+    header.action_noise = noise;
+    let (mut world, agents) = build_world(game, &levels.mode, 0, 0, 1);
+    game.arm_demonstrator(&mut world, agents[0], noise);
+    world.insert_resource(Recorder::new(DemoWriter::create(path, header)?));
+    let queue = LevelQueue::list(levels.levels().collect::<Vec<_>>());
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
+    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+        world.tick()?;
+    }
+    Ok(world.resource::<Recorder>().episodes())
+}
+
+/// Learns the skill model of an experiment from its recordings.
+///
+/// # Errors
+///
+/// The experiment names no recordings, they cannot be read or do not replay, or a loss is not a number.
+pub fn learn_skills(
+    game: &dyn Game,
+    experiment: &Experiment,
+    device: DeviceKind,
+    threads: usize,
+) -> Result<SkillModel, PipelineError> {
+    experiment.check_actions(game.actions())?;
+    let sight = experiment.sight();
+    let mut demos = Demonstrations::read(game, &sight, experiment.recordings()?, Some(&experiment.test))?;
+    if let Some(steps) = experiment.demo_steps {
+        demos = demos.at_most(steps);
+    }
+    let dataset = demos.dataset(game, threads, |_| {})?;
+    let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?;
+    while trainer.epochs_done() < experiment.skills.epochs as u64 {
+        trainer.train_epoch(&mut |_| ControlFlow::Continue(()))?;
+    }
+    Ok(trainer.into_model().with_picture(sight.card()))
+}
+
+/// Trains to the end of the experiment; `after_update` hears of each update. Nothing is written: a training that is to be
+/// resumed saves itself with [`RunDir`](crate::train::run_dir::RunDir).
+///
+/// # Errors
+///
+/// See [`TrainError`].
+pub fn train(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&SkillModel>,
+    device: DeviceKind,
+    threads: usize,
+    mut after_update: impl FnMut(&UpdateReport),
+) -> Result<Trainer, PipelineError> {
+    let mut trainer = Trainer::new(game, experiment, skills, device, threads)?;
+    while !trainer.is_done() {
+        after_update(&trainer.update()?);
+    }
+    Ok(trainer)
+}
+
+/// What a training has learned so far, as the file that a game ships with:
+/// [`export_policy`](crate::policy_export::export_policy) writes it, and a game plays with it at once with
+/// [`install_policy`](bevy_playbot::policy_file::install_policy).
+pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
+    let experiment = trainer.experiment();
+    let training = format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed);
+    let about = (experiment.algorithm.name().to_owned(), training, env!("CARGO_PKG_VERSION").to_owned());
+    policy_file(game, &experiment.sight(), trainer.policy(), trainer.skill_source(), about)
+}

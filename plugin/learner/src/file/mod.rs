@@ -1,0 +1,10 @@
+//! Self-describing safetensors files: tensors by name, and a JSON description in the header.
+
+mod atomic;
+mod header;
+mod network;
+mod tensor_file;
+
+pub use atomic::write_atomically;
+pub(crate) use header::FileKind;
+pub(crate) use tensor_file::TensorFile;

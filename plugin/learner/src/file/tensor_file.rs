@@ -1,0 +1,203 @@
+//! Self-describing safetensors files: tensors by name, and a JSON description in the header.
+
+use super::write_atomically;
+use crate::{FileError, LearnError};
+use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+use std::collections::{BTreeMap, HashMap};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The header entry that holds the description.
+const DESCRIPTION: &str = "playbot";
+
+/// A tensor in host memory.
+#[derive(Clone, Debug)]
+struct StoredTensor {
+    shape: Vec<usize>,
+    dtype: Dtype,
+    bytes: Vec<u8>,
+}
+
+/// The contents of one file, to be written or just read.
+#[derive(Clone, Debug)]
+pub(crate) struct TensorFile {
+    path: PathBuf,
+    pub(super) description: String,
+    tensors: BTreeMap<String, StoredTensor>,
+}
+
+impl TensorFile {
+    /// An empty file for `path` with `description`, which is JSON, in its header.
+    pub(super) fn empty(path: &Path, description: String) -> Self {
+        Self { path: path.to_owned(), description, tensors: BTreeMap::new() }
+    }
+
+    /// Adds single-precision numbers.
+    pub(crate) fn put(&mut self, name: &str, shape: &[usize], values: &[f32]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.tensors.insert(name.to_owned(), StoredTensor { shape: shape.to_vec(), dtype: Dtype::F32, bytes });
+    }
+
+    /// Adds a vector of double-precision numbers.
+    pub(crate) fn put_f64(&mut self, name: &str, values: &[f64]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        let shape = vec![values.len()];
+        self.tensors.insert(name.to_owned(), StoredTensor { shape, dtype: Dtype::F64, bytes });
+    }
+
+    /// Adds a vector of whole numbers.
+    pub(crate) fn put_u32(&mut self, name: &str, values: &[u32]) {
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.tensors.insert(name.to_owned(), StoredTensor { shape: vec![values.len()], dtype: Dtype::U32, bytes });
+    }
+
+    /// Adds bytes.
+    pub(crate) fn put_bytes(&mut self, name: &str, shape: &[usize], values: &[u8]) {
+        let stored = StoredTensor { shape: shape.to_vec(), dtype: Dtype::U8, bytes: values.to_vec() };
+        self.tensors.insert(name.to_owned(), stored);
+    }
+
+    /// Adds a vector of flags, as bytes 0 and 1.
+    pub(crate) fn put_flags(&mut self, name: &str, values: &[bool]) {
+        let bytes: Vec<u8> = values.iter().map(|&flag| u8::from(flag)).collect();
+        self.put_bytes(name, &[values.len()], &bytes);
+    }
+
+    /// Writes everything under a temporary name, flushes it to the disk and renames it into place.
+    pub(crate) fn write(&self) -> Result<(), FileError> {
+        let views: Result<Vec<_>, _> = self
+            .tensors
+            .iter()
+            .map(|(name, t)| TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|view| (name, view)))
+            .collect();
+        let header = HashMap::from([(DESCRIPTION.to_owned(), self.description.clone())]);
+        let bytes = views
+            .and_then(|views| safetensors::serialize(views, Some(header)))
+            .map_err(|e| self.format(e.to_string()))?;
+        write_atomically(&self.path, &bytes).map_err(|source| FileError::Io {
+            action: "write",
+            path: self.path.clone(),
+            source,
+        })
+    }
+
+    /// Reads a whole file.
+    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
+        let bytes = fs::read(path).map_err(|source| FileError::Io { action: "read", path: path.to_owned(), source })?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Takes a whole file from memory; `path` is for messages.
+    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
+        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let description = metadata
+            .metadata()
+            .as_ref()
+            .and_then(|map| map.get(DESCRIPTION).cloned())
+            .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry")))?;
+        let views = SafeTensors::deserialize(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let tensors = views
+            .iter()
+            .map(|(name, view)| {
+                let stored =
+                    StoredTensor { shape: view.shape().to_vec(), dtype: view.dtype(), bytes: view.data().to_vec() };
+                (name.to_owned(), stored)
+            })
+            .collect();
+        Ok(Self { path: path.to_owned(), description, tensors })
+    }
+
+    /// Takes out a single-precision tensor of the given shape.
+    pub(crate) fn take(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f32>, FileError> {
+        let bytes = self.take_any(name, Some(shape), Dtype::F32)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out a double-precision vector, of length `len` if given.
+    pub(crate) fn take_f64(&mut self, name: &str, len: Option<usize>) -> Result<Vec<f64>, FileError> {
+        let shape = len.map(|len| vec![len]);
+        let bytes = self.take_any(name, shape.as_deref(), Dtype::F64)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out a vector of `len` whole numbers.
+    pub(crate) fn take_u32(&mut self, name: &str, len: usize) -> Result<Vec<u32>, FileError> {
+        let bytes = self.take_any(name, Some(&[len]), Dtype::U32)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Takes out bytes of the given shape.
+    pub(crate) fn take_bytes(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u8>, FileError> {
+        self.take_any(name, Some(shape), Dtype::U8)
+    }
+
+    /// Takes out a vector of `len` flags.
+    pub(crate) fn take_flags(&mut self, name: &str, len: usize) -> Result<Vec<bool>, FileError> {
+        let bytes = self.take_bytes(name, &[len])?;
+        Ok(bytes.into_iter().map(|byte| byte != 0).collect())
+    }
+
+    /// Fails if any tensor was not taken out.
+    pub(crate) fn finish(self) -> Result<(), FileError> {
+        match self.tensors.into_keys().next() {
+            None => Ok(()),
+            Some(name) => Err(FileError::ExtraTensor { path: self.path, name }),
+        }
+    }
+
+    /// The file's name.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The product of `sizes`, each of which must be at least 1; an error that names `what` if it is beyond all files.
+    pub(crate) fn product(&self, what: &str, sizes: &[usize]) -> Result<usize, FileError> {
+        if sizes.contains(&0) {
+            return Err(self.format(format!("`{what}` has a size of 0")));
+        }
+        let product = sizes.iter().try_fold(1usize, |product, &size| product.checked_mul(size));
+        let product = product.filter(|product| *product <= isize::MAX as usize / 8);
+        product.ok_or_else(|| self.format(format!("`{what}` cannot be as large as its description says: {sizes:?}")))
+    }
+
+    /// `Ok` if the tensor `name` is there and has `shape`.
+    fn expect(&self, name: &str, shape: &[usize]) -> Result<(), FileError> {
+        let Some(stored) = self.tensors.get(name) else {
+            return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
+        };
+        if stored.shape == shape {
+            return Ok(());
+        }
+        Err(FileError::WrongShape {
+            path: self.path.clone(),
+            name: name.to_owned(),
+            expected: shape.to_vec(),
+            found: stored.shape.clone(),
+        })
+    }
+
+    /// An error about this file's contents.
+    pub(crate) fn format(&self, detail: String) -> FileError {
+        FileError::Format { path: self.path.clone(), detail }
+    }
+
+    /// An error of what the contents describe.
+    pub(crate) fn learner(&self, source: LearnError) -> FileError {
+        FileError::Learner { path: self.path.clone(), source }
+    }
+
+    fn take_any(&mut self, name: &str, shape: Option<&[usize]>, dtype: Dtype) -> Result<Vec<u8>, FileError> {
+        if let Some(shape) = shape {
+            self.expect(name, shape)?;
+        }
+        let Some(stored) = self.tensors.remove(name) else {
+            return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
+        };
+        if stored.dtype != dtype {
+            let detail = format!("tensor `{name}` is {:?}, expected {dtype:?}", stored.dtype);
+            return Err(self.format(detail));
+        }
+        Ok(stored.bytes)
+    }
+}

@@ -1,0 +1,83 @@
+//! What every learner has beside its networks and their optimizers.
+
+use crate::norm::{ObsNormalizer, ObsStats, RewardNormalizer};
+use crate::policy::{Actor, Critic, Policy, States};
+use crate::rng::Streams;
+use crate::score::{ScoreConfig, Teacher};
+use crate::{DeviceKind, LearnError, PolicySpec};
+use std::sync::Arc;
+
+/// The common part of all learners: what the policy reads and does, the skill model that it is tied to, normalisers,
+/// random numbers, and the device.
+#[derive(Debug)]
+pub struct LearnerBase {
+    pub(crate) spec: PolicySpec,
+    /// The frozen skill model; `None` without SCORE.
+    pub(crate) teacher: Option<Teacher>,
+    pub(crate) rewards: Option<RewardNormalizer>,
+    pub(crate) observations: Option<ObsNormalizer>,
+    pub(crate) streams: Streams,
+    /// Rollouts learned from.
+    pub(crate) updates: u64,
+    pub(crate) device: DeviceKind,
+}
+
+impl LearnerBase {
+    /// A learner's base before its first update; `norm_obs`: it normalises observations itself.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for settings that cannot work.
+    pub(crate) fn new(
+        spec: PolicySpec,
+        teacher: Option<Teacher>,
+        rewards: Option<RewardNormalizer>,
+        norm_obs: bool,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        spec.validate()?;
+        if let Some(teacher) = &teacher {
+            teacher.check(norm_obs)?;
+        }
+        let observations = norm_obs.then(|| ObsNormalizer::new(spec.obs.numbers()));
+        Ok(Self { spec, teacher, rewards, observations, streams: Streams::new(seed), updates: 0, device })
+    }
+
+    /// The settings of SCORE, with a skill model.
+    pub(crate) fn score_config(&self) -> Option<&ScoreConfig> {
+        self.teacher.as_ref().map(|teacher| &teacher.config)
+    }
+
+    /// The skill model, if the policy starts as a copy of its decoder.
+    pub(crate) fn copied_teacher(&self) -> Option<&Teacher> {
+        self.teacher.as_ref().filter(|teacher| teacher.is_copied())
+    }
+
+    /// Width of the skills that a rollout must hold.
+    pub(crate) fn rollout_latent(&self) -> usize {
+        self.teacher.as_ref().map_or(self.spec.latent, Teacher::latent)
+    }
+
+    /// How the networks see observations now: through the frozen normaliser of the skill model if that has one, else
+    /// through the learner's own running one, else raw.
+    pub(crate) fn obs_stats(&self) -> Option<Arc<ObsStats>> {
+        let frozen = self.teacher.as_ref().and_then(|teacher| teacher.stats.clone());
+        frozen.or_else(|| self.observations.as_ref().map(|normalizer| Arc::new(normalizer.snapshot())))
+    }
+
+    /// A snapshot of networks that sees observations as they do now.
+    pub(crate) fn snapshot(&self, actor: &Actor, critic: Option<&Critic>) -> Policy {
+        Policy::new(actor, critic, self.obs_stats(), self.spec, self.device.plain())
+    }
+
+    /// Mean divergence between decoder and `policy`, as [`Learner::initial_kl`](super::Learner::initial_kl) gives it.
+    pub(crate) fn initial_kl(
+        &self,
+        policy: &Policy,
+        untrained: bool,
+        states: States<'_>,
+    ) -> Result<Option<f32>, LearnError> {
+        let Some(teacher) = &self.teacher else { return Ok(None) };
+        teacher.initial_kl(policy, untrained, states, self.device).map(Some)
+    }
+}

@@ -1,0 +1,100 @@
+//! A learner's complete state in one file: the frame that all learners share.
+
+use super::LearnerBase;
+use crate::file::{FileKind, TensorFile};
+use crate::norm::{put_normalizers, take_normalizers};
+use crate::score::{ScoreConfig, Teacher};
+use crate::skill::SkillDescription;
+use crate::{DeviceKind, FileError, PolicySpec};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The JSON in the header of every learner's checkpoint: the settings `C`, the common state, and the counters `K` of
+/// the algorithm.
+///
+/// A learner's generators are streams of `seed` numbered by its counters, so these are their whole state.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header<C, K> {
+    config: C,
+    spec: PolicySpec,
+    score: Option<ScoreConfig>,
+    skill: Option<SkillDescription>,
+    seed: u64,
+    updates: u64,
+    #[serde(flatten)]
+    counters: K,
+}
+
+impl LearnerBase {
+    /// Writes a checkpoint of this `kind`: settings, counters, what `put` adds of the algorithm's own (networks, moments,
+    /// ...), the frozen decoder and prior, and the normalisers.
+    ///
+    /// # Errors
+    /// [`FileError::Io`] if it cannot be written.
+    pub(crate) fn save(
+        &self,
+        path: &Path,
+        kind: FileKind,
+        config: &impl Serialize,
+        counters: &impl Serialize,
+        put: impl FnOnce(&mut TensorFile) -> Result<(), FileError>,
+    ) -> Result<(), FileError> {
+        let teacher = self.teacher.as_ref();
+        let header = Header {
+            config,
+            spec: self.spec,
+            score: teacher.map(|teacher| teacher.config.clone()),
+            skill: teacher.map(|teacher| teacher.description.clone()),
+            seed: self.streams.seed(),
+            updates: self.updates,
+            counters,
+        };
+        let mut file = TensorFile::new(path, kind, &header)?;
+        put(&mut file)?;
+        if let Some(teacher) = teacher {
+            teacher.put(&mut file)?;
+        }
+        put_normalizers(&mut file, self.observations.as_ref(), self.rewards.as_ref());
+        file.write()
+    }
+}
+
+/// A checkpoint that was read, with the tensors that were not taken out yet.
+#[derive(Debug)]
+pub(crate) struct Checkpoint<C, K> {
+    pub(crate) file: TensorFile,
+    pub(crate) config: C,
+    pub(crate) counters: K,
+    pub(crate) spec: PolicySpec,
+    pub(crate) teacher: Option<Teacher>,
+    pub(crate) seed: u64,
+    updates: u64,
+}
+
+impl<C: DeserializeOwned, K: DeserializeOwned> Checkpoint<C, K> {
+    /// Reads a checkpoint of this `kind` and takes the frozen decoder and prior out of it.
+    ///
+    /// # Errors
+    /// [`FileError`] says what is wrong with the file, or names the tensor that is missing or misshapen.
+    pub(crate) fn read(path: &Path, kind: FileKind, device: DeviceKind) -> Result<Self, FileError> {
+        let mut file = TensorFile::read(path)?;
+        let Header { config, spec, score, skill, seed, updates, counters }: Header<C, K> = file.header(kind)?;
+        let teacher = match score.zip(skill) {
+            None => None,
+            Some((score, skill)) => Some(Teacher::take(score, skill, spec, &mut file, device)?),
+        };
+        Ok(Self { file, config, counters, spec, teacher, seed, updates })
+    }
+
+    /// Puts the common state back into a learner that has taken everything else.
+    ///
+    /// # Errors
+    /// [`FileError`] names a tensor that is missing, misshapen or superfluous.
+    pub(crate) fn finish(mut self, base: &mut LearnerBase) -> Result<(), FileError> {
+        take_normalizers(&mut self.file, base.observations.as_mut(), base.rewards.as_mut())?;
+        base.updates = self.updates;
+        self.file.finish()
+    }
+}

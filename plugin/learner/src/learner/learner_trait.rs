@@ -1,0 +1,113 @@
+//! A learner of any kind, as training needs it.
+
+use super::LearnerBase;
+use crate::policy::Policy;
+use crate::score::ScoreConfig;
+use crate::skill::{Prior, SkillSource};
+use crate::{FileError, LearnError, ObsSlice, PolicySpec, Rollout};
+use std::fmt::Debug;
+use std::path::Path;
+
+/// Improves a policy from rollouts.
+///
+/// ```
+/// use playbot_learner::{ActionSpace, DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner, SacConfig, SacLearner};
+///
+/// let spec = PolicySpec { obs: 2.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
+/// let learners: [Box<dyn Learner>; 2] = [
+///     Box::new(PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?),
+///     Box::new(SacLearner::new(SacConfig::default(), spec, 1, DeviceKind::Flex)?),
+/// ];
+/// for learner in &learners {
+///     assert_eq!((learner.spec(), learner.rollout_latent(), learner.updates()), (spec, 0, 0));
+///     assert!(learner.skills().is_none() && learner.policy().forward(&[], &[0.5, -0.5], 1).is_ok());
+/// }
+/// # Ok::<(), playbot_learner::LearnError>(())
+/// ```
+pub trait Learner: Debug + Send {
+    /// What it has in common with all learners.
+    fn base(&self) -> &LearnerBase;
+
+    /// A snapshot of the policy that shall play now.
+    fn policy(&self) -> Policy;
+
+    /// Learns from a rollout.
+    ///
+    /// # Errors
+    /// [`LearnError`] if it does not fit, or names what ran away.
+    fn learn(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError>;
+
+    /// Mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is still a copy of
+    /// the decoder. `None` without a skill model.
+    ///
+    /// # Errors
+    /// [`LearnError::InitialKl`] if the policy should be a copy ([`ScoreConfig::init_from_decoder`], and it was not
+    /// trained yet) and the divergence is not exactly 0; [`LearnError::Shape`].
+    fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError>;
+
+    /// Writes everything that is needed to go on bit for bit. Under a temporary name first, so that a checkpoint is whole
+    /// or not there.
+    ///
+    /// # Errors
+    /// [`FileError::Io`] if it cannot be written.
+    fn save(&self, path: &Path) -> Result<(), FileError>;
+
+    /// Sets over how many updates a falling learning rate falls, for a training that shall go on for longer. Does nothing
+    /// for learners whose learning rate does not fall.
+    fn set_total_updates(&mut self, _: Option<u64>) {}
+
+    /// What the policy reads and does. With a skill model rollouts need skills also where `latent` is 0
+    /// ([`Self::rollout_latent`]).
+    fn spec(&self) -> PolicySpec {
+        self.base().spec
+    }
+
+    /// Width of the skills that a rollout must hold.
+    fn rollout_latent(&self) -> usize {
+        self.base().rollout_latent()
+    }
+
+    /// Rollouts learned from.
+    fn updates(&self) -> u64 {
+        self.base().updates
+    }
+
+    /// The seed.
+    fn seed(&self) -> u64 {
+        self.base().streams.seed()
+    }
+
+    /// The settings of SCORE, with a skill model.
+    fn score_config(&self) -> Option<&ScoreConfig> {
+        self.base().score_config()
+    }
+
+    /// Where skills come from, by [`ScoreConfig::prior`]; `None` without a skill model.
+    fn prior(&self) -> Option<Prior> {
+        let base = self.base();
+        base.teacher.as_ref().map(|teacher| teacher.prior(base.device))
+    }
+
+    /// Where the policy's skills come from, and its decoder; `None` without a skill model.
+    fn skills(&self) -> Option<SkillSource> {
+        let base = self.base();
+        base.teacher.as_ref().map(|teacher| teacher.source(base.device))
+    }
+}
+
+/// What an update of any learner reports: numbers by their TensorBoard tags.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearnerMetrics {
+    scalars: Vec<(&'static str, f64)>,
+}
+
+impl LearnerMetrics {
+    pub(crate) fn new(scalars: Vec<(&'static str, f64)>) -> Self {
+        Self { scalars }
+    }
+
+    /// The numbers by their tags; what was not measured is left out.
+    pub fn scalars(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.scalars.iter().copied()
+    }
+}

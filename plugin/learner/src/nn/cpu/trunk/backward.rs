@@ -1,0 +1,108 @@
+//! From the gradient of the features to those of the parameters.
+
+use super::forward::{Kept, wides};
+use super::layer::{Layer, Weights, add_where, put};
+use super::plan::{Plan, Step};
+use super::pool;
+use super::relu_backward;
+use super::tile::{LANES, Lanes};
+use rayon::prelude::*;
+
+/// Into how many parts a batch is split, each with its own sums of gradients.
+const PARTS: usize = 32;
+/// Images of a part, at least.
+const IMAGES: usize = 8;
+
+/// The gradients of all parameters, layer by layer, for the gradient `[n, Plan::features]` of the features.
+///
+/// The parts depend on the batch alone and are added in order: the sums are the same on any number of threads.
+pub(super) fn gradients(plan: &Plan, weights: &[Weights], kept: &Kept, grad: &[f32]) -> Vec<f32> {
+    let n = grad.len() / plan.features();
+    let part = n.div_ceil(PARTS).max(IMAGES);
+    let parts = (0..n.div_ceil(part)).into_par_iter().map(|i| {
+        let mut sums = zeros(plan);
+        let (mut wides, mut grads) = (wides(plan), vec![0.0; plan.lean.len]);
+        for image in i * part..n.min((i + 1) * part) {
+            let grad = &grad[image * plan.features()..][..plan.features()];
+            let values = &kept.values[image * plan.kept.len..][..plan.kept.len];
+            let marks = &kept.marks[image * plan.marks..][..plan.marks];
+            let last = plan.lean.write(plan.last, &mut grads);
+            plan.slots[plan.last].read(grad, last);
+            mask(last, plan.kept.read(plan.last, values));
+            backward(plan, weights, values, marks, &mut wides, &mut grads, &mut sums);
+        }
+        sums
+    });
+    let parts: Vec<Vec<Vec<Lanes>>> = parts.collect();
+    let mut total = zeros(plan);
+    for part in &parts {
+        let pairs = total.iter_mut().flatten().flatten().zip(part.iter().flatten().flatten());
+        pairs.for_each(|(sum, x)| *sum += x);
+    }
+    let mut params = vec![0.0; plan.layers.iter().map(Layer::params).sum()];
+    let mut rest = &mut params[..];
+    for (layer, sums) in plan.layers.iter().zip(&total) {
+        let (of_layer, others) = rest.split_at_mut(layer.params());
+        layer.gradients(sums, of_layer);
+        rest = others;
+    }
+    params
+}
+
+/// For each layer, where its gradients are summed.
+fn zeros(plan: &Plan) -> Vec<Vec<Lanes>> {
+    plan.layers.iter().map(|layer| vec![[0.0; LANES]; layer.sums()]).collect()
+}
+
+/// From the gradients of what a ReLU gave to those of what it got.
+fn mask(grads: &mut [f32], values: &[f32]) {
+    grads.iter_mut().zip(values).for_each(|(grad, &value)| *grad = relu_backward(value, *grad));
+}
+
+/// All steps for one image, from the last; the gradient of the image itself is not needed. `grads` is laid out as
+/// [`Plan::lean`], with zeros in the borders.
+fn backward(
+    plan: &Plan,
+    weights: &[Weights],
+    values: &[f32],
+    marks: &[u8],
+    wides: &mut [Vec<f32>],
+    grads: &mut [f32],
+    sums: &mut [Vec<Lanes>],
+) {
+    let (kept, lean, layers) = (&plan.kept, &plan.lean, &plan.layers);
+    for (number, step) in plan.steps.iter().enumerate().rev() {
+        match *step {
+            Step::Relu { layer, input, output } => {
+                mask(lean.write(output, grads), kept.read(output, values));
+                let (to, grad) = lean.two(input, output, grads);
+                layers[layer].add_gradients(kept.read(input, values), grad, &mut sums[layer]);
+                if number > 0 {
+                    layers[layer].backward(grad, &weights[layer], to);
+                }
+            }
+            Step::Pool { layer, input, output, wide, marks: from } => {
+                let (to, grad) = lean.two(input, output, grads);
+                let (buffer, grid, of) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
+                pool::backward(grad, of, &marks[from..][..of.numbers()], buffer, grid);
+                layers[layer].add_gradients(kept.read(input, values), buffer, &mut sums[layer]);
+                if number > 0 {
+                    layers[layer].backward(buffer, &weights[layer], to);
+                }
+            }
+            Step::Residual { layers: [layer0, layer1], x, relu, inner } => {
+                let (relu, hidden) = (kept.read(relu, values), kept.read(inner, values));
+                let (x, inside) = lean.two(x, inner, grads);
+                layers[layer1].add_gradients(hidden, x, &mut sums[layer1]);
+                layers[layer1].backward_same(x, &weights[layer1], |at, count, sums| {
+                    put(inside, at, count, sums, |grad, sum| *grad = sum);
+                });
+                mask(inside, hidden);
+                layers[layer0].add_gradients(relu, inside, &mut sums[layer0]);
+                layers[layer0].backward_same(inside, &weights[layer0], |at, count, sums| {
+                    add_where(x, at, count, sums, relu);
+                });
+            }
+        }
+    }
+}

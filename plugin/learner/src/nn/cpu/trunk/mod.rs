@@ -1,0 +1,23 @@
+//! All convolutions of an image encoder as one operation, for the flex backend.
+//!
+//! burn's convolutions write out every window of an image before they multiply it, and every layer reads and writes
+//! the whole batch. Here each image goes through all layers while it is in the cache, and the products read the windows
+//! where they are: pixels lie with their channels last, in borders of zeros, so that a row of a window is one piece of
+//! memory. The gradient of a layer's input is a convolution again (or, with strides, a sum of such pieces).
+//!
+//! An image's features do not depend on the rest of the batch, and nothing depends on the number of threads.
+
+mod backward;
+mod forward;
+mod grid;
+mod layer;
+mod op;
+mod plan;
+mod pool;
+mod stage;
+#[cfg(test)]
+mod tests;
+mod tile;
+
+pub(in crate::nn) use stage::{Stage, forward as features};
+use stage::{relu, relu_backward};

@@ -1,0 +1,103 @@
+//! The trunk as an operation of the flex backend, with its backward pass.
+
+use super::backward::gradients;
+use super::forward::{Kept, features, features_kept};
+use super::layer::Weights;
+use super::plan::Plan;
+use crate::nn::cpu::kernels::tensor;
+use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, DispatchDevice, Flex, TensorMetadata, backend_extension};
+use burn::tensor::{Device, Tensor};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// Whether `device` has this operation.
+pub(super) fn is_flex(device: &Device) -> bool {
+    matches!(device.clone().inner().as_dispatch(), DispatchDevice::Flex(_))
+}
+
+/// Features of `pixels`, on flex; `params` has the parameters of all layers, one after the other.
+pub(super) fn trunk(pixels: Tensor<4>, params: Tensor<1>, plan: Arc<Plan>) -> Tensor<2> {
+    Tensor::from_dispatch(Dispatch::trunk(pixels.into_dispatch(), params.into_dispatch(), plan))
+}
+
+/// What a backend with trunks can do.
+#[backend_extension(Flex, Autodiff)]
+pub(super) trait Trunks: Backend {
+    /// As [`trunk`].
+    fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self>;
+}
+
+/// A backend whose numbers can be read without a copy.
+pub(super) trait HostNumbers: Backend {
+    /// The numbers, row-major.
+    fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]>;
+}
+
+impl HostNumbers for Flex {
+    fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]> {
+        let copy = || tensor.to_contiguous().as_slice().map(<[f32]>::to_vec);
+        let values = tensor.as_slice().map(Cow::Borrowed).or_else(|| copy().map(Cow::Owned));
+        values.expect("a tensor in row-major order can be read")
+    }
+}
+
+impl Trunks for Flex {
+    fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self> {
+        let weights = weights(&plan, &Self::numbers(&params), false);
+        let values = features(&plan, &weights, &Self::numbers(&pixels));
+        tensor::<Self>(values, [pixels.shape()[0], plan.features()], &pixels.device())
+    }
+}
+
+impl<B: Trunks + HostNumbers, C: CheckpointStrategy> Trunks for Autodiff<B, C> {
+    fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self> {
+        let ((pixels, _), (params, node)) = (pixels.into_parts(), params.into_parts());
+        match Convolutions.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => {
+                let weights = weights(&plan, &B::numbers(&params), true);
+                let (values, kept) = features_kept(&plan, &weights, &B::numbers(&pixels));
+                let values = tensor::<B>(values, [pixels.shape()[0], plan.features()], &pixels.device());
+                prep.finish(Arc::new(Run { plan, weights, kept }), values)
+            }
+            OpsKind::UnTracked(prep) => prep.finish(B::trunk(pixels, params, plan)),
+        }
+    }
+}
+
+/// What a forward pass leaves for the backward pass.
+#[derive(Debug)]
+struct Run {
+    plan: Arc<Plan>,
+    weights: Vec<Weights>,
+    kept: Kept,
+}
+
+#[derive(Debug)]
+struct Convolutions;
+
+impl<B: Trunks + HostNumbers> Backward<B, 1> for Convolutions {
+    type State = Arc<Run>;
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let grad = grads.consume::<B>(&ops.node);
+        let (run, [params]) = (ops.state, ops.parents);
+        if let Some(params) = params {
+            let found = gradients(&run.plan, &run.weights, &run.kept, &B::numbers(&grad));
+            let len = found.len();
+            grads.register::<B>(params.id, tensor::<B>(found, [len], &grad.device()));
+        }
+    }
+}
+
+fn weights(plan: &Plan, mut params: &[f32], backward: bool) -> Vec<Weights> {
+    let weights = plan.layers.iter().map(|layer| {
+        let (own, rest) = params.split_at(layer.params());
+        params = rest;
+        layer.weights(own, backward)
+    });
+    weights.collect()
+}

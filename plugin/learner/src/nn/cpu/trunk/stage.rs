@@ -1,0 +1,71 @@
+//! The stages of a trunk, and the way into it.
+
+use super::layer::ConvShape;
+use super::op;
+use super::plan::{Plan, StageShape};
+use crate::nn::Conv2d;
+use burn::tensor::Tensor;
+use std::sync::Arc;
+
+/// One stage of a trunk.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::nn) enum Stage<'a> {
+    /// A convolution, then ReLU.
+    Relu(&'a Conv2d),
+    /// A convolution, then max-pooling of 3×3 at every second pixel with padding 1.
+    Pool(&'a Conv2d),
+    /// x + conv1(relu(conv0(relu(x)))).
+    Residual(&'a Conv2d, &'a Conv2d),
+}
+
+/// The stages and a last ReLU over images `[n, channels, height, width]`: features
+/// `[n, channels' * height' * width']`. `None` if this is not on flex, or the stages are none that this can do:
+/// every convolution must keep the size of its image or have no padding.
+///
+/// Gradients reach the convolutions' parameters, never the pixels.
+pub(in crate::nn) fn forward(pixels: &Tensor<4>, stages: &[Stage<'_>]) -> Option<Tensor<2>> {
+    let [n, channels, height, width] = pixels.dims();
+    if n == 0 || !op::is_flex(&pixels.device()) {
+        return None;
+    }
+    let shapes: Vec<StageShape> = stages.iter().map(Stage::shape).collect();
+    let plan = Plan::new(&shapes, [channels, height, width])?;
+    let flat = |conv: &Conv2d| -> [Tensor<1>; 2] { [conv.weight.clone().flatten(0, 3), conv.bias.clone()] };
+    let params = stages.iter().flat_map(Stage::convs).flat_map(flat).collect();
+    Some(op::trunk(pixels.clone(), Tensor::cat(params, 0), Arc::new(plan)))
+}
+
+impl<'a> Stage<'a> {
+    fn convs(&self) -> impl Iterator<Item = &'a Conv2d> + use<'a> {
+        let (first, second) = match *self {
+            Self::Relu(conv) | Self::Pool(conv) => (conv, None),
+            Self::Residual(conv0, conv1) => (conv0, Some(conv1)),
+        };
+        std::iter::once(first).chain(second)
+    }
+
+    fn shape(&self) -> StageShape {
+        match self {
+            Self::Relu(conv) => StageShape::Relu(shape(conv)),
+            Self::Pool(conv) => StageShape::Pool(shape(conv)),
+            Self::Residual(conv0, conv1) => StageShape::Residual([shape(conv0), shape(conv1)]),
+        }
+    }
+}
+
+fn shape(conv: &Conv2d) -> ConvShape {
+    let [outputs, inputs, kernel, _] = conv.weight.dims();
+    ConvShape { inputs, outputs, kernel, stride: conv.stride, padding: conv.padding }
+}
+
+/// The number if it is positive, otherwise 0; NaN stays NaN.
+#[inline(always)]
+pub(super) fn relu(x: f32) -> f32 {
+    if x < 0.0 { 0.0 } else { x }
+}
+
+/// The gradient of [`relu`], where it gave `value`.
+#[inline(always)]
+pub(super) fn relu_backward(value: f32, grad: f32) -> f32 {
+    if value <= 0.0 { 0.0 } else { grad }
+}

@@ -1,0 +1,95 @@
+//! Joining skills and observations into what networks read.
+
+use crate::nn::{ObsBatch, matrix};
+use crate::norm::ObsStats;
+use crate::{ObsKind, ObsSlice};
+use burn::tensor::{Device, Tensor};
+
+/// What actor and critic read of many states, on a device.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per batch, and it is never stored")]
+pub enum NetInput {
+    /// Skills joined with vectors: `[z, s]`, `[n, latent + obs_dim]`.
+    Joined(Tensor<2>),
+    /// Images, which the actor's trunk makes features of before the skills join them.
+    Images {
+        /// Skills, `[n, latent]`, for networks that read any.
+        z: Option<Tensor<2>>,
+        /// Pixels in 0..1, `[n, channels, height, width]`.
+        pixels: Tensor<4>,
+    },
+}
+
+impl From<Tensor<2>> for NetInput {
+    fn from(joined: Tensor<2>) -> Self {
+        Self::Joined(joined)
+    }
+}
+
+/// Skills and raw observations of `n` states in host memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct States<'a> {
+    /// `n * latent`; not read by networks without skills.
+    pub(crate) z: &'a [f32],
+    /// `n` observations.
+    pub(crate) obs: ObsSlice<'a>,
+    pub(crate) n: usize,
+}
+
+/// Makes what a network reads out of skills and raw observations in host memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InputBuilder<'a> {
+    /// `n * latent`.
+    pub(crate) z: &'a [f32],
+    /// How many of a skill's numbers the network reads: all or none.
+    pub(crate) latent: usize,
+    /// `n` observations of `kind`.
+    pub(crate) obs: ObsSlice<'a>,
+    pub(crate) kind: &'a ObsKind,
+    /// Normalises vectors, if given.
+    pub(crate) stats: Option<&'a ObsStats>,
+}
+
+impl InputBuilder<'_> {
+    /// The given rows on `device`. Of images only these become numbers.
+    pub(crate) fn input(&self, rows: &[usize], device: &Device) -> NetInput {
+        let (n, width) = (rows.len(), self.kind.numbers());
+        let rows_of = rows.iter().copied();
+        match (self.obs, self.kind) {
+            (ObsSlice::Image(pixels), ObsKind::Image(shape)) => {
+                let skills = || matrix(joined_rows(&[], 0, self.z, self.latent, None, rows_of), n, self.latent, device);
+                NetInput::Images {
+                    z: (self.latent > 0).then(skills),
+                    pixels: ObsBatch::gather(pixels, [shape.channels, shape.height, shape.width], rows, device),
+                }
+            }
+            (ObsSlice::Vector(values), _) => {
+                let joined = joined_rows(self.z, self.latent, values, width, self.stats, rows_of);
+                NetInput::Joined(matrix(joined, n, self.latent + width, device))
+            }
+            (ObsSlice::Image(_), ObsKind::Vector(_)) => unreachable!("observations are checked to be of their kind"),
+        }
+    }
+}
+
+/// Rows `[z, obs]` for the given row numbers: `latent` numbers of `z` (may be 0), then `obs_dim` of `obs`, which
+/// `stats` normalises if given.
+pub(crate) fn joined_rows(
+    z: &[f32],
+    latent: usize,
+    obs: &[f32],
+    obs_dim: usize,
+    stats: Option<&ObsStats>,
+    rows: impl ExactSizeIterator<Item = usize>,
+) -> Vec<f32> {
+    let mut out = Vec::with_capacity(rows.len() * (latent + obs_dim));
+    for row in rows {
+        out.extend_from_slice(&z[row * latent..(row + 1) * latent]);
+        let observation = &obs[row * obs_dim..(row + 1) * obs_dim];
+        match stats {
+            None => out.extend_from_slice(observation),
+            Some(stats) => stats.normalize_into(observation, &mut out),
+        }
+    }
+    out
+}

@@ -1,0 +1,120 @@
+//! A policy that a game ships with: one self-describing file.
+
+use super::PolicyCard;
+use super::examples::Examples;
+use super::header::{PolicyShape, SkillsShape};
+use crate::file::{FileKind, TensorFile};
+use crate::norm::put_obs_stats;
+use crate::policy::{Policy, States};
+use crate::skill::{SKILL_STATS, SkillSource};
+use crate::{DeviceKind, FileError, LearnError, ObsSlice};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const FILE: FileKind = FileKind { name: "policy", version: 1 };
+
+/// A policy with everything it needs to play.
+///
+/// The file is safetensors: networks, normaliser and some rows of observations with what the policy said about them,
+/// and a description as JSON in the header. A reader that computes something else for those rows refuses the file.
+#[derive(Clone, Debug)]
+pub struct PolicyFile {
+    /// What it was made for and by.
+    pub card: PolicyCard,
+    /// The policy.
+    pub policy: Policy,
+    /// Its skills, if it reads any.
+    pub skills: Option<SkillSource>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    card: PolicyCard,
+    policy: PolicyShape,
+    skills: Option<SkillsShape>,
+    examples: usize,
+}
+
+impl PolicyFile {
+    /// Writes the file, in one step. `obs` (`n`, raw) and `z` (`n * latent`) are the rows by which readers check
+    /// themselves; a few that the policy meets in play are enough.
+    ///
+    /// # Errors
+    /// [`FileError::Learner`] if the rows do not fit the policy, [`FileError::Io`] if the file cannot be written.
+    pub fn save<'a>(&self, path: &Path, obs: impl Into<ObsSlice<'a>>, z: &[f32], n: usize) -> Result<(), FileError> {
+        let (policy, obs) = (&self.policy, obs.into());
+        let learner = |source| FileError::Learner { path: path.to_owned(), source };
+        if n == 0 {
+            let text = "a policy file needs at least one row by which its readers check themselves";
+            return Err(learner(LearnError::Config(text.to_owned())));
+        }
+        if let Some(picture) = &self.card.picture {
+            picture.check(policy.observation()).map_err(learner)?;
+        }
+        let header = Header {
+            card: self.card.clone(),
+            policy: PolicyShape::of(policy),
+            skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
+            examples: n,
+        };
+        let states = States { z, obs, n };
+        let examples = Examples::of(self, states).map_err(learner)?;
+        let mut file = TensorFile::new(path, FILE, &header)?;
+        file.put_network("actor", &policy.actor)?;
+        if let Some(critic) = &policy.critic {
+            file.put_network("critic", critic)?;
+        }
+        if let Some(stats) = &policy.stats {
+            put_obs_stats(&mut file, "obs_norm", stats);
+        }
+        if let Some(skills) = &self.skills {
+            file.put_network("decoder", &skills.decoder.actor)?;
+            if let Some(net) = &skills.prior.net {
+                file.put_network("prior", &net.actor)?;
+            }
+            if let Some(stats) = &skills.decoder.stats {
+                put_obs_stats(&mut file, SKILL_STATS, stats);
+            }
+        }
+        examples.put(&mut file, policy, states);
+        file.write()
+    }
+
+    /// Reads a file that [`Self::save`] wrote, and checks that it says of its examples what it said when it was written.
+    ///
+    /// # Errors
+    /// [`FileError`] says what is wrong with the file, names the tensor that is missing, superfluous or misshapen, or the
+    /// example that came out otherwise.
+    pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
+        Self::take(TensorFile::read(path)?, device)
+    }
+
+    /// [`Self::load`] for a file that is in memory already, such as an asset or `include_bytes!`; `name` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn from_bytes(name: &Path, bytes: &[u8], device: DeviceKind) -> Result<Self, FileError> {
+        Self::take(TensorFile::parse(name, bytes)?, device)
+    }
+
+    fn take(mut file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
+        let header: Header = file.header(FILE)?;
+        let spec = header.policy.spec();
+        let policy = header.policy.take(&mut file, device)?;
+        let skills = match header.skills {
+            None => None,
+            Some(skills) => Some(skills.take(&mut file, &spec, device)?),
+        };
+        if header.examples == 0 {
+            return Err(file.format("holds no examples by which it could be checked".to_owned()));
+        }
+        if let Some(picture) = &header.card.picture {
+            picture.check(spec.obs).map_err(|e| file.learner(e))?;
+        }
+        let read = Self { card: header.card, policy, skills };
+        Examples::check(&read, &mut file, header.examples)?;
+        file.finish()?;
+        Ok(read)
+    }
+}

@@ -1,0 +1,9 @@
+//! A policy that a game ships with: one self-describing file.
+
+mod card;
+mod examples;
+mod file;
+mod header;
+
+pub use card::PolicyCard;
+pub use file::PolicyFile;

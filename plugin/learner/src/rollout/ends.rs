@@ -1,0 +1,35 @@
+//! The states at the ends of a rollout and of the episodes that it cuts off.
+
+use crate::{ObsKind, Observations};
+
+/// States that are in no row of a rollout: where episodes were cut off, and where the rollout stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EndStates {
+    /// Rows that cut an episode off without terminating it, ascending.
+    pub cut_rows: Vec<usize>,
+    /// Last observation of each of those episodes.
+    pub cut_obs: Observations,
+    /// The skill under which that observation is valued, `cut_rows * latent`.
+    pub cut_z: Vec<f32>,
+    /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
+    pub next_obs: Observations,
+    /// The skill active there, `B * latent`.
+    pub next_z: Vec<f32>,
+}
+
+impl EndStates {
+    /// No states yet.
+    pub fn new(kind: &ObsKind) -> Self {
+        let none = || Observations::empty(kind);
+        Self { cut_rows: Vec::new(), cut_obs: none(), cut_z: Vec::new(), next_obs: none(), next_z: Vec::new() }
+    }
+
+    /// Forgets all states and keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.cut_rows.clear();
+        self.cut_obs.clear();
+        self.cut_z.clear();
+        self.next_obs.clear();
+        self.next_z.clear();
+    }
+}

@@ -1,0 +1,208 @@
+//! The gradient steps of SAC: critics, actor, temperature.
+
+use super::{Critics, SacBatch, SacNets, critic_loss, q_target, soft_value, soft_value_of_choices, temperature_loss};
+use crate::LearnError;
+use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
+use crate::score::{Penalty, ScoreConfig, penalty};
+use burn::tensor::{Gradients, Tensor};
+
+/// What a step of the critics looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CriticStep {
+    /// Mean squared error of Q₁.
+    pub q1_loss: f64,
+    /// Mean squared error of Q₂.
+    pub q2_loss: f64,
+    /// Mean of Q₁ and Q₂ over the batch.
+    pub q_values: f64,
+    /// Norm of the gradient.
+    pub grad_norm: f64,
+}
+
+/// What a step of the actor looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ActorStep {
+    /// -mean(V), without the penalty.
+    pub actor_loss: f64,
+    /// Estimate of the entropy in nats, -mean(ln π): exact for discrete actions.
+    pub entropy: f64,
+    /// Mean divergence between decoder and policy, not weighted.
+    pub decoder_kl: f64,
+    /// The penalty that is added to the loss, in the form of [`ScoreConfig::penalty`], without kl_coef.
+    pub kl_penalty: f64,
+    /// Mean of the decoder's confidence.
+    pub confidence: f64,
+    /// Norm of the gradient.
+    pub grad_norm: f64,
+}
+
+/// What a step of the temperature looked like, before it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TemperatureStep {
+    /// mean(-α (ln π + target entropy)), where α is the temperature.
+    pub temperature_loss: f64,
+    /// Mean of ln π.
+    pub log_prob: f64,
+}
+
+/// The actions over which a loss takes its expectation in each row.
+#[expect(clippy::large_enum_variant, reason = "there is one per gradient step")]
+enum PolicyActions {
+    /// All choices, by their ln π, `[n, choices]`.
+    All(Tensor<2>),
+    /// One draw.
+    Sample(SquashedDraw),
+}
+
+impl PolicyActions {
+    fn new(dist: Dist, noise: Option<&Tensor<2>>) -> Result<Self, LearnError> {
+        match (dist, noise) {
+            (Dist::Categorical { log_probs }, _) => Ok(Self::All(log_probs)),
+            (Dist::Gaussian { mean, log_std }, Some(noise)) => {
+                let device = noise.device();
+                let squashed = SquashedGaussian::unit(mean, log_std, &device);
+                Ok(Self::Sample(squashed.draw(noise.clone(), LogProbForm::Eps)))
+            }
+            _ => Err(LearnError::Action("noise is needed to draw continuous actions".to_owned())),
+        }
+    }
+
+    /// V under `critics`, `[n]`.
+    fn soft_value(&self, critics: &Critics, inputs: Tensor<2>, temperature: f64) -> Tensor<1> {
+        match self {
+            Self::All(log_probs) => {
+                let (q1, q2) = critics.of_choices(inputs);
+                soft_value_of_choices(log_probs.clone(), q1, q2, temperature)
+            }
+            Self::Sample(draw) => {
+                let (q1, q2) = critics.of_vectors(inputs, draw.action.clone());
+                soft_value(draw.log_prob.clone(), q1, q2, temperature)
+            }
+        }
+    }
+
+    /// ln π of the draw, or E\[ln π\], `[n]`.
+    fn log_prob(&self) -> Tensor<1> {
+        match self {
+            Self::All(log_probs) => (log_probs.clone().exp() * log_probs.clone()).sum_dim(1).squeeze_dim(1),
+            Self::Sample(draw) => draw.log_prob.clone(),
+        }
+    }
+}
+
+/// y = r + γ V' of each row, V' being the target critics' soft value of the actor's actions in the next state.
+///
+/// `noise` is standard normal, `[n, dim]`, and needed for continuous actions only (here and below).
+///
+/// # Errors
+/// [`LearnError::Action`] without the noise that is needed.
+pub fn target_of(
+    nets: &SacNets,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    temperature: f64,
+    gamma: f64,
+) -> Result<Tensor<1>, LearnError> {
+    let actions = PolicyActions::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), noise)?;
+    let next = actions.soft_value(&nets.targets, batch.next_inputs.clone(), temperature);
+    Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
+}
+
+/// One step of Adam on both critics.
+///
+/// # Errors
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
+/// first loss beyond all bounds; [`LearnError::Action`] as [`target_of`].
+pub fn critic_step(
+    nets: &mut SacNets,
+    adam: &mut Adam,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    temperature: f64,
+    gamma: f64,
+    lr: f64,
+) -> Result<CriticStep, LearnError> {
+    let target = target_of(nets, batch, noise, temperature, gamma)?;
+    let (q1, q2) = nets.critics.of_actions(batch.inputs.clone(), &batch.actions);
+    let values = ((q1.clone() + q2.clone()) * 0.5).mean();
+    let (loss1, loss2) = (critic_loss(q1, target.clone()), critic_loss(q2, target));
+    let steps = adam.steps();
+    let (q1_loss, q2_loss) = (finite("q1_loss", &loss1, steps)?, finite("q2_loss", &loss2, steps)?);
+    let q_values = finite("q_values", &values, steps)?;
+    let grad_norm = descend(&mut nets.critics, "", adam, (loss1 + loss2).backward(), lr)?;
+    Ok(CriticStep { q1_loss, q2_loss, q_values, grad_norm })
+}
+
+/// One step of Adam on the actor, under the present critics.
+///
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss. A squashed policy is compared before its tanh (see [`crate::score::unsquashed`]).
+///
+/// # Errors
+/// As [`critic_step`].
+pub fn actor_step(
+    nets: &mut SacNets,
+    adam: &mut Adam,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    temperature: f64,
+    score: Option<&ScoreConfig>,
+    lr: f64,
+) -> Result<ActorStep, LearnError> {
+    let dist = nets.actor.forward(batch.inputs.clone());
+    let actions = PolicyActions::new(dist.clone(), noise)?;
+    let loss = actions.soft_value(&frozen(&nets.critics), batch.inputs.clone(), temperature).mean().neg();
+    let steps = adam.steps();
+    let mut metrics = ActorStep {
+        actor_loss: finite("actor_loss", &loss, steps)?,
+        entropy: -finite("log_prob", &actions.log_prob().mean(), steps)?,
+        ..ActorStep::default()
+    };
+    let mut total = loss;
+    if let (Some(teacher), Some(score)) = (&batch.teacher, score) {
+        let Penalty { kl, term } = penalty(score, &teacher.dist, &dist, teacher.confidence.clone())?;
+        metrics.decoder_kl = finite("decoder_kl", &kl.mean(), steps)?;
+        metrics.kl_penalty = finite("kl_penalty", &term, steps)?;
+        metrics.confidence = teacher.mean_confidence;
+        total = total + term * score.kl_coef;
+    }
+    metrics.grad_norm = descend(&mut nets.actor, "actor", adam, total.backward(), lr)?;
+    Ok(metrics)
+}
+
+/// One step of Adam on the logarithm of the temperature, under the present actor.
+///
+/// # Errors
+/// As [`critic_step`].
+pub fn temperature_step(
+    nets: &mut SacNets,
+    adam: &mut Adam,
+    batch: &SacBatch,
+    noise: Option<&Tensor<2>>,
+    target_entropy: f64,
+    lr: f64,
+) -> Result<TemperatureStep, LearnError> {
+    let actions = PolicyActions::new(frozen(&nets.actor).forward(batch.inputs.clone()), noise)?;
+    let log_prob = actions.log_prob();
+    let loss = temperature_loss(nets.log_temperature.0.clone(), log_prob.clone(), target_entropy);
+    let steps = adam.steps();
+    let metrics = TemperatureStep {
+        temperature_loss: finite("alpha_loss", &loss, steps)?,
+        log_prob: finite("log_prob", &log_prob.mean(), steps)?,
+    };
+    descend(&mut nets.log_temperature, "", adam, loss.backward(), lr)?;
+    Ok(metrics)
+}
+
+/// One step of Adam without clipping; gives the gradient's norm.
+fn descend<M: Parameters>(
+    network: &mut M,
+    prefix: &str,
+    adam: &mut Adam,
+    gradients: Gradients,
+    lr: f64,
+) -> Result<f64, LearnError> {
+    let grads = NamedGrads::take(network, prefix, gradients)?;
+    let (norm, scale) = grads.clip_factor(f64::INFINITY, adam.steps())?;
+    adam.step(network, prefix, &grads, lr, scale)?;
+    Ok(norm)
+}

@@ -1,0 +1,94 @@
+//! A frozen skill model, and what a learner that is tied to it takes from it.
+
+use crate::norm::ObsStats;
+use crate::policy::{Actor, Policy};
+use crate::score::{PriorKind, ScoreConfig};
+use crate::skill::{Actors, Prior, SkillDescription, SkillModel, SkillSource};
+use crate::{DeviceKind, LearnError, PolicySpec};
+use std::sync::Arc;
+
+/// The decoder and the prior of a skill model, and how a learner uses them.
+#[derive(Clone, Debug)]
+pub(crate) struct Teacher {
+    pub(crate) config: ScoreConfig,
+    pub(crate) description: SkillDescription,
+    pub(super) actors: Actors,
+    /// How decoder and prior see observations, and the policy that is tied to them.
+    pub(crate) stats: Option<Arc<ObsStats>>,
+}
+
+impl Teacher {
+    /// `model`, used as `config` says.
+    pub(crate) fn new(config: ScoreConfig, model: &SkillModel) -> Self {
+        let actors = Actors { decoder: model.nets.decoder.clone(), prior: model.nets.prior.clone() };
+        Self { config, description: model.description.clone(), actors, stats: model.stats.clone() }
+    }
+
+    /// What a policy tied to this skill model reads and does.
+    pub(crate) fn policy_spec(&self) -> PolicySpec {
+        let latent = if self.config.condition { self.latent() } else { 0 };
+        PolicySpec { latent, ..self.description.decoder_spec() }
+    }
+
+    /// Width of a skill.
+    pub(crate) fn latent(&self) -> usize {
+        self.description.config.latent
+    }
+
+    /// Whether the policy's layers are those of the decoder, and not those that the learner's settings describe.
+    pub(crate) fn is_copied(&self) -> bool {
+        self.config.init_from_decoder
+    }
+
+    /// The decoder, which a policy that is a copy starts as.
+    pub(crate) fn decoder(&self) -> &Actor {
+        &self.actors.decoder
+    }
+
+    /// `Ok` if these settings can work. `norm_obs`: the learner would normalise observations itself.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if they cannot.
+    pub(crate) fn check(&self, norm_obs: bool) -> Result<(), LearnError> {
+        self.config.validate()?;
+        self.config.check_space(self.description.action_space)?;
+        let bad = |text: &str| Err(LearnError::Config(text.to_owned()));
+        if norm_obs && self.description.config.norm_obs {
+            return bad(
+                "norm_obs does not go with a skill model that normalises observations: the policy sees them through \
+                 the same frozen normaliser, not through a running one of its own",
+            );
+        }
+        if norm_obs && self.is_copied() {
+            return bad(
+                "norm_obs does not go with score init_from_decoder: the decoder reads raw observations; a skill model \
+                 with norm_obs of its own normalises for both",
+            );
+        }
+        Ok(())
+    }
+
+    /// Where skills come from, by [`ScoreConfig::prior`].
+    pub(crate) fn prior(&self, device: DeviceKind) -> Prior {
+        let (latent, tanh) = (self.latent(), self.description.config.tanh_latent);
+        match self.config.prior {
+            PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
+            PriorKind::Learned => {
+                let (stats, observation) = (self.stats.clone(), self.description.observation);
+                Prior::learned(&self.actors.prior, stats, observation, latent, tanh, device.plain())
+            }
+        }
+    }
+
+    /// Prior and decoder with the horizon and the draw, as a policy needs them in play.
+    pub(crate) fn source(&self, device: DeviceKind) -> SkillSource {
+        let (horizon, draw) = (self.config.horizon, self.config.skill_draw);
+        SkillSource { prior: self.prior(device), decoder: self.decoder_policy(device), horizon, draw }
+    }
+
+    /// The decoder as a policy.
+    pub(super) fn decoder_policy(&self, device: DeviceKind) -> Policy {
+        let spec = self.description.decoder_spec();
+        Policy::new(&self.actors.decoder, None, self.stats.clone(), spec, device.plain())
+    }
+}

@@ -1,0 +1,38 @@
+//! How far a policy is from its teacher, which must be nothing where it starts as a copy.
+
+use super::Teacher;
+use crate::nn::{HostDist, scalar};
+use crate::policy::{Policy, States};
+use crate::score::{decoder_kl, unsquashed};
+use crate::{DeviceKind, LearnError};
+
+impl Teacher {
+    /// Mean divergence between decoder and `policy` over `states`, in nats, which must be exactly 0 for a copy that is
+    /// `untrained`.
+    pub(crate) fn initial_kl(
+        &self,
+        policy: &Policy,
+        untrained: bool,
+        states: States<'_>,
+        device: DeviceKind,
+    ) -> Result<f32, LearnError> {
+        let States { z, obs, n } = states;
+        if n == 0 {
+            return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
+        }
+        let played = policy.forward(z, obs, n)?;
+        let squashed = played.squashed;
+        let mut decoded = self.decoder_policy(device).forward(z, obs, n)?.into_dist();
+        if squashed {
+            decoded = unsquashed(&decoded);
+        }
+        let rows: Vec<usize> = (0..n).collect();
+        let dist = |host: HostDist| host.rows(&rows, &device.plain());
+        let kl = decoder_kl(&dist(decoded), &dist(played.into_dist()), self.config.direction())?;
+        let kl = scalar(kl.mean())?;
+        if self.config.init_from_decoder && untrained && kl != 0.0 {
+            return Err(LearnError::InitialKl { kl });
+        }
+        Ok(kl)
+    }
+}

@@ -1,0 +1,190 @@
+//! A task whose state is a picture, and a driver that plays it.
+
+use playbot_learner::nn::CnnKind;
+use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
+use playbot_learner::{
+    Action, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Learner, ObsKind, Observations,
+    PpoConfig, Rollout, RolloutStep, SkillConfig, SkillDraw, SkillModel, SkillTrainer,
+};
+use std::ops::ControlFlow;
+
+const SIDE: usize = 12;
+/// Steps until an episode is cut off.
+const LIMIT: usize = 8;
+/// Steps between two draws of a skill.
+const HORIZON: usize = 4;
+
+pub const SHAPE: ImageShape = ImageShape { channels: 1, height: SIDE, width: SIDE };
+pub const SPACE: ActionSpace = ActionSpace::Discrete(4);
+
+pub fn cnn() -> CnnKind {
+    CnnKind::Impala { channels: vec![4, 4], feature: 8 }
+}
+
+pub fn config() -> PpoConfig {
+    PpoConfig {
+        lr: 2e-3,
+        num_steps: 16,
+        minibatches: 4,
+        epochs: 3,
+        gamma: 0.9,
+        hidden: vec![16],
+        cnn: cnn(),
+        ..PpoConfig::default()
+    }
+}
+
+/// A dark image with a bright spot of 3×3 pixels in one of its quarters: top left, top right, bottom left, bottom right.
+pub fn image(quarter: u32, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let mut pixels: Vec<u8> = (0..SHAPE.numbers()).map(|_| below(rng, 40) as u8).collect();
+    let mut corner = |far: bool| below(rng, SIDE as u64 / 2 - 2) as usize + if far { SIDE / 2 } else { 0 };
+    let (column, row) = (corner(quarter % 2 == 1), corner(quarter / 2 == 1));
+    for y in row..row + 3 {
+        pixels[y * SIDE + column..][..3].fill(255);
+    }
+    pixels
+}
+
+/// A skill model of players who look at the picture six times in ten, and guess otherwise. Not trained at all for 0 epochs.
+pub fn model(epochs: usize, seed: u64) -> SkillModel {
+    let config = SkillConfig {
+        latent: 2,
+        beta: 0.5,
+        window: 3,
+        hidden: vec![16],
+        gru_hidden: 8,
+        cnn: cnn(),
+        lr: 1e-2,
+        batch: 16,
+        ..SkillConfig::default()
+    };
+    let mut rng = Streams::new(seed).stream("demos", 0);
+    let episodes = (0..80).map(|_| {
+        let quarters: Vec<u32> = (0..9).map(|_| below(&mut rng, 4) as u32).collect();
+        let pixels: Vec<u8> = quarters.iter().flat_map(|&quarter| image(quarter, &mut rng)).collect();
+        let mut name = |quarter| if below(&mut rng, 10) < 6 { quarter } else { below(&mut rng, 4) as u32 };
+        let named = quarters.iter().map(|&quarter| name(quarter)).collect();
+        DemoEpisode { observations: pixels.into(), actions: Actions::Discrete(named) }
+    });
+    let dataset = Dataset::new(SHAPE, SPACE, episodes.collect()).expect("consistent");
+    let mut trainer = SkillTrainer::new(config, dataset, seed, DeviceKind::Flex).expect("windows fit");
+    for _ in 0..epochs {
+        trainer.train_epoch(&mut |_| ControlFlow::Continue(())).expect("finite");
+    }
+    trainer.into_model()
+}
+
+/// Several players who earn 1 for each step on which they name the quarter of a spot that jumps about; a wrong name ends
+/// the episode.
+pub struct Driver {
+    players: Vec<Player>,
+    skills: Vec<f32>,
+    /// Whether each answer was right.
+    pub hits: Vec<bool>,
+}
+
+struct Player {
+    rng: ChaCha8Rng,
+    quarter: u32,
+    time: usize,
+    pixels: Vec<u8>,
+}
+
+impl Player {
+    fn look(&mut self) {
+        self.quarter = below(&mut self.rng, 4) as u32;
+        self.pixels = image(self.quarter, &mut self.rng);
+    }
+}
+
+impl Driver {
+    pub fn new(envs: usize, seed: u64) -> Self {
+        let streams = Streams::new(seed);
+        let player = |i| {
+            let rng = streams.stream("play", i);
+            let mut player = Player { rng, quarter: 0, time: 0, pixels: Vec::new() };
+            player.look();
+            player
+        };
+        Self { players: (0..envs as u64).map(player).collect(), skills: Vec::new(), hits: Vec::new() }
+    }
+
+    fn observe(&self) -> Observations {
+        let mut all = Observations::empty(&ObsKind::Image(SHAPE));
+        self.players.iter().for_each(|player| all.push(&player.pixels).expect("images"));
+        all
+    }
+
+    /// Draws new skills where the time has come (or for all).
+    fn draw(&mut self, learner: &impl Learner, obs: &Observations) {
+        let Some(prior) = learner.prior() else { return };
+        let (n, all) = (self.players.len(), self.skills.is_empty());
+        let mut next = |row: usize| normal(&mut self.players[row].rng);
+        let fresh = prior.sample(obs, n, SkillDraw::Sample, &mut next).expect("finite");
+        self.skills.resize(fresh.len(), 0.0);
+        for (row, player) in self.players.iter().enumerate() {
+            if all || player.time.is_multiple_of(HORIZON) {
+                let range = row * prior.latent()..(row + 1) * prior.latent();
+                self.skills[range.clone()].copy_from_slice(&fresh[range]);
+            }
+        }
+    }
+
+    /// Plays `steps` ticks with the learner's policy.
+    pub fn rollout(&mut self, learner: &impl Learner, steps: usize) -> Rollout {
+        let (envs, policy, latent) = (self.players.len(), learner.policy(), learner.rollout_latent());
+        let mut rollout = Rollout::new(envs, SHAPE, latent, &SPACE);
+        let mut obs = self.observe();
+        self.draw(learner, &obs);
+        for _ in 0..steps {
+            let output = policy.forward(&self.skills, &obs, envs).expect("finite");
+            let z = self.skills.clone();
+            let (mut actions, mut log_probs, mut rewards) = (Actions::empty(&SPACE), Vec::new(), Vec::new());
+            let (mut terminated, mut truncated) = (Vec::new(), Vec::new());
+            for (row, player) in self.players.iter_mut().enumerate() {
+                let (action, log_prob) = output.sample(row, &mut player.rng);
+                let hit = action == Action::Discrete(player.quarter);
+                player.time += 1;
+                player.look();
+                actions.push(&action).expect("discrete");
+                log_probs.push(log_prob);
+                rewards.push(f32::from(u8::from(hit)));
+                terminated.push(!hit);
+                truncated.push(hit && player.time == LIMIT);
+                self.hits.push(hit);
+            }
+            let step = RolloutStep {
+                obs: obs.as_slice(),
+                z: &z,
+                actions: &actions,
+                log_probs: &log_probs,
+                values: &output.values,
+                rewards: &rewards,
+                terminated: &terminated,
+                truncated: &truncated,
+                final_values: &vec![0.0; envs],
+            };
+            rollout.push_step(step).expect("one kind");
+            for (row, player) in self.players.iter_mut().enumerate() {
+                if truncated[row] {
+                    rollout.push_cut(row, &player.pixels, &z[row * latent..(row + 1) * latent]).expect("images");
+                }
+                if truncated[row] || terminated[row] {
+                    player.time = 0;
+                    player.look();
+                }
+            }
+            obs = self.observe();
+            self.draw(learner, &obs);
+        }
+        (rollout.ends.next_obs, rollout.ends.next_z) = (obs, self.skills.clone());
+        rollout.bootstrap(&policy).expect("they fit");
+        rollout
+    }
+
+    /// Share of right answers among the last `n`.
+    pub fn recent(&self, n: usize) -> f64 {
+        let last = &self.hits[self.hits.len().saturating_sub(n)..];
+        last.iter().filter(|hit| **hit).count() as f64 / last.len() as f64
+    }
+}

@@ -1,0 +1,85 @@
+//! Bevy without a screen.
+
+use bevy::{
+    app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},
+    prelude::*,
+    window::{ExitCondition, WindowPlugin, WindowResolution},
+};
+
+/// The app has no screen, so that nothing needs to be drawn but what agents ask for.
+#[derive(Resource, Clone, Copy, Debug)]
+pub(crate) struct NoScreen;
+
+struct NoScreenPlugin;
+
+impl Plugin for NoScreenPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(NoScreen);
+    }
+}
+
+/// Bevy's `DefaultPlugins`, as this program is built with them, for a World that nobody looks at: input, assets, states,
+/// text, meshes and materials are there, and a window of 1280 by 720 that exists for the game only. There is no event
+/// loop, and the renderer has nothing to draw on.
+///
+/// Built with Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with `bevy_render`, the feature
+/// `camera`: a plugin can only be left out by name. Others are left out with
+/// [`disable`](bevy::app::PluginGroupBuilder::disable), as of any group.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HeadlessPlugins {
+    /// Draw, for agents that see through a camera.
+    draws: bool,
+}
+
+impl HeadlessPlugins {
+    /// With a renderer that draws for [`CameraSensor`](crate::camera::CameraSensor)s.
+    #[cfg(feature = "camera")]
+    pub fn drawing() -> Self {
+        Self { draws: true }
+    }
+}
+
+impl PluginGroup for HeadlessPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        let window = Window { resolution: WindowResolution::new(1280, 720), ..default() };
+        let plugins = DefaultPlugins
+            .build()
+            .disable::<PanicHandlerPlugin>()
+            .disable::<TerminalCtrlCHandlerPlugin>()
+            .set(WindowPlugin {
+                primary_window: Some(window),
+                exit_condition: ExitCondition::DontExit,
+                close_when_requested: false,
+                ..default()
+            });
+        without_screen(plugins, self.draws).add(NoScreenPlugin)
+    }
+}
+
+#[cfg(feature = "camera")]
+fn without_screen(plugins: PluginGroupBuilder, draws: bool) -> PluginGroupBuilder {
+    use bevy::render::{RenderPlugin, pipelined_rendering::PipelinedRenderingPlugin};
+    let render_creation = if draws { crate::camera::drawing() } else { crate::camera::not_drawing() };
+    let renderer = RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
+    let plugins = without_event_loop(plugins.set(renderer));
+    if plugins.contains::<PipelinedRenderingPlugin>() {
+        plugins.disable::<PipelinedRenderingPlugin>()
+    } else {
+        plugins
+    }
+}
+
+#[cfg(not(feature = "camera"))]
+fn without_screen(plugins: PluginGroupBuilder, _draws: bool) -> PluginGroupBuilder {
+    without_event_loop(plugins)
+}
+
+#[cfg(feature = "window")]
+fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    plugins.disable::<bevy::winit::WinitPlugin>()
+}
+
+#[cfg(not(feature = "window"))]
+fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    plugins
+}

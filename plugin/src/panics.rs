@@ -1,0 +1,192 @@
+//! Panics of a game: an error with the way back to it, instead of the end of the program.
+
+use std::{
+    cell::{Cell, RefCell},
+    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
+    path::PathBuf,
+    sync::Once,
+};
+
+use bevy::prelude::*;
+
+use crate::{
+    action::{Action, check_actions},
+    agent::{Agent, AgentOrder},
+    control::Control,
+    demo::{
+        file::{DemoEpisode, DemoHeader, DemoWriter},
+        recorder::{decider, demo_actions, push_action},
+    },
+    episode::Episode,
+    fault::Fault,
+    placement::TickSchedules,
+    reward::Reward,
+    state_hash::StateHash,
+    systems::PlaybotSystems,
+};
+
+/// Turns panics of the game into a [`Fault`] that [`tick_world`](crate::headless::tick_world) returns, with the running
+/// episodes of all agents kept in a file that replays to the panic.
+#[derive(Resource, Clone, Debug)]
+pub struct PanicReports {
+    header: DemoHeader,
+    folder: PathBuf,
+}
+
+/// What an agent has done in its running episode, kept for the report of a panic.
+#[derive(Component, Clone, Debug, Default)]
+pub struct EpisodeTrace(Option<DemoEpisode>);
+
+/// The World has panicked, and what it holds may be half of something.
+#[derive(Resource)]
+struct Broken;
+
+impl PanicReports {
+    /// Reports for recordings with this header, written below `folder`.
+    pub fn new(header: DemoHeader, folder: impl Into<PathBuf>) -> Self {
+        Self { header, folder: folder.into() }
+    }
+
+    /// Adds the reports to an app that has the [`PlaybotPlugin`](crate::plugin::PlaybotPlugin). Agents need an
+    /// [`EpisodeTrace`].
+    pub fn add_to(self, app: &mut App) {
+        let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
+        app.insert_resource(self)
+            .add_systems(decide, note_actions.in_set(PlaybotSystems::Act).after(check_actions).ambiguous_with_all())
+            .add_systems(judge, note_outcomes.in_set(PlaybotSystems::Record).ambiguous_with_all());
+    }
+
+    /// Writes elsewhere from now on.
+    pub fn move_to(&mut self, folder: impl Into<PathBuf>) {
+        self.folder = folder.into();
+    }
+}
+
+fn note_actions(mut agents: Query<(&Agent, &Control, &Episode, &Action, &mut EpisodeTrace)>) {
+    for (agent, control, episode, action, mut trace) in &mut agents {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        if episode.tick == 0 {
+            trace.0 = Some(DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+        }
+        if let Some(trace) = &mut trace.0 {
+            push_action(&mut trace.actions, &action.0);
+            trace.deciders.push(decider(*control));
+        }
+    }
+}
+
+fn note_outcomes(mut agents: Query<(&Control, &Episode, &Reward, &StateHash, &mut EpisodeTrace)>) {
+    for (control, episode, reward, hash, mut trace) in &mut agents {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        if let Some(trace) = &mut trace.0 {
+            trace.rewards.push(reward.get());
+            trace.state_hashes.push(hash.folded());
+        }
+    }
+}
+
+thread_local! {
+    /// Whether this thread runs a World whose panics are reported.
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+    static WORDS: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+/// Lets panics of guarded Worlds be heard instead of printed.
+fn hear_panics() {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let usual = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !GUARDED.get() {
+                return usual(panic);
+            }
+            let words = panic.payload_as_str().unwrap_or("no reason given");
+            let place = panic.location().map_or_else(String::new, |place| format!(" ({place})"));
+            WORDS.with_borrow_mut(|first| {
+                if first.is_empty() {
+                    *first = format!("{}{place}", words.split_whitespace().collect::<Vec<_>>().join(" "));
+                }
+            });
+        }));
+    });
+}
+
+/// Runs a World; a panic in it becomes a fault if it has [`PanicReports`].
+pub(crate) fn guard(world: &mut World, work: impl FnOnce(&mut World) -> Result<(), Fault>) -> Result<(), Fault> {
+    if !world.contains_resource::<PanicReports>() {
+        return work(world);
+    }
+    if world.contains_resource::<Broken>() {
+        return Err(Fault("the game has panicked before, and its World cannot go on".to_owned()));
+    }
+    hear_panics();
+    let outer = GUARDED.replace(true);
+    let result = catch_unwind(AssertUnwindSafe(|| work(world)));
+    GUARDED.set(outer);
+    result.unwrap_or_else(|_| {
+        world.insert_resource(Broken);
+        Err(Fault(report(world, &WORDS.take())))
+    })
+}
+
+/// Says where the game has panicked, and keeps the way there.
+fn report(world: &mut World, words: &str) -> String {
+    let agents = world.get_resource::<AgentOrder>().map_or_else(Vec::new, |order| order.entities().to_vec());
+    let mut episodes = Vec::new();
+    let mut at = Vec::new();
+    for &entity in &agents {
+        let (Some(agent), Some(episode), Some(control)) =
+            (world.get::<Agent>(entity), world.get::<Episode>(entity), world.get::<Control>(entity))
+        else {
+            continue;
+        };
+        if !control.is_active() || !(episode.is_running() || episode.is_loading()) {
+            continue;
+        }
+        at.push(format!("agent {}, level {}, tick {}", agent.index, episode.level, episode.tick));
+        let trace = world.get::<EpisodeTrace>(entity).and_then(|trace| trace.0.clone());
+        episodes.push(whole(trace.filter(|_| episode.is_running()), agent, episode));
+    }
+    let place = if at.is_empty() { "before any level was played".to_owned() } else { at.join("; ") };
+    let kept = match keep(world, &at, &episodes) {
+        Ok(Some(path)) => format!("; the actions so far are in {}, which replays to it", path.display()),
+        Ok(None) => String::new(),
+        Err(error) => format!("; the actions so far could not be kept: {error}"),
+    };
+    format!("{place}: the game panicked: {words}{kept}")
+}
+
+/// A trace with all its lists filled: the tick that panicked has no outcome. One without any tick gets its first.
+fn whole(trace: Option<DemoEpisode>, agent: &Agent, episode: &Episode) -> DemoEpisode {
+    use playbot_learner::{Action as Value, ActionSpace};
+    let mut trace = trace.unwrap_or_else(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+    if trace.deciders.is_empty() {
+        let nothing = match agent.actions {
+            ActionSpace::Discrete(_) => Value::Discrete(0),
+            ActionSpace::Continuous(n) => Value::Continuous(vec![0.0; n]),
+        };
+        push_action(&mut trace.actions, &nothing);
+        trace.deciders.push(decider(Control::Idle));
+    }
+    trace.rewards.resize(trace.deciders.len(), 0.0);
+    trace.state_hashes.resize(trace.deciders.len(), 0);
+    trace
+}
+
+fn keep(
+    world: &World,
+    at: &[String],
+    episodes: &[DemoEpisode],
+) -> Result<Option<PathBuf>, crate::demo::file::DemoFileError> {
+    let (Some(reports), Some(first)) = (world.get_resource::<PanicReports>(), at.first()) else { return Ok(None) };
+    let place = first.replace(", ", "-").replace(' ', "");
+    let path = reports.folder.join(format!("panic-{}-{place}.demo", reports.header.game));
+    let note = "kept when the game panicked in its last tick".to_owned();
+    let mut writer = DemoWriter::replace(&path, DemoHeader { note, ..reports.header.clone() })?;
+    episodes.iter().try_for_each(|episode| writer.push(episode))?;
+    Ok(Some(path))
+}

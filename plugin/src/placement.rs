@@ -1,0 +1,94 @@
+//! Where in a frame a tick lies, and in which frames there is one.
+
+use bevy::{
+    ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
+    prelude::*,
+};
+
+use crate::{agent::Agent, control::Control, episode::Episode, headless::Tick};
+
+/// What a tick is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
+pub enum TickPlacement {
+    /// One run of Bevy's fixed schedules: agents decide in `FixedPreUpdate` and are judged in `FixedPostUpdate`. For
+    /// games that know the plugin and simulate in `FixedUpdate`.
+    #[default]
+    Fixed,
+    /// One whole frame of a fixed length: agents decide in `PreUpdate`, before Bevy's own input, and are judged in
+    /// `Last`. For games that know nothing of the plugin, whatever schedules they use.
+    Frame,
+}
+
+/// The schedules in which the parts of a tick run. [`PlaybotPlugin`](crate::plugin::PlaybotPlugin) inserts it; whoever
+/// adds systems to a [`PlaybotSystems`](crate::systems::PlaybotSystems) set asks it where.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickSchedules {
+    /// What a tick is made of.
+    pub placement: TickPlacement,
+    /// Schedule of `Begin` to `Act`.
+    pub decide: InternedScheduleLabel,
+    /// Schedule of `Judge` to `Reset`.
+    pub judge: InternedScheduleLabel,
+}
+
+impl TickSchedules {
+    /// The schedules of a placement.
+    pub fn new(placement: TickPlacement) -> Self {
+        let (decide, judge) = match placement {
+            TickPlacement::Fixed => (FixedPreUpdate.intern(), FixedPostUpdate.intern()),
+            TickPlacement::Frame => (PreUpdate.intern(), Last.intern()),
+        };
+        Self { placement, decide, judge }
+    }
+
+    /// Those of an app; before it has the plugin, the fixed ones.
+    pub fn of(app: &App) -> Self {
+        app.world().get_resource().copied().unwrap_or(Self::new(TickPlacement::Fixed))
+    }
+}
+
+/// Which frames are ticks, under [`TickPlacement::Frame`]: not the first, which only starts the clock, and none while an
+/// agent waits for its level.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct FrameGate {
+    frames: u64,
+    held: bool,
+    is_tick: bool,
+}
+
+impl FrameGate {
+    /// Lets no frame be a tick until it is let go again: for a window whose player pauses. Frames go on.
+    pub fn hold(&mut self, held: bool) {
+        self.held = held;
+    }
+
+    /// Whether this frame is a tick.
+    pub fn is_tick(&self) -> bool {
+        self.is_tick
+    }
+}
+
+pub(crate) fn begin_frame(mut gate: ResMut<FrameGate>) {
+    gate.frames += 1;
+    gate.is_tick = false;
+}
+
+/// Whether agents may be given levels in this frame.
+pub(crate) fn has_begun(gate: Res<FrameGate>) -> bool {
+    gate.frames > 1 && !gate.held
+}
+
+/// A run condition: whether this frame is a tick. Always under [`TickPlacement::Fixed`], where systems run in ticks only.
+pub fn is_tick(gate: Option<Res<FrameGate>>) -> bool {
+    gate.is_none_or(|gate| gate.is_tick)
+}
+
+/// Opens the gate and counts the tick, unless somebody waits for a level.
+pub(crate) fn open_gate(
+    agents: Query<(&Control, &Episode), With<Agent>>,
+    mut gate: ResMut<FrameGate>,
+    mut tick: ResMut<Tick>,
+) {
+    gate.is_tick = !agents.iter().any(|(control, episode)| control.is_active() && episode.is_loading());
+    tick.0 += u64::from(gate.is_tick);
+}

@@ -1,0 +1,5 @@
+//! Takes the game out of the `bevy` package.
+
+fn main() {
+    foreign_showcase::write_game("alien_cake_addict", &[], None);
+}

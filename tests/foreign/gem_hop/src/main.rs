@@ -1,0 +1,40 @@
+//! Gem Hop, a small platformer that knows nothing of playbot, with every verb of it.
+
+mod game;
+
+use std::process::ExitCode;
+
+use EpisodeEnd::Terminated;
+use KeyCode::{ArrowLeft, ArrowRight, Space};
+use bevy::prelude::*;
+use game::{Hero, Level, Map, Run, Screen};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::EpisodeEnd,
+};
+
+fn main() -> ExitCode {
+    let gem_hop = ForeignGame::new("gem_hop", 1, game::game)
+        .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
+        .observe((0..29).map(|index| index.to_string()), see)
+        .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
+        .end(|screen: Res<State<Screen>>| {
+            matches!(**screen, Screen::Won | Screen::Lost).then(|| Terminated { success: *screen == Screen::Won })
+        })
+        .restart(Restart::state(Screen::Loading))
+        .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>| level.0 = seed.0)
+        .ready(in_state(Screen::Playing))
+        .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
+            let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
+            2 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
+        });
+    playbot_cli::main(&[&gem_hop])
+}
+
+/// The hero's place and motion, and the ground, spikes and gems of the next eight columns.
+fn see(hero: Single<(&Transform, &Hero)>, map: Res<Map>) -> Vec<f32> {
+    let (at, hero) = (hero.0.translation, hero.1);
+    let ahead = map.columns.iter().skip(at.x as usize).take(8);
+    let ahead = ahead.flat_map(|c| [f32::from(c.ground) - at.y, f32::from(c.spikes), f32::from(c.gem)]);
+    [at.x.fract(), at.y, hero.velocity.x, hero.velocity.y, hero.coyote].into_iter().chain(ahead).collect()
+}

@@ -1,0 +1,32 @@
+//! Where cargo keeps the sources of the `bevy` package.
+
+use std::{env, path::PathBuf, process::Command};
+
+use serde_json::Value;
+
+/// The folder of the `bevy` package that this workspace is built with, as cargo tells it.
+pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.args(["metadata", "--offline", "--locked", "--format-version", "1"]);
+    // Packages for other systems need not have been downloaded.
+    if let Ok(target) = env::var("TARGET") {
+        command.args(["--filter-platform", &target]);
+    }
+    let output = command.output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
+    if !output.status.success() {
+        let why = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
+        return Err(format!("cargo metadata cannot tell where it is ({why}); `cargo fetch` may help"));
+    }
+    let metadata: Value = serde_json::from_slice(&output.stdout)
+        .map_err(|error| format!("cargo metadata answers something else than JSON: {error}"))?;
+    let manifest = metadata["packages"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .find(|package| package["name"] == "bevy" && package["version"].as_str().is_some_and(|v| v.starts_with("0.19.")))
+        .and_then(|package| package["manifest_path"].as_str())
+        .ok_or("there is no package bevy 0.19 in this workspace")?;
+    let folder = PathBuf::from(manifest).parent().map(PathBuf::from);
+    folder.ok_or_else(|| format!("{manifest} lies in no folder"))
+}

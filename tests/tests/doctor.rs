@@ -1,0 +1,187 @@
+//! The doctor finds each planted fault and names it, and finds nothing in healthy games.
+
+use playbot_games::registry;
+use playbot_lab::{
+    doctor::{CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, examine},
+    game::Game,
+};
+use playbot_tests::{Corridor, faulty::Fault};
+
+fn examined(game: &dyn Game, ticks: u32, ignored: &[&str]) -> DoctorReport {
+    let options = DoctorOptions {
+        ticks,
+        ignored: ignored.iter().map(|part| (*part).to_owned()).collect(),
+        ..DoctorOptions::new(game.modes()[0])
+    };
+    examine(game, &options, |_| {}).expect("the game has this mode")
+}
+
+/// The only finding in a copy with this fault.
+fn finding(fault: Fault) -> (Finding, DoctorReport) {
+    let mut report = examined(&fault, 60, &[]);
+    assert_eq!(report.findings.len(), 1, "{fault:?}:\n{report}");
+    (report.findings.remove(0), report)
+}
+
+/// The only finding, which must be a difference of this kind of thing in this comparison.
+fn named(
+    fault: Fault,
+    comparison: Comparison,
+    kind: DifferenceKind,
+    name: &str,
+    field: &str,
+) -> (Finding, DoctorReport) {
+    let (finding, report) = finding(fault);
+    let difference = finding.difference.clone().expect("a difference");
+    assert_eq!((finding.kind, finding.comparison), (FindingKind::Differs, Some(comparison)), "{}", finding.what);
+    assert_eq!(difference.kind, kind, "{}", finding.what);
+    assert!(difference.name.ends_with(name) && difference.field == field, "{}", finding.what);
+    assert_ne!(difference.left, difference.right);
+    (finding, report)
+}
+
+fn likeliest(finding: &Finding) -> CauseKind {
+    finding.causes.first().expect("every difference has usual causes").kind
+}
+
+#[test]
+fn a_healthy_game_has_no_findings() {
+    let report = examined(&Fault::None, 60, &[]);
+    assert!(report.is_healthy(), "{report}");
+    assert_eq!(report.comparisons.len(), Comparison::ALL.len());
+    for comparison in &report.comparisons {
+        assert_eq!((comparison.same(), comparison.ticks, comparison.unmatched), (Some(true), 60, 0), "{report}");
+    }
+    assert!(report.safety.all().iter().all(|(_, verdict)| verdict.safe == Some(true)), "{report}");
+}
+
+#[test]
+fn what_reflection_sees_and_what_it_does_not_see_is_said() {
+    let report = examined(&Fault::None, 30, &[]);
+    let compared = |name: &str| report.types.compared.iter().any(|path| path.ends_with(name));
+    for name in ["::Gardener", "::Plant", "::Soil", "::Transform"] {
+        assert!(compared(name), "{name} is missing in {:?}", report.types.compared);
+    }
+    let hidden = report.types.not_reflected.len() + report.types.unnamed;
+    assert_eq!(hidden, 2, "`Secret` and `Planted` are not reflected: {:?}", report.types);
+    assert_eq!(report.observation.constant, ["gardens"]);
+    assert!(report.observation.state_hash);
+}
+
+#[test]
+fn unseeded_randomness_is_found_at_its_source() {
+    let (finding, report) =
+        named(Fault::UnseededRandomness, Comparison::Repeat, DifferenceKind::Resource, "::Wind", ".force");
+    assert!(finding.causes.iter().any(|cause| cause.kind == CauseKind::Randomness));
+    assert_eq!(report.safety.recording.safe, Some(false));
+    let skipped = report.of(Comparison::Restart).and_then(|restart| restart.skipped.clone());
+    assert!(skipped.expect("it would only repeat the finding").contains("differs from itself"));
+}
+
+#[test]
+fn iteration_over_a_hash_map_is_found_and_the_map_is_named() {
+    let (finding, _) = named(Fault::HashOrder, Comparison::Repeat, DifferenceKind::Component, "::Smells", ".mixture");
+    assert_eq!(likeliest(&finding), CauseKind::HashOrder);
+    let evidence = &finding.causes[0].evidence;
+    assert!(evidence.iter().any(|hint| hint.contains("Herbs.strengths")), "{evidence:?}");
+}
+
+#[test]
+fn a_reader_of_the_wall_clock_is_found_although_no_clock_runs_without_a_window() {
+    let (finding, report) = named(Fault::WallClock, Comparison::Clock, DifferenceKind::Resource, "::Sun", ".pace");
+    assert_eq!(likeliest(&finding), CauseKind::WallClock);
+    assert_eq!(report.of(Comparison::Repeat).and_then(|repeat| repeat.same()), Some(true));
+    assert_eq!((report.safety.window.safe, report.safety.recording.safe), (Some(false), Some(true)));
+}
+
+#[test]
+fn a_score_that_two_arenas_share_is_found() {
+    let (finding, report) = named(Fault::SharedScore, Comparison::Arenas, DifferenceKind::Resource, "::Score", ".0");
+    assert_eq!(likeliest(&finding), CauseKind::SharedByArenas);
+    let difference = finding.difference.expect("a difference");
+    assert_eq!((difference.left.as_str(), difference.right.as_str()), ("1", "2"));
+    let effect = report.of(Comparison::Arenas).and_then(|arenas| arenas.effect.clone()).expect("it is paid out");
+    assert_eq!((effect.kind, effect.tick), (DifferenceKind::Reward, 0));
+    assert_eq!((report.safety.arenas.safe, report.safety.resume.safe), (Some(false), Some(true)));
+}
+
+#[test]
+fn a_game_with_one_arena_per_world_is_not_asked_for_two() {
+    let options = DoctorOptions { ticks: 20, several_arenas: false, ..DoctorOptions::new("bed") };
+    let report = examine(&Fault::SharedScore, &options, |_| {}).expect("the game has this mode");
+    assert!(report.is_healthy(), "{report}");
+    assert_eq!(report.safety.arenas.safe, None);
+}
+
+#[test]
+fn state_that_survives_a_restart_is_found() {
+    let (finding, report) = named(Fault::Survivor, Comparison::Restart, DifferenceKind::Resource, "::Soil", ".wet");
+    assert_eq!(likeliest(&finding), CauseKind::SurvivesRestart);
+    assert_eq!((report.safety.resume.safe, report.safety.threads.safe), (Some(false), Some(true)));
+}
+
+#[test]
+fn entities_that_survive_a_restart_are_counted() {
+    let (finding, _) = finding(Fault::LeftOvers);
+    let difference = finding.difference.expect("a difference");
+    assert_eq!((finding.comparison, difference.kind), (Some(Comparison::Restart), DifferenceKind::Entities));
+    assert!(difference.name.contains("Plant"), "{}", difference.name);
+    assert_eq!((difference.left.as_str(), difference.right.as_str()), ("4", "8"));
+}
+
+#[test]
+fn what_is_meant_to_last_can_be_left_out() {
+    let (_, report) = named(Fault::LastingRecord, Comparison::Restart, DifferenceKind::Resource, "::Record", ".0");
+    assert!(report.to_string().contains("agents have noticed nothing"), "{report}");
+    assert!(examined(&Fault::LastingRecord, 60, &["::Record"]).is_healthy());
+}
+
+#[test]
+fn what_reflection_cannot_see_shows_in_what_agents_get() {
+    let (finding, _) = named(Fault::Hidden, Comparison::Repeat, DifferenceKind::Reward, "reward", "");
+    assert!(finding.causes.iter().any(|cause| cause.kind == CauseKind::Randomness));
+}
+
+#[test]
+fn values_that_are_no_numbers_are_named_with_their_tick() {
+    let (finding, report) = finding(Fault::NotFinite);
+    assert_eq!(finding.kind, FindingKind::NotFinite);
+    assert_eq!(report.observation.not_finite, Some((7, "tallest".to_owned(), "inf".to_owned())));
+}
+
+#[test]
+fn a_panic_is_a_finding_and_ends_only_the_examination() {
+    let (finding, _) = finding(Fault::Panic);
+    assert_eq!(finding.kind, FindingKind::Fault);
+    assert!(finding.what.contains("the garden burns"), "{}", finding.what);
+}
+
+#[test]
+fn an_observation_that_never_changes_is_a_finding() {
+    let (finding, report) = finding(Fault::Blind);
+    assert_eq!(finding.kind, FindingKind::Blind);
+    assert_eq!(report.observation.constant, ["x", "tallest", "gardens"]);
+}
+
+#[test]
+fn the_report_names_the_cause_and_what_to_do() {
+    let text = finding(Fault::Survivor).1.to_string();
+    for words in ["again after a restart", "DIFFERS at tick 0", "second episode", "what to do", "1 finding."] {
+        assert!(text.contains(words), "`{words}` is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn an_unknown_mode_is_an_error() {
+    assert!(examine(&Fault::None, &DoctorOptions::new("desert"), |_| {}).is_err());
+}
+
+#[test]
+fn the_games_of_this_workspace_are_healthy() {
+    for (name, ticks) in [("coinrun", 150), ("maze2d", 150), ("antmaze", 60)] {
+        let report = examined(registry::game(name).expect("a game"), ticks, &[]);
+        assert!(report.is_healthy(), "{report}");
+        assert!(report.comparisons.iter().all(|comparison| comparison.ticks == ticks), "{report}");
+    }
+    assert!(examined(&Corridor, 60, &[]).is_healthy());
+}

@@ -1,0 +1,168 @@
+//! What is wrong with a foreign game is said, with the game's own names.
+
+use bevy::prelude::*;
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{
+    demo::verify::verify_file,
+    eval::{EvalPlan, Player, evaluate},
+    foreign::{ForeignGame, Restart},
+    prelude::*,
+    train::{Trainer, config_file::parse_experiment},
+    worlds::build_world,
+};
+use playbot_learner::DeviceKind;
+use playbot_tests::foreign::catch::{Paddle, Score, catch_game, game};
+
+/// Plays until something is wrong, for at most this many ticks.
+fn fault(game: &ForeignGame, ticks: u64) -> String {
+    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+    let bot = BlindBot::Constant(ActionValue::Discrete(1));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::Always(3)));
+    world.ticks(ticks).expect_err("something is wrong").to_string()
+}
+
+fn plan() -> EvalPlan {
+    let split = "default:0..3".parse().expect("a split");
+    EvalPlan { split, sight: ObservationConfig::default(), episodes_per_level: 1, seed: 1, arenas: 2, worlds: 1, threads: 1 }
+}
+
+#[test]
+fn a_game_without_actions_is_refused() {
+    let mute = ForeignGame::new("mute", 1, game).observe(["x"], || [0.0]);
+    assert!(fault(&mute, 1).contains("`mute` has no actions: say what an agent can do, for instance with `.keys`"));
+    let error = evaluate(&mute, &Player::Blind(BlindBot::Uniform), &plan(), |_| {}).expect_err("no actions");
+    assert!(error.to_string().contains("has no actions"), "{error}");
+    let experiment = r#"(game: "mute", train: "default:0..3", test: "default:4..7", demos: "x", steps: 9000, algorithm: "ppo")"#;
+    let experiment = parse_experiment(experiment, std::path::Path::new("x.ron")).expect("valid");
+    let error = Trainer::new(&mute, &experiment, None, DeviceKind::Flex, 1).err().expect("no actions");
+    assert!(error.to_string().contains("has no actions"), "{error}");
+}
+
+#[test]
+fn a_game_of_which_nothing_is_seen_is_refused() {
+    let dark = ForeignGame::new("dark", 1, game).keys([vec![], vec![KeyCode::ArrowLeft]]);
+    let text = fault(&dark, 1);
+    assert!(text.contains("nothing of the game `dark` is seen") && text.contains("`.observe`"), "{text}");
+}
+
+#[test]
+fn an_observation_that_changes_its_length_is_a_fault() {
+    fn grow(mut ticks: Local<usize>) -> Vec<f32> {
+        *ticks += 1;
+        vec![0.0; if *ticks < 3 { 2 } else { 3 }]
+    }
+    let text = fault(&catch_game().observe(["a", "b"], grow), 10);
+    for part in ["agent 0, level 3, tick 2", "`catch`", "names 2 values", "grow", "returned 3"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+    let text = fault(&catch_game().observe(["a", "b", "c"], || [1.0, 2.0]), 1);
+    assert!(text.contains("names 3 values") && text.contains("returned 2"), "{text}");
+}
+
+#[test]
+fn an_observation_of_what_does_not_exist_is_a_fault() {
+    #[derive(Component)]
+    struct Nowhere;
+    fn see(nowhere: Single<&Transform, With<Nowhere>>) -> [f32; 1] {
+        [nowhere.translation.x]
+    }
+    let text = fault(&catch_game().observe(["x"], see), 1);
+    assert!(text.contains("see` was skipped: an entity that it asks for does not exist"), "{text}");
+}
+
+#[test]
+fn a_level_that_never_becomes_ready_times_out_with_the_name_of_the_system() {
+    fn never() -> bool {
+        false
+    }
+    let text = fault(&catch_game().ready(never).ready_within(20), 1);
+    for part in ["level 3", "`catch`", "not ready after 20 frames", "never", "`.ready_within`"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+}
+
+#[test]
+fn two_agents_in_a_world_for_one_are_a_fault() {
+    let (mut world, agents) = build_world(&catch_game(), "default", 0, 0, 2);
+    for agent in agents {
+        world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform));
+    }
+    let text = world.tick().expect_err("room for one").to_string();
+    assert!(text.contains("`catch` has room for 1 agent,") && text.contains("it has 2: build more Worlds"), "{text}");
+}
+
+#[test]
+fn a_missing_resource_is_named_with_what_brings_it() {
+    #[derive(Resource)]
+    struct Lives(#[allow(dead_code)] u32);
+    fn count(_lives: Res<Lives>) {}
+    let broken = ForeignGame::new("broken", 1, |app: &mut App| {
+        game(app);
+        app.add_systems(Update, count);
+    });
+    let broken = broken.keys([vec![], vec![KeyCode::ArrowLeft]]).observe(["x"], || [0.0]).restart(Restart::Startup);
+    let text = fault(&broken, 2);
+    assert!(!text.contains("panicked"), "{text}");
+    // The names are known if Bevy is built with its feature `debug`.
+    assert!(text.contains("`Lives`") || text.contains("feature `debug`"), "{text}");
+    let text = fault(&catch_game().reward(|lives: Res<Lives>| lives.0 as f32), 2);
+    assert!(text.contains("`Lives`") || text.contains("feature `debug`"), "{text}");
+}
+
+#[test]
+fn a_state_that_the_game_does_not_have_is_named() {
+    #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    enum Nothing {
+        #[default]
+        Here,
+    }
+    let text = fault(&catch_game().restart(Restart::state(Nothing::Here)), 1);
+    assert!(text.contains("Nothing") && text.contains("`init_state`"), "{text}");
+}
+
+#[test]
+fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
+    fn explode(paddle: Single<&Transform, With<Paddle>>) {
+        assert!(paddle.translation.x > 3.1, "the paddle has left the field");
+    }
+    let bomb = || {
+        let bomb = ForeignGame::new("bomb", 1, |app: &mut App| {
+            game(app);
+            app.add_systems(PostUpdate, explode);
+        });
+        bomb.keys([vec![], vec![KeyCode::ArrowLeft]])
+            .observe(["x"], |paddle: Single<&Transform, With<Paddle>>| [paddle.translation.x])
+            .reward(|_score: Res<Score>| 0.0)
+    };
+    let text = fault(&bomb(), 100);
+    for part in ["agent 0, level 3, tick 4", "the paddle has left the field", "foreign_faults.rs", "which replays to it"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+    let path = text.split("are in ").nth(1).and_then(|rest| rest.split(", which").next()).expect("a path");
+    let error = verify_file(&bomb(), std::path::Path::new(path), |_| {}).expect_err("panics again").to_string();
+    assert!(error.contains("tick 4") && error.contains("the paddle has left the field"), "{error}");
+    std::fs::remove_file(path).expect("it was there");
+    // Measuring gets the error too, from whichever thread.
+    let plan = EvalPlan { threads: 2, ..plan() };
+    let player = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
+    let error = evaluate(&bomb(), &player, &plan, |_| {}).expect_err("panics").to_string();
+    assert!(error.contains("the paddle has left the field"), "{error}");
+}
+
+#[test]
+fn numbers_are_observed_by_their_paths() {
+    let see = |paths: &[&str]| {
+        let paths = paths.iter().copied();
+        let game = ForeignGame::new("paths", 1, game).keys([vec![], vec![KeyCode::ArrowLeft]]).observe_paths(paths);
+        let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+        let bot = BlindBot::Constant(ActionValue::Discrete(0));
+        world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::Always(3)));
+        world.tick().map(|()| world.get::<Observation>(agents[0]).expect("an agent").vector.clone())
+    };
+    assert_eq!(see(&["Paddle.Transform.translation.x", "Paddle.Transform.scale.y"]), Ok(vec![4.0, 1.0]));
+    let refused = |path: &str| see(&[path]).expect_err("no such number").to_string();
+    assert!(refused("Spoon.Transform.translation.x").contains("means no entity"));
+    assert!(refused("Paddle.Transform.translation.w").contains("leads nowhere"));
+    assert!(refused("Paddle.Transform.translation").contains("is no number"));
+    assert!(refused("Paddle.Spoon.x").contains("derives `Reflect`"));
+}

@@ -1,0 +1,79 @@
+//! What it takes to make a game playable that is not ours: at most 20 lines, and none in the game itself.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Games that are not ours.
+const GAMES: [&str; 3] = ["alien_cake_addict", "breakout", "gem_hop"];
+
+fn crate_of(game: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("foreign").join(game)
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("cannot read {}: {error}", path.display()))
+}
+
+/// Files below a folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("cannot read {}: {error}", folder.display()));
+    let paths = entries.map(|entry| entry.expect("a folder of the repository can be listed").path());
+    paths.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
+/// Lines that say something: not blank, no comment, no import, not closing brackets only.
+fn lines_that_count(source: &str) -> Vec<&str> {
+    let mut in_use = false;
+    let mut counted = Vec::new();
+    for line in source.lines().map(str::trim) {
+        in_use |= line.starts_with("use ");
+        let closes = line.chars().all(|c| ")]};,".contains(c));
+        if !in_use && !closes && !line.starts_with("//") {
+            counted.push(line);
+        }
+        in_use &= !line.ends_with(';');
+    }
+    counted
+}
+
+#[test]
+fn blank_lines_comments_imports_and_closing_brackets_do_not_count() {
+    let source = "//! A game.\n\nuse std::{\n    fs,\n};\nfn main() {\n    play([\n        1, // one\n    ]);\n}\n";
+    assert_eq!(lines_that_count(source), ["fn main() {", "play([", "1, // one"]);
+}
+
+#[test]
+fn no_adapter_has_more_than_twenty_lines() {
+    for game in GAMES {
+        let source = read(&crate_of(game).join("src/main.rs"));
+        let lines = lines_that_count(&source);
+        assert!(lines.len() <= 20, "{game}: {} lines\n{}", lines.len(), lines.join("\n"));
+        assert!(lines.len() > 5, "{game}: {} lines are no adapter\n{}", lines.len(), lines.join("\n"));
+        assert!(lines.iter().all(|line| line.len() <= 120), "{game}: lines are as long as elsewhere");
+        assert!(lines.iter().all(|line| line.matches(';').count() <= 1), "{game}: one statement to a line");
+    }
+}
+
+#[test]
+fn all_of_an_adapter_is_in_its_main() {
+    for game in GAMES {
+        let folder = crate_of(game);
+        let others = files(&folder).into_iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs"));
+        for path in others.filter(|path| !path.ends_with("src/main.rs")) {
+            assert!(!read(&path).contains("playbot"), "{} knows of the plugin", path.display());
+        }
+    }
+}
+
+#[test]
+fn nothing_of_the_examples_of_bevy_is_kept_here() {
+    for (game, allowed) in [("alien_cake_addict", vec!["build.rs"]), ("breakout", vec!["build.rs", "silence.rs"])] {
+        let folder = crate_of(game);
+        for path in files(&folder).iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs")) {
+            let name = path.strip_prefix(&folder).expect("it was found there").display().to_string();
+            assert!(name == "src/main.rs" || allowed.contains(&name.as_str()), "{game} has a file {name}");
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Games that know nothing of the plugin: played, recorded, measured and trained like any other.
+
+use std::path::Path;
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    demo::{
+        file::{DemoHeader, DemoWriter},
+        recorder::demo_actions,
+    },
+    headless::Tick,
+    vision::ObservationConfig,
+};
+use playbot_lab::{
+    demo::{dataset::Demonstrations, verify::verify_file},
+    eval::{EvalPlan, Player, evaluate, summarize},
+    foreign::ForeignGame,
+    prelude::*,
+    train::{
+        Algorithm, Experiment, Trainer,
+        checkpoint::Which,
+        config_file::parse_experiment,
+        run_dir::{RunDir, RunInfo},
+    },
+    worlds::build_world,
+};
+use playbot_learner::DeviceKind;
+use playbot_tests::foreign::{
+    catch::{Apple, catch_game},
+    rooms::{PlayedFrames, Stage, rooms_game},
+};
+
+/// Records the demonstrator for these levels.
+fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>, noise: f64) {
+    let header = DemoHeader::new(game.name(), 1, "default", game.tick_hz(), demo_actions(&game.actions()));
+    let (mut world, agents) = build_world(game, "default", 5, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
+    game.arm_demonstrator(&mut world, agents[0], noise);
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list(levels)));
+    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+        world.tick().expect("sound");
+    }
+}
+
+fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32, f64)> {
+    let split: LevelSplit = "default:0..7".parse().expect("a split");
+    let plan =
+        EvalPlan { split, sight: ObservationConfig::default(), episodes_per_level: 1, seed: 1, arenas: 4, worlds: 2, threads };
+    let results = evaluate(game, &player, &plan, |_| {}).expect("can be played");
+    assert_eq!(results.len(), 8);
+    let summary = summarize("player", &plan.split, &results);
+    assert!(summary.return_mean.is_finite());
+    results.iter().map(|result| (result.level, result.ticks, result.total_reward)).collect()
+}
+
+#[test]
+fn a_bot_that_follows_catches_and_a_random_one_does_not() {
+    let game = catch_game();
+    let total = |results: &[(u64, u32, f64)]| results.iter().map(|result| result.2).sum::<f64>() / 8.0;
+    let followed = measure(&game, Player::Demonstrator, 2);
+    assert_eq!(followed, measure(&game, Player::Demonstrator, 1), "threads do not count");
+    assert!(followed.iter().all(|(_, ticks, _)| *ticks == 600), "time is up after 600 ticks: {followed:?}");
+    let random = measure(&game, Player::Blind(BlindBot::Uniform), 2);
+    assert!(total(&followed) > 8.0 && total(&random) < 3.0, "{followed:?} {random:?}");
+    assert!(random.iter().any(|(_, ticks, _)| *ticks < 600), "somebody has lost");
+}
+
+#[test]
+fn recordings_replay_and_are_learned_from() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("catch.demo");
+    // Three rounds, so that episodes also follow each other in one World, which a replay does in another order.
+    record(&catch_game(), &path, (0..9).chain(0..3).collect(), 0.3);
+    let report = verify_file(&catch_game(), &path, |_| {}).expect("readable");
+    assert_eq!((report.episodes, &report.divergences), (12, &Vec::new()));
+    let demos = Demonstrations::read(&catch_game(), &ObservationConfig::default(), &path, None).expect("readable");
+    let steps = demos.steps();
+    let dataset = demos.dataset(&catch_game(), 2, |_| {}).expect("replays");
+    assert!(steps > 1000 && dataset.steps() as u64 == steps);
+}
+
+#[test]
+fn states_and_loading_screens_pass_before_the_first_tick() {
+    let game = rooms_game();
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([1, 2, 3])));
+    let mut lengths = Vec::new();
+    let mut count = 0;
+    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+        let ended = world.get::<EpisodeCount>(agents[0]).expect("an agent").finished;
+        world.tick().expect("sound");
+        count += 1;
+        if world.get::<EpisodeCount>(agents[0]).expect("an agent").finished > ended {
+            lengths.push(count);
+            count = 0;
+        }
+    }
+    // Three fixed steps of 50 ms to lose, in frames of 16.7 ms. The fixed clock begins with the restart, eight frames before
+    // the first tick, so that the steps fall into ticks 1, 4 and 7, whatever the episode before has left in it.
+    assert_eq!(lengths, [7, 7, 7], "no ghosts, and no loading in an episode");
+    assert_eq!(world.resource::<Tick>().0, 22, "loading frames are no ticks; the last one has nobody to play");
+    assert_eq!(*world.resource::<State<Stage>>(), Stage::Over);
+    let played = world.resource::<PlayedFrames>().0;
+    assert_eq!(played, 24, "seven ticks, and the frame in which the level is entered");
+}
+
+#[test]
+fn the_first_episode_and_a_later_one_of_a_level_are_the_same() {
+    for game in [catch_game(), rooms_game()] {
+        let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+        let bot = BlindBot::Constant(ActionValue::Discrete(1));
+        world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::rounds([5, 8])));
+        let mut traces = vec![Vec::new()];
+        while traces.len() < 5 {
+            let ended = world.get::<EpisodeCount>(agents[0]).expect("an agent").finished;
+            world.tick().expect("sound");
+            let hash = world.get::<StateHash>(agents[0]).expect("an agent").0;
+            traces.last_mut().expect("never empty").push(hash);
+            if world.get::<EpisodeCount>(agents[0]).expect("an agent").finished > ended {
+                traces.push(Vec::new());
+            }
+        }
+        assert_eq!(traces[0], traces[2], "{}: level 5", game.name());
+        assert_eq!(traces[1], traces[3], "{}: level 8", game.name());
+        let distinct: std::collections::BTreeSet<_> = traces[0].iter().collect();
+        assert!(distinct.len() > traces[0].len() / 4, "{}: the hash sees the game", game.name());
+    }
+}
+
+const EXPERIMENT: &str = r#"(
+    game: "catch", train: "default:0..7", test: "default:8..15", demos: "unused",
+    steps: 2048, arenas: 8, worlds: 2, algorithm: "ppo",
+    ppo: (num_steps: 64, minibatches: 4, hidden: [16, 16], lr: 0.003),
+)"#;
+
+fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Vec<Vec<u8>> {
+    let info = RunInfo {
+        algorithm: Algorithm::Ppo,
+        seed: 1,
+        version: "test".into(),
+        revision: "test".into(),
+        game_version: 1,
+        skills: None,
+        device: DeviceKind::Flex,
+    };
+    let run = match RunDir::create(folder, trainer.experiment(), &info, false) {
+        Ok(run) => run,
+        Err(_) => RunDir::open(folder).expect("a run").0,
+    };
+    while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
+        let report = trainer.update().expect("learns");
+        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
+    }
+    run.save(&mut trainer).expect("writable");
+    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
+    let files = [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()];
+    files.into_iter().map(|path| std::fs::read(path).expect("written")).collect()
+}
+
+fn fresh(game: &ForeignGame, threads: usize) -> Trainer {
+    let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
+    Trainer::new(game, &experiment, None, DeviceKind::Flex, threads).expect("fits")
+}
+
+#[test]
+fn training_that_was_killed_in_the_middle_of_episodes_goes_on_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (whole, halved) = (folder.path().join("whole"), folder.path().join("halved"));
+    let game = catch_game();
+    let mut trainer = fresh(&game, 2);
+    assert_eq!(trainer.worlds_mut().count(), 8, "one arena in each World");
+    let expected = train(&whole, trainer, None);
+    train(&halved, fresh(&game, 1), Some(2));
+    let (run, experiment, _): (RunDir, Experiment, _) = RunDir::open(&halved).expect("readable");
+    let resumed = run.resume(&game, &experiment, DeviceKind::Flex, 2).expect("replays");
+    assert_eq!(resumed.updates(), 2);
+    assert!(train(&halved, resumed, None) == expected, "stopping in the middle changed the result");
+}
+
+#[test]
+fn a_game_with_hidden_state_says_at_resume_what_it_may_be() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Where the apple is depends on how often the game was begun in this World.
+    fn hang(mut begun: Local<u32>, mut apple: Single<&mut Transform, With<Apple>>) {
+        *begun += 1;
+        apple.translation.x = (*begun % 9) as f32;
+    }
+    let forgetful = catch_game().level(hang);
+    train(folder.path(), fresh(&forgetful, 1), Some(3));
+    let (run, experiment, _) = RunDir::open(folder.path()).expect("readable");
+    let error = run.resume(&forgetful, &experiment, DeviceKind::Flex, 1).err().expect("the apple hangs elsewhere");
+    let text = error.to_string();
+    for part in ["did not replay", "resources that a restart does not reset", "`Local`", "playbot doctor"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+}

@@ -1,0 +1,123 @@
+//! Runs, their files and what they learn.
+
+use std::path::Path;
+
+use bevy_playbot::{
+    policy_file::{PolicyMisfit, policy_observation},
+    vision::VisionError,
+};
+use playbot_lab::{
+    eval::{EpisodeResult, EvalPlan, Player, evaluate},
+    policy_export::{export_policy, policy_file},
+    prelude::*,
+    train::{
+        Algorithm, Experiment, Learner, Trainer,
+        checkpoint::Which,
+        run_dir::{RunDir, RunInfo},
+    },
+};
+use playbot_learner::{DeviceKind, Policy, PolicyFile, SkillModel};
+use playbot_tests::{Corridor, PaintedCorridor};
+
+use crate::corridor::{experiment, record, skills};
+
+fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer {
+    let skills = algorithm.needs_skills().then_some(skills);
+    let experiment = Experiment { algorithm, ..experiment() };
+    Trainer::new(&PaintedCorridor, &experiment, skills, DeviceKind::Flex, threads).expect("fits")
+}
+
+/// Trains in `folder` to the end or until so many updates are done, and saves.
+fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
+    let Experiment { algorithm, seed, .. } = *trainer.experiment();
+    let (version, revision) = ("test".to_owned(), "test".to_owned());
+    let device = DeviceKind::Flex;
+    let info = RunInfo { algorithm, seed, version, revision, game_version: 3, skills: None, device };
+    let run = match folder.exists() {
+        true => RunDir::open(folder).expect("a run").0,
+        false => RunDir::create(folder, trainer.experiment(), &info, false).expect("writable"),
+    };
+    while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
+        let report = trainer.update().expect("learns");
+        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
+    }
+    run.save(&mut trainer).expect("writable");
+    trainer
+}
+
+fn bytes(folder: &Path) -> Vec<Vec<u8>> {
+    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
+    [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
+        .into_iter()
+        .map(|path| std::fs::read(path).expect("written"))
+        .collect()
+}
+
+fn measure(policy: &Policy, prior: Option<SkillPrior>, threads: usize) -> Vec<EpisodeResult> {
+    let (split, sight) = ("plain:8..15".parse().expect("a split"), experiment().sight());
+    let plan = EvalPlan { split, sight, episodes_per_level: 3, seed: 7, arenas: 4, worlds: 2, threads };
+    let player = Player::Policy { policy: policy.clone(), prior, draw: ActionDraw::Sample };
+    evaluate(&PaintedCorridor, &player, &plan, |_| {}).expect("fits")
+}
+
+#[test]
+fn what_is_learned_from_pictures_survives_its_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    record(folder.path());
+    let skills = skills(folder.path());
+    let mut trainer = trainer(Algorithm::ScorePpo, &skills, 2);
+    assert_eq!(trainer.update().expect("learns").initial_kl, Some(0.0), "the first policy is the decoder");
+    let run = folder.path().join("run");
+    let trainer = train(&run, trainer, None);
+    let results = measure(&trainer.policy(), trainer.skill_prior(), 2);
+    assert_eq!(results.len(), 24);
+    assert_eq!(results, measure(&trainer.policy(), trainer.skill_prior(), 1), "threads");
+
+    let (run, experiment, info) = RunDir::open(&run).expect("a run");
+    let saved = run.checkpoint(Which::Last).expect("saved").learner_file();
+    let learner = Learner::load(info.algorithm, &saved, DeviceKind::Flex).expect("as written");
+    let (path, about) = (folder.path().join("eyes.policy"), [(); 3].map(|()| "test".to_owned()).into());
+    let file = policy_file(&PaintedCorridor, &experiment.sight(), learner.policy(), learner.skills(), about);
+    export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");
+    let read = PolicyFile::load(&path, DeviceKind::Flex).expect("as written");
+    check_policy(&PaintedCorridor, &read).expect("fits");
+    assert_eq!(policy_observation(&read), Ok(experiment.sight()));
+    let prior = read.skills.as_ref().map(SkillPrior::from);
+    assert_eq!(measure(&read.policy, prior, 2), results, "the file plays another game");
+
+    let error = check_policy(&Corridor, &read).expect_err("cannot be drawn");
+    assert!(matches!(error, PolicyMisfit::Vision { error: VisionError::NoPicture { .. }, .. }), "{error}");
+}
+
+#[test]
+fn pictures_show_enough_to_learn_the_corridor() {
+    let mut experiment = experiment();
+    experiment.algorithm = Algorithm::Ppo;
+    experiment.image.stack = 1;
+    experiment.steps = 8192;
+    let mut trainer = Trainer::new(&PaintedCorridor, &experiment, None, DeviceKind::Flex, 2).expect("fits");
+    let mut last = None;
+    while !trainer.is_done() {
+        last = trainer.update().expect("learns").success_rate;
+    }
+    assert!(last.expect("episodes ended") > 0.9, "success rate {last:?}; a random walker has about 0.3");
+}
+
+#[test]
+fn stopping_and_threads_change_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    record(folder.path());
+    let skills = skills(folder.path());
+    for algorithm in [Algorithm::ScorePpo, Algorithm::Ppo] {
+        let run = |name: &str| folder.path().join(format!("{algorithm}-{name}"));
+        let (one, two, halved) = (run("1"), run("2"), run("halved"));
+        train(&one, trainer(algorithm, &skills, 1), None);
+        train(&two, trainer(algorithm, &skills, 2), None);
+        assert!(bytes(&one) == bytes(&two), "{algorithm}: one thread and two threads differ");
+        train(&halved, trainer(algorithm, &skills, 2), Some(3));
+        let (run, experiment, _) = RunDir::open(&halved).expect("readable");
+        let resumed = run.resume(&PaintedCorridor, &experiment, DeviceKind::Flex, 2).expect("a checkpoint");
+        train(&halved, resumed, None);
+        assert!(bytes(&one) == bytes(&halved), "{algorithm}: stopping in the middle changed the result");
+    }
+}

@@ -1,0 +1,6 @@
+//! Learning from pictures, from recordings to policy files.
+
+mod corridor;
+mod eyes;
+mod learning;
+mod recordings;

@@ -1,0 +1,79 @@
+//! An eye over the origin, and what it sees as text.
+
+use bevy::{
+    ecs::schedule::{LogLevel, ScheduleBuildSettings},
+    prelude::*,
+};
+use bevy_playbot::{
+    headless::into_world,
+    raster::{RasterPlugin, RasterSensor},
+    vision::{Frame, ImageOptions},
+};
+use playbot_lab::prelude::*;
+use playbot_tests::scene::{image, pixel};
+
+pub const RED: [u8; 4] = [255, 0, 0, 255];
+
+pub const GREEN: [u8; 4] = [0, 255, 0, 255];
+
+pub const BLUE: [u8; 4] = [0, 0, 255, 255];
+
+pub const WHITE: [u8; 4] = [255; 4];
+
+/// Systems that observe must not be in an ambiguous order.
+pub fn raster_world() -> World {
+    let mut app = headless_app();
+    app.edit_schedule(ObserveSchedule, |schedule| {
+        schedule.set_build_settings(ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() });
+    });
+    app.add_plugins(RasterPlugin);
+    into_world(app)
+}
+
+pub fn spawn_eye(world: &mut World, target: Entity, width: f32, size: [u32; 2]) -> Entity {
+    let options = ImageOptions { width: size[0], height: size[1], ..default() };
+    let sensor = RasterSensor::following(target, width, options);
+    world.spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, sensor)).id()
+}
+
+/// A World with an eye over the origin that sees a unit in each pixel.
+pub fn looking(size: [u32; 2]) -> (World, Entity) {
+    let mut world = raster_world();
+    let target = world.spawn(Transform::default()).id();
+    let eye = spawn_eye(&mut world, target, size[0] as f32, size);
+    (world, eye)
+}
+
+pub fn add(world: &mut World, width: u32, texels: &[[u8; 4]]) -> Handle<Image> {
+    world.resource_mut::<Assets<Image>>().add(image(width, texels))
+}
+
+/// A sprite with red and green above, blue and white below, one unit for each.
+pub fn four(world: &mut World) -> Sprite {
+    Sprite::from_image(add(world, 2, &[RED, GREEN, BLUE, WHITE]))
+}
+
+/// The picture as text: a letter for each pixel, `.` for black and `?` for what is none of the colours.
+pub fn text(world: &mut World, eye: Entity) -> String {
+    world.tick().expect("sound");
+    let options = world.get::<bevy_playbot::vision::ImageSensor>(eye).expect("a sensor").0;
+    let letter = |pixel: [u8; 3]| match pixel {
+        [255, 0, 0] => 'R',
+        [0, 255, 0] => 'G',
+        [0, 0, 255] => 'B',
+        [255, 255, 255] => 'W',
+        [0, 0, 0] => '.',
+        _ => '?',
+    };
+    let row = |y| (0..options.width).map(|x| letter(pixel(world, eye, x, y))).collect::<String>();
+    (0..options.height).map(row).collect::<Vec<_>>().join("/")
+}
+
+pub fn frame(world: &mut World, eye: Entity) -> Vec<[u8; 4]> {
+    world.tick().expect("sound");
+    world.get::<Frame>(eye).expect("an eye").pixels.clone()
+}
+
+pub fn fault(world: &mut World) -> String {
+    world.tick().expect_err("it cannot be drawn").to_string()
+}

@@ -1,0 +1,7 @@
+//! Exact pixels of a raster sensor.
+
+mod eye;
+mod faults;
+mod pixels;
+mod sprites;
+mod stages;
