@@ -36,11 +36,6 @@ impl Action {
     }
 }
 
-/// Whether nothing can be done in this space.
-pub fn has_no_actions(space: &ActionSpace) -> bool {
-    matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
-}
-
 /// Gives every agent an action.
 pub(crate) fn plugin(app: &mut App) {
     app.register_required_components::<Agent, Action>().register_type::<Action>();

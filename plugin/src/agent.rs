@@ -3,9 +3,7 @@
 use bevy::prelude::*;
 use playbot_learner::ActionSpace;
 
-use crate::{
-    action::has_no_actions, control::Control, fault::Faults, level::LevelQueue, reward::Reward, state_hash::StateHash,
-};
+use crate::{control::Control, fault::Faults, level::LevelQueue, reward::Reward, state_hash::StateHash};
 
 /// An entity that acts in the game.
 ///
@@ -45,12 +43,18 @@ impl AgentOrder {
 }
 
 /// Most agents that the World of a game can hold.
-#[derive(Resource, Clone, Copy, Debug)]
+#[derive(Resource, Clone, Copy, Debug, Reflect)]
+#[reflect(Resource)]
 pub struct AgentLimit {
     /// Name of the game.
     pub game: &'static str,
     /// The number.
     pub most: u32,
+}
+
+/// Whether nothing can be done in this space.
+pub fn has_no_actions(space: &ActionSpace) -> bool {
+    matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
 }
 
 /// Reports agents that cannot do anything, and more of them than the game bears, and stops those.
@@ -61,7 +65,7 @@ pub(crate) fn check_agents(
 ) {
     if let Some(limit) = limit.filter(|limit| agents.iter().len() > limit.most as usize) {
         faults.report(format!(
-            "a World of the game `{}` has room for {} agent{}, since they would share its player and its resources, but it              has {}: build more Worlds",
+            "a World of the game `{}` has room for {} agent{}, since they would share its player and its resources, but it has {}: build more Worlds",
             limit.game,
             limit.most,
             if limit.most == 1 { "" } else { "s" },

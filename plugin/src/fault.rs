@@ -30,7 +30,7 @@ pub struct Fault(pub String);
 /// struct Heard(Vec<String>);
 ///
 /// let mut app = App::new();
-/// app.add_plugins((TimePlugin, PlaybotPlugin))
+/// app.add_plugins((TimePlugin, PlaybotPlugin::default()))
 ///     .init_resource::<Heard>()
 ///     .add_observer(|event: On<FaultOccurred>, mut heard: ResMut<Heard>| heard.0.push(event.fault.to_string()))
 ///     .add_systems(Update, |mut faults: ResMut<Faults>| faults.report("agent 0: something is wrong".into()));

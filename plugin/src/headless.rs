@@ -96,21 +96,22 @@ pub fn into_world(mut app: App) -> World {
 /// The first breach of contract of the game in this tick: see [`Faults`]. A panic, in Worlds with
 /// [`PanicReports`](crate::panics::PanicReports).
 pub fn tick_world(world: &mut World) -> Result<(), Fault> {
-    panics::guard(world, run_frames)
+    if let Some(mut faults) = world.get_resource_mut::<Faults>() {
+        faults.set_caller(true);
+    }
+    let ticked = panics::guard(world, run_frames);
+    // A World that has panicked may have lost anything.
+    if let Some(mut faults) = world.get_resource_mut::<Faults>() {
+        faults.set_caller(false);
+    }
+    ticked
 }
 
 /// Frames of a level that is being made ready in which the clock is not waited for.
 const QUICK_FRAMES: u32 = 60;
 
-/// Runs frames up to and with the next tick; faults are for the caller, not for the log.
+/// Runs frames up to and with the next tick.
 fn run_frames(world: &mut World) -> Result<(), Fault> {
-    world.resource_mut::<Faults>().set_caller(true);
-    let done = run_to_next_tick(world);
-    world.resource_mut::<Faults>().set_caller(false);
-    done
-}
-
-fn run_to_next_tick(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
     system_errors::clear();
     for frame in 1.. {

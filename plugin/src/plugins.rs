@@ -4,9 +4,10 @@ use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use crate::{
     keyboard::KeyboardPlugin,
+    placement::TickPlacement,
     plugin::PlaybotPlugin,
     takeover::{GameIdentity, TakeoverPlugin},
-    virtual_input::VirtualInputPlugin,
+    virtual_input::{InputRoute, VirtualInputPlugin},
 };
 
 /// Everything that a game with agents needs at run time:
@@ -33,25 +34,35 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct PlaybotPlugins {
     game: GameIdentity,
+    placement: TickPlacement,
 }
 
 impl PlaybotPlugins {
     /// For a game of this name, at this version of its rules: see [`GameIdentity`].
     pub fn new(name: &str, version: u32) -> Self {
-        Self { game: GameIdentity::new(name, version) }
+        Self { game: GameIdentity::new(name, version), placement: TickPlacement::Fixed }
     }
 
     /// For a mode of the game.
     pub fn with_mode(self, mode: &str) -> Self {
-        Self { game: self.game.with_mode(mode) }
+        Self { game: self.game.with_mode(mode), ..self }
+    }
+
+    /// For a game whose ticks are whole frames: virtual input then goes by messages.
+    pub fn in_frames(self) -> Self {
+        Self { placement: TickPlacement::Frame, ..self }
     }
 }
 
 impl PluginGroup for PlaybotPlugins {
     fn build(self) -> PluginGroupBuilder {
+        let route = match self.placement {
+            TickPlacement::Fixed => InputRoute::Direct,
+            TickPlacement::Frame => InputRoute::Messages,
+        };
         PluginGroupBuilder::start::<Self>()
-            .add(PlaybotPlugin::default())
-            .add(VirtualInputPlugin::default())
+            .add(PlaybotPlugin { placement: self.placement })
+            .add(VirtualInputPlugin { route })
             .add(KeyboardPlugin)
             .add(TakeoverPlugin::new(self.game))
     }

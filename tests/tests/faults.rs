@@ -23,7 +23,7 @@ fn listen(app: &mut App) {
 #[test]
 fn an_app_that_runs_by_itself_hears_every_fault_in_its_frame() {
     let mut app = App::new();
-    app.add_plugins((TimePlugin, PlaybotPlugin)).add_plugins(corridor_plugin);
+    app.add_plugins((TimePlugin, PlaybotPlugin::default())).add_plugins(corridor_plugin);
     let step = set_fixed_step(&mut app, 10.0);
     app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
     listen(&mut app);
@@ -60,7 +60,7 @@ fn the_first_of_several_faults_is_the_one_that_is_returned() {
     });
     assert_eq!(app.tick().expect_err("two").to_string(), "the cause");
     let mut app = App::new();
-    app.add_plugins((TimePlugin, PlaybotPlugin));
+    app.add_plugins((TimePlugin, PlaybotPlugin::default()));
     listen(&mut app);
     let mut faults = app.world_mut().resource_mut::<Faults>();
     faults.report("the cause".into());

@@ -26,7 +26,7 @@ struct Heard(Vec<String>);
 /// A build of the corridor in which somebody holds the key that goes right.
 fn build(plugin: TakeoverPlugin) -> (App, Entity) {
     let mut app = App::new();
-    app.add_plugins((TimePlugin, InputPlugin, PlaybotPlugin, plugin))
+    app.add_plugins((TimePlugin, InputPlugin, PlaybotPlugin::default(), plugin))
         .add_plugins(corridor_plugin)
         .init_resource::<Heard>()
         .add_observer(|event: On<FaultOccurred>, mut heard: ResMut<Heard>| heard.0.push(event.fault.to_string()));

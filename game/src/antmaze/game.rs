@@ -4,7 +4,13 @@ use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{ObservationKind, Picture};
-use playbot_lab::{floor_plan::FloorPlan, mode::ModeError, prelude::*};
+use playbot_lab::{
+    benchmark::Benchmark,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView},
+    mode::ModeError,
+    prelude::*,
+};
 
 use super::{
     components::{MazeAnt, PlaysIn},

@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     maze::{
-        Map, Maze,
+        Map, Maze, MazeModeError,
         show_level::{self, MazeSource, unfit},
     },
     sighted::Sighted,

@@ -9,7 +9,8 @@ use crate::{
     mode::ModeError,
 };
 use bevy_playbot::{
-    action::{ActionSpace, has_no_actions},
+    action::ActionSpace,
+    agent::has_no_actions,
     bot::BlindBot,
     demo::{file::DemoHeader, recorder::demo_actions},
     headless_plugins::HeadlessPlugins,

@@ -75,7 +75,7 @@ enum Running {
     Nothing,
     Recording,
     Policy(Vec<Seat>),
-    Replay(Playing),
+    Replay(Box<Playing>),
 }
 
 impl Takeover {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bevy::prelude::*;
+use bevy::{prelude::*, time::TimeUpdateStrategy};
 
 use super::{error::TakeoverError, identity::GameIdentity, seats::playing_agents};
 use crate::{
@@ -11,6 +11,7 @@ use crate::{
         file::{DemoHeader, DemoWriter},
         recorder::{Recorder, Recording, demo_actions, flush_unfinished},
     },
+    placement::{TickPlacement, TickSchedules},
 };
 
 /// Who plays, if the environment does not say.
@@ -54,6 +55,10 @@ pub(super) fn stop(world: &mut World) -> Result<(), TakeoverError> {
 
 /// Ticks per second of game time. A step has whole nanoseconds, so that its inverse is not quite what was asked for.
 fn tick_hz(world: &World) -> f64 {
-    let step = world.get_resource::<Time<Fixed>>().map_or(1.0 / 60.0, |time| time.timestep().as_secs_f64());
+    let is_frame = world.get_resource::<TickSchedules>().is_some_and(|ticks| ticks.placement == TickPlacement::Frame);
+    let step = match world.get_resource::<TimeUpdateStrategy>() {
+        Some(TimeUpdateStrategy::ManualDuration(frame)) if is_frame => frame.as_secs_f64(),
+        _ => world.get_resource::<Time<Fixed>>().map_or(1.0 / 60.0, |time| time.timestep().as_secs_f64()),
+    };
     (1000.0 / step).round() / 1000.0
 }

@@ -16,6 +16,7 @@ use crate::{
     control::Control,
     episode::{Episode, EpisodeEnded, StartEpisode},
     fault::Faults,
+    placement::is_tick,
     systems::PlaybotSystems,
 };
 
@@ -122,7 +123,7 @@ impl<A> Default for LeafwingActionsPlugin<A> {
 impl<A: Actionlike> Plugin for LeafwingActionsPlugin<A> {
     fn build(&self, app: &mut App) {
         match self.route {
-            InputRoute::Messages => app.add_systems(PreUpdate, drive::<A>.in_set(InputManagerSystem::ManualControl)),
+            InputRoute::Messages => app.add_systems(PreUpdate, drive::<A>.in_set(InputManagerSystem::ManualControl).run_if(is_tick)),
             InputRoute::Direct => app.add_systems(FixedPreUpdate, drive::<A>.in_set(PlaybotSystems::Act)),
         };
         app.add_observer(|event: On<StartEpisode>, agents: Agents<A>, states: States<A>| {
@@ -192,14 +193,12 @@ fn apply<A: Actionlike>(drives: &[(A, Drive)], value: &ActionValue, state: &mut 
     for (action, drive) in drives {
         match (drive, action.input_control_kind()) {
             (Drive::On(on), InputControlKind::Button) => {
-                if matches!(value, ActionValue::Discrete(index) if on.contains(index)) && !pressed.contains(action) {
-                    pressed.push(action.clone());
-                }
+                let is_on = matches!(value, ActionValue::Discrete(index) if on.contains(index));
+                pressed.extend((is_on && !pressed.contains(action)).then(|| action.clone()));
             }
             (Drive::Above(index, threshold), InputControlKind::Button) => {
-                if number(index) > *threshold && !pressed.contains(action) {
-                    pressed.push(action.clone());
-                }
+                let is_on = number(index) > *threshold;
+                pressed.extend((is_on && !pressed.contains(action)).then(|| action.clone()));
             }
             (Drive::Value(index), InputControlKind::Axis) => state.set_value(action, number(index)),
             (Drive::Pair(x, y), InputControlKind::DualAxis) => {

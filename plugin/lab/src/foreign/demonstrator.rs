@@ -30,7 +30,7 @@ pub(super) fn decide(world: &mut World) {
     });
     let Some(planned) = planned else { return };
     let mut entity = world.entity_mut(agent);
-    let Some(space) = entity.get::<Agent>().map(|agent| agent.actions.clone()) else { return };
+    let Some(space) = entity.get::<Agent>().map(|agent| agent.actions) else { return };
     let Some(mut streams) = entity.get_mut::<AgentStreams>() else { return };
     let rng = &mut streams.action;
     let chosen = match planned {

@@ -10,7 +10,8 @@ use super::{
 };
 use crate::game::Game;
 use bevy_playbot::{
-    action::{ActionSpace, ActionValue, has_no_actions},
+    action::{ActionSpace, ActionValue},
+    agent::has_no_actions,
     agent::Agent,
     episode::EpisodeEnd,
     headless_plugins::HeadlessPlugins,

@@ -21,7 +21,7 @@ pub(super) struct Input {
 impl Input {
     pub(super) fn space(&self) -> ActionSpace {
         let pressed = || self.pressed.as_ref().map(VirtualInput::space);
-        self.space.clone().or_else(pressed).unwrap_or(ActionSpace::Discrete(0))
+        self.space.or_else(pressed).unwrap_or(ActionSpace::Discrete(0))
     }
 
     /// Names as given, or those of the keys.
