@@ -5,10 +5,7 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    demo::{
-        file::{DemoEnd, DemoHeader, DemoReader, DemoWriter},
-        recorder::demo_actions,
-    },
+    demo::file::{DemoEnd, DemoReader, DemoWriter},
     test_app::{PlaybotTestExt, test_app},
     vision::ObservationConfig,
 };

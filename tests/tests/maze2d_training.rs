@@ -2,14 +2,7 @@
 
 use std::path::Path;
 
-use bevy_playbot::{
-    demo::{
-        file::{DemoHeader, DemoWriter},
-        recorder::demo_actions,
-    },
-    policy::ActionDraw,
-    vision::ObservationConfig,
-};
+use bevy_playbot::{demo::file::DemoWriter, policy::ActionDraw, vision::ObservationConfig};
 use playbot_games::maze2d::Maze2d;
 use playbot_lab::prelude::*;
 use playbot_lab::{

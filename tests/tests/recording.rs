@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
         file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
-        recorder::{demo_actions, flush_unfinished},
+        recorder::flush_unfinished,
     },
     vision::ObservationConfig,
 };

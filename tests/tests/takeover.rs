@@ -17,7 +17,7 @@ use bevy_playbot::{
     prelude::*,
     takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest},
 };
-use playbot_learner::{DeviceKind, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner};
+use playbot_learner::{DeviceKind, Learner as _, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner};
 use playbot_tests::{Cell, Drift, corridor_plugin, spawn_walker};
 
 #[derive(Resource, Default)]

@@ -2,14 +2,7 @@
 
 use std::path::Path;
 
-use bevy_playbot::{
-    bot::BlindBot,
-    demo::{
-        file::{DemoHeader, DemoWriter},
-        recorder::demo_actions,
-    },
-    vision::ObservationConfig,
-};
+use bevy_playbot::{bot::BlindBot, demo::file::DemoWriter, vision::ObservationConfig};
 use playbot_games::coinrun::CoinRun;
 use playbot_lab::prelude::*;
 use playbot_lab::{

@@ -9,7 +9,9 @@ use thiserror::Error;
 
 pub use bevy_playbot::episode::EpisodeResult;
 
-use crate::{arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world};
+use crate::{
+    arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world,
+};
 use bevy_playbot::{
     agent::Agent,
     bot::BlindBot,

@@ -148,9 +148,8 @@ fn start(world: &mut World) {
     let started = match &request {
         TakeoverRequest::Record(path) => record::start(world, path).map(|()| Running::Recording),
         TakeoverRequest::Policy(path) => play_policy::start(world, path).map(Running::Policy),
-        TakeoverRequest::Replay(path) => {
-            play_replay::start(world, path).map(|playing| playing.map_or(Running::Nothing, Running::Replay))
-        }
+        TakeoverRequest::Replay(path) => play_replay::start(world, path)
+            .map(|playing| playing.map_or(Running::Nothing, |playing| Running::Replay(Box::new(playing)))),
     };
     match started {
         Ok(running) => {

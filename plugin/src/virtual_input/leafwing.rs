@@ -123,7 +123,9 @@ impl<A> Default for LeafwingActionsPlugin<A> {
 impl<A: Actionlike> Plugin for LeafwingActionsPlugin<A> {
     fn build(&self, app: &mut App) {
         match self.route {
-            InputRoute::Messages => app.add_systems(PreUpdate, drive::<A>.in_set(InputManagerSystem::ManualControl).run_if(is_tick)),
+            InputRoute::Messages => {
+                app.add_systems(PreUpdate, drive::<A>.in_set(InputManagerSystem::ManualControl).run_if(is_tick))
+            }
             InputRoute::Direct => app.add_systems(FixedPreUpdate, drive::<A>.in_set(PlaybotSystems::Act)),
         };
         app.add_observer(|event: On<StartEpisode>, agents: Agents<A>, states: States<A>| {

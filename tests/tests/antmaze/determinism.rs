@@ -4,10 +4,7 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    demo::{
-        file::{DemoHeader, DemoReader, DemoWriter},
-        recorder::demo_actions,
-    },
+    demo::file::{DemoReader, DemoWriter},
     test_app::PlaybotTestExt,
 };
 use playbot_games::antmaze::AntMaze;

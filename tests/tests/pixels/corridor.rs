@@ -2,21 +2,14 @@
 
 use std::path::Path;
 
-use bevy_playbot::{
-    bot::BlindBot,
-    demo::{
-        file::{DemoHeader, DemoWriter},
-        recorder::demo_actions,
-    },
-    vision::ObservationConfig,
-};
+use bevy_playbot::{bot::BlindBot, demo::file::DemoWriter, vision::ObservationConfig};
 use playbot_lab::{
     demo::dataset::Demonstrations,
     prelude::*,
     train::{Experiment, config_file::parse_experiment},
     worlds::build_world,
 };
-use playbot_learner::{DeviceKind, Policy, PolicySpec, PpoLearner, SkillModel, SkillTrainer};
+use playbot_learner::{DeviceKind, Learner as _, Policy, PolicySpec, PpoLearner, SkillModel, SkillTrainer};
 use playbot_tests::{Corridor, PaintedCorridor};
 
 const EXPERIMENT: &str = r#"(

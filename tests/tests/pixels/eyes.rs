@@ -6,7 +6,7 @@ use playbot_lab::{
     train::{Experiment, Trainer, collect::Collector, trainer::TrainError},
     worlds::build_observing_world,
 };
-use playbot_learner::{DeviceKind, ObsKind, Observations, Policy, PolicySpec, PpoLearner};
+use playbot_learner::{DeviceKind, Learner as _, ObsKind, Observations, PolicySpec, PpoLearner};
 use playbot_tests::{Corridor, PaintedCorridor};
 
 use crate::corridor::{experiment, record, skills, untrained};
@@ -58,7 +58,7 @@ fn eyes_that_do_not_fit_are_refused_with_a_way_out() {
         (|e| e.image.paint_velocity = true, "with painted velocity"),
     ] {
         let error = refuse(change, &PaintedCorridor);
-        assert!(matches!(error, TrainError::SkillSight { .. }), "{error}");
+        assert!(matches!(error, TrainError::SkillObservation { .. }), "{error}");
         let text = error.to_string();
         assert!(text.contains(words) && text.contains("playbot learn-skills"), "{text}");
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
     policy_file::{PolicyMisfit, policy_observation},
     vision::VisionError,
@@ -80,12 +81,12 @@ fn what_is_learned_from_pictures_survives_its_files() {
     let file = policy_file(&PaintedCorridor, &experiment.sight(), learner.policy(), learner.skills(), about);
     export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");
     let read = PolicyFile::load(&path, DeviceKind::Flex).expect("as written");
-    check_policy(&PaintedCorridor, &read).expect("fits");
+    check_policy(&PaintedCorridor.card(), &read).expect("fits");
     assert_eq!(policy_observation(&read), Ok(experiment.sight()));
     let prior = read.skills.as_ref().map(SkillPrior::from);
     assert_eq!(measure(&read.policy, prior, 2), results, "the file plays another game");
 
-    let error = check_policy(&Corridor, &read).expect_err("cannot be drawn");
+    let error = check_policy(&Corridor.card(), &read).expect_err("cannot be drawn");
     assert!(matches!(error, PolicyMisfit::Vision { error: VisionError::NoPicture { .. }, .. }), "{error}");
 }
 

@@ -1,7 +1,6 @@
 //! Recordings are replayed before eyes.
 
 use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
-use playbot_lab::prelude::*;
 use playbot_tests::PaintedCorridor;
 
 use crate::corridor::{demonstrations, experiment, record};

@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use bevy_playbot::{
-    demo::{
-        file::{DemoHeader, DemoSummary},
-    },
+    demo::file::{DemoHeader, DemoSummary},
     vision::ObservationConfig,
 };
 use playbot_lab::games::Games;

@@ -11,8 +11,8 @@ use super::{
 use crate::game::Game;
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
-    agent::has_no_actions,
     agent::Agent,
+    agent::has_no_actions,
     episode::EpisodeEnd,
     headless_plugins::HeadlessPlugins,
     key_bindings::KeyBindings,
