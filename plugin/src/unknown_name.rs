@@ -38,6 +38,9 @@ impl UnknownName {
 
 /// The candidate most like `name`, if one is like it at all.
 pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    if let Some(same) = candidates.iter().find(|candidate| candidate.eq_ignore_ascii_case(name)) {
+        return Some(same);
+    }
     candidates
         .iter()
         .map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate))

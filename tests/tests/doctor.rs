@@ -18,9 +18,9 @@ fn examined(game: &dyn Game, ticks: u32, ignored: &[&str]) -> DoctorReport {
 
 /// The only finding in a copy with this fault.
 fn finding(fault: Fault) -> (Finding, DoctorReport) {
-    let mut report = examined(&fault, 60, &[]);
+    let report = examined(&fault, 60, &[]);
     assert_eq!(report.findings.len(), 1, "{fault:?}:\n{report}");
-    (report.findings.remove(0), report)
+    (report.findings[0].clone(), report)
 }
 
 /// The only finding, which must be a difference of this kind of thing in this comparison.

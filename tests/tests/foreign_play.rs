@@ -187,15 +187,16 @@ fn training_that_was_killed_in_the_middle_of_episodes_goes_on_bit_for_bit() {
 
 #[test]
 fn a_game_with_hidden_state_says_at_resume_what_it_may_be() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path().join("run");
     // Where the apple is depends on how often the game was begun in this World.
     fn hang(mut begun: Local<u32>, mut apple: Single<&mut Transform, With<Apple>>) {
         *begun += 1;
         apple.translation.x = (*begun % 9) as f32;
     }
     let forgetful = catch_game().level(hang);
-    train(folder.path(), fresh(&forgetful, 1), Some(3));
-    let (run, experiment, _) = RunDir::open(folder.path()).expect("readable");
+    train(&folder, fresh(&forgetful, 1), Some(3));
+    let (run, experiment, _) = RunDir::open(&folder).expect("readable");
     let error = run.resume(&forgetful, &experiment, DeviceKind::Flex, 1).err().expect("the apple hangs elsewhere");
     let text = error.to_string();
     for part in ["did not replay", "resources that a restart does not reset", "`Local`", "playbot doctor"] {

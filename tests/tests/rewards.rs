@@ -1,5 +1,7 @@
 //! Rewards are counted once, whenever they are paid.
 
+use std::time::Duration;
+
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_playbot::{headless::set_fixed_step, prelude::*, test_app::test_app};
 
@@ -56,7 +58,7 @@ fn a_reward_paid_in_update_counts_in_the_next_tick() {
 fn every_payment_between_two_ticks_is_kept() {
     let (mut app, _) = app();
     let step = set_fixed_step(&mut app, 60.0);
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(step / 4));
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(step / 4 + Duration::from_nanos(1)));
     app.add_systems(Update, |mut rewards: Query<&mut Reward>, mut frames: Local<u32>| {
         *frames += 1;
         // The first frame starts the clock; the tick is in the fifth.

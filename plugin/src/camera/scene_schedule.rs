@@ -13,6 +13,7 @@ use bevy::{
     render::{RenderPlugin, extract_plugin::ExtractPlugin, settings::RenderCreation},
     sprite::SpritePlugin,
     sprite_render::SpriteRenderPlugin,
+    text::TextPlugin,
     transform::TransformPlugin,
     window::{ExitCondition, WindowPlugin},
 };
@@ -32,6 +33,8 @@ pub(super) fn add_renderer(app: &mut App, render_creation: RenderCreation) {
     add(app, MeshPlugin);
     add(app, CameraPlugin);
     add(app, CorePipelinePlugin);
+    // Sprites bring systems for text along, which need it.
+    add(app, TextPlugin);
     add(app, SpritePlugin);
     add(app, SpriteRenderPlugin);
     add(app, TileLayerPlugin);

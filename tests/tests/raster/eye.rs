@@ -33,7 +33,8 @@ pub fn raster_world() -> World {
 pub fn spawn_eye(world: &mut World, target: Entity, width: f32, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
     let sensor = RasterSensor::following(target, width, options);
-    world.spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, sensor)).id()
+    let index = world.query::<&Agent>().iter(world).len() as u32;
+    world.spawn((Agent::new(index, ActionSpace::Discrete(2)), Control::Human, sensor)).id()
 }
 
 /// A World with an eye over the origin that sees a unit in each pixel.

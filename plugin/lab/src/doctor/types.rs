@@ -10,6 +10,10 @@ use bevy::{
     prelude::{ReflectComponent, World},
     reflect::{TypeInfo, TypeRegistration},
 };
+use bevy_playbot::{
+    agent::AgentLimit,
+    panics::{EpisodeTrace, PanicReports},
+};
 use serde::Serialize;
 
 use super::{cause::CauseKind, game_copy::GameCopy, scope};
@@ -63,8 +67,10 @@ pub(super) struct TypeBook {
 impl TypeBook {
     /// Starts with a World without a game, in which only the engine's and the plugin's types are.
     pub fn new(bare: &World) -> Self {
-        let bare = bare.components().iter_registered().filter_map(ComponentInfo::type_id).collect();
-        Self { known: BTreeMap::new(), bare }
+        let engine = bare.components().iter_registered().filter_map(ComponentInfo::type_id);
+        // What the lab adds to every World.
+        let ours = [TypeId::of::<AgentLimit>(), TypeId::of::<EpisodeTrace>(), TypeId::of::<PanicReports>()];
+        Self { known: BTreeMap::new(), bare: engine.chain(ours).collect() }
     }
 
     /// Looks at types that are new in a World.

@@ -2,8 +2,6 @@
 //!
 //! A level is where the cakes appear. An episode ends when the game is over, or after a minute.
 
-#![allow(clippy::type_complexity, reason = "the example's own")]
-
 include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
 use std::process::ExitCode;

@@ -10,7 +10,7 @@ use leafwing_input_manager::prelude::*;
 use rand::{RngExt, SeedableRng};
 
 /// Columns of a level, the last of which lie behind the flag.
-const COLUMNS: usize = 56;
+const COLUMNS: usize = 76;
 const FLAG_COLUMN: usize = COLUMNS - 12;
 /// Half of the hero's width and height.
 const HERO: Vec2 = Vec2::new(0.35, 0.45);
@@ -124,7 +124,7 @@ fn draw_level(level: u64) -> Vec<Column> {
             2 => ground = (ground + rng.random_range(1..=2)).min(6),
             _ => ground = ground.saturating_sub(rng.random_range(1..=3)).max(1),
         }
-        for _ in 0..rng.random_range(2..=4) {
+        for _ in 0..rng.random_range(5..=7) {
             columns.push(Column { ground, spikes: false, gem: rng.random_bool(0.25) });
         }
     }

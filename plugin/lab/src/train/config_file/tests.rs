@@ -2,9 +2,9 @@ use super::*;
 use crate::train::presets::PRESETS;
 
 const GOOD: &str = r#"(
-game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos/coinrun",
-steps: 1000,
-ppo: (gamma: 0.99),
+    game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "demos/coinrun",
+    steps: 1000,
+    ppo: (gamma: 0.99),
 )"#;
 
 fn good(text: &str) -> Experiment {
