@@ -207,3 +207,8 @@ fn init_tracing(verbose: u8) {
     let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
     format.with_writer(std::io::stderr).init();
 }
+
+/// What the README shows is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
