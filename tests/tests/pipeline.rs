@@ -1,5 +1,7 @@
 //! The whole road as functions: each step works on what the one before has made, and says what it cannot do.
 
+#![allow(clippy::result_large_err, reason = "errors are looked at here, not handed on")]
+
 use std::path::Path;
 
 use bevy::prelude::*;

@@ -104,9 +104,10 @@ pub fn road(experiment: &str, demos: &str, policy: &Path) -> Result<[EvalSummary
 
     let file = pipeline::policy(&Lander, &trainer);
     export_policy(&Lander, &file, &experiment.train, experiment.seed, policy)?;
-    let measure = |name, player| pipeline::evaluate(&Lander, &experiment, name, &player, threads);
-    let learned = measure("SCORE-PPO", Player::of_file(&file, ActionDraw::Sample))?;
-    Ok([learned, measure("random", Player::Blind(BlindBot::Uniform))?])
+    let player = Player::of_file(&file, ActionDraw::Sample);
+    let learned = pipeline::evaluate(&Lander, &experiment, "SCORE-PPO", &player, threads)?;
+    let random = pipeline::evaluate(&Lander, &experiment, "random", &Player::Blind(BlindBot::Uniform), threads)?;
+    Ok([learned, random])
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
