@@ -13,9 +13,10 @@
 //!   says that nothing was to be had afterwards.
 //! - A [`SkillPrior`](skill_prior::SkillPrior) draws a skill z for each agent every T ticks; a policy decodes it into
 //!   actions together with the observation.
-//! - [`demo`] records who did what, and replays it to the bit. [`train`] learns from recordings and from play, headless,
-//!   over many levels. [`eval`] measures, and [`runs`] reads back and compares what was trained.
+//! - [`demo`] records who did what, and replays it to the bit.
 //! - A [`policy_file`] brings a trained policy into a game that ships with it.
+//!
+//! Training, evaluation and reports are in `playbot_lab`, the command line for any list of games in `playbot_cli`.
 //!
 //! # One tick
 //!
@@ -31,7 +32,7 @@
 //!
 //! ```
 //! use bevy::prelude::*;
-//! use crate::prelude::*;
+//! use bevy_playbot::prelude::*;
 //!
 //! #[derive(Component, Default)]
 //! struct Position(i32);

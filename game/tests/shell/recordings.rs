@@ -84,3 +84,50 @@ fn a_full_disk_is_no_wrong_usage() {
     let output = playbot(folder.path(), &["record", "coinrun", "--levels", "easy:0..0", "--out", "a.demo", "--force"]);
     assert_eq!(code(&output), Some(3), "a folder was named: {}", errors(&output));
 }
+
+#[test]
+fn recordings_of_many_testers_become_one_that_replays() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "ada.demo", &["--levels", "easy:0..1"]);
+    record(folder, "bob.demo", &["--levels", "easy:2..4"]);
+    let merged = playbot(folder, &["demo", "merge", "--out", "new/all.demo", "ada.demo", "bob.demo", "--json"]);
+    assert_eq!(code(&merged), Some(0), "{}", errors(&merged));
+    let report = lines(&merged).remove(0);
+    let counts = [0, 1].map(|index| report["files"][index]["episodes"].as_u64());
+    assert_eq!((report["episodes"].as_u64(), counts), (Some(5), [Some(2), Some(3)]), "{report}");
+    let shown = playbot(folder, &["demo", "show", "new/all.demo", "--json"]);
+    let levels: Vec<_> = lines(&shown).iter().map(|episode| episode["level"].as_u64()).collect();
+    assert_eq!(levels, [0, 1, 2, 3, 4].map(Some), "in the order of the files");
+    let verified = playbot(folder, &["demo", "verify", "new/all.demo"]);
+    assert_eq!(code(&verified), Some(0), "{}", errors(&verified));
+    assert!(
+        said(&verified).contains("5 episodes") && said(&verified).contains("all as recorded"),
+        "{}",
+        said(&verified)
+    );
+
+    let again = playbot(folder, &["demo", "merge", "--out", "new/all.demo", "ada.demo"]);
+    assert_eq!(code(&again), Some(3), "{}", errors(&again));
+    assert!(errors(&again).contains("exists already; nothing was written"), "{}", errors(&again));
+}
+
+#[test]
+fn recordings_that_do_not_belong_together_are_not_merged() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "easy.demo", &["--levels", "easy:0..0"]);
+    record(folder, "hard.demo", &["--levels", "hard:0..0"]);
+    let merge = |files: &[&str]| playbot(folder, &[&["demo", "merge", "--out", "all.demo"], files].concat());
+    for (files, words) in [
+        (&["easy.demo", "hard.demo"][..], "mode `hard`"),
+        (&["easy.demo", "./easy.demo"], "easy.demo"),
+        (&["easy.demo", "nothing.demo"], "nothing.demo"),
+        (&[], "<FILE>"),
+    ] {
+        let output = merge(files);
+        assert_eq!(code(&output), Some(3), "{files:?}: {}", errors(&output));
+        assert!(errors(&output).contains(words), "{files:?}: {}", errors(&output));
+        assert!(!folder.join("all.demo").exists(), "{files:?}: nothing is left");
+    }
+}

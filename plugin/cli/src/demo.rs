@@ -1,4 +1,4 @@
-//! `playbot demo ls|show|verify|repair`.
+//! `playbot demo ls|show|verify|repair|merge`.
 
 use std::{
     collections::BTreeMap,
@@ -11,20 +11,22 @@ use playbot_lab::games::Games;
 use serde_json::json;
 
 use super::{
+    demo_merge::merge,
     error::{CliError, Outcome, print_line},
     experiment::resolve,
     number::counted,
     progress,
 };
 
-/// Look at, check and repair recordings.
+/// Look at, check, repair and join recordings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot demo ls
   playbot demo show demos/coinrun/easy.demo --episode 0
   playbot demo verify demos/coinrun
   playbot demo verify a.demo b.demo --json
-  playbot demo repair torn.demo --out whole.demo")]
+  playbot demo repair torn.demo --out whole.demo
+  playbot demo merge --out all.demo alice.demo bob.demo")]
 pub struct Args {
     #[command(subcommand)]
     verb: Verb,
@@ -72,6 +74,18 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+    /// Join recordings of one game, one version of its rules and one mode into a new one.
+    Merge {
+        /// The recordings, in the order in which their episodes are to stand.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// File to write; it must not exist.
+        #[arg(long)]
+        out: PathBuf,
+        /// Print the result as a line of JSON.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
@@ -80,6 +94,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         Verb::Show { file, episode, json } => show(&file, episode, json),
         Verb::Verify { paths, json } => verify(&paths, json, games),
         Verb::Repair { file, out, json } => mend(&file, out.as_deref().unwrap_or(&file), json),
+        Verb::Merge { files, out, json } => merge(&files, &out, json),
     }
 }
 

@@ -7,6 +7,7 @@ mod tell;
 mod bench;
 mod config;
 mod demo;
+mod demo_merge;
 mod doctor;
 mod error;
 mod eval;
@@ -39,7 +40,7 @@ mod view;
 pub mod window;
 
 use playbot_lab::games::Games;
-use std::{panic::AssertUnwindSafe, process::ExitCode};
+use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
@@ -86,7 +87,7 @@ enum Verb {
     Record(record::Args),
     /// Play in a window, record, and hand over to a policy and back.
     Play(play::Args),
-    /// Look at, check and repair recordings.
+    /// Look at, check, repair and join recordings.
     Demo(demo::Args),
     /// Check that a game plays the same when it is given the same actions, and find what differs.
     Doctor(doctor::Args),
@@ -114,6 +115,25 @@ enum Verb {
     View(view::Args),
     /// Measure speed.
     Bench(bench::Args),
+}
+
+/// Whether the command line can be read: whoever writes commands into documentation asks it. `args` begin with the name of
+/// the program. Nothing is run, and no game is asked whether it has what they name.
+///
+/// # Errors
+///
+/// What is wrong with them, in words.
+#[doc(hidden)]
+pub fn check_usage<Args>(args: Args) -> Result<(), String>
+where
+    Args: IntoIterator<Item: Into<OsString> + Clone>,
+{
+    match Cli::try_parse_from(args) {
+        Ok(_) => Ok(()),
+        // Asking for help is no mistake.
+        Err(error) if !error.use_stderr() => Ok(()),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 /// Runs the command line on the process's arguments, for these games. The first one is meant by verbs that name none.
@@ -187,3 +207,8 @@ fn init_tracing(verbose: u8) {
     let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
     format.with_writer(std::io::stderr).init();
 }
+
+/// What the README shows is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use bevy::prelude::*;
-use playbot_learner::Policy;
+use playbot_learner::{Policy, PolicyFile};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -56,6 +56,11 @@ pub enum EvalError {
 }
 
 impl Player {
+    /// The policy of a file, with its skills.
+    pub fn of_file(file: &PolicyFile, draw: ActionDraw) -> Self {
+        Self::Policy { policy: file.policy.clone(), prior: file.skills.as_ref().map(SkillPrior::from), draw }
+    }
+
     /// Gives a World what the player needs once: networks and the source of skills.
     pub fn install(&self, world: &mut World) {
         if let Self::Policy { policy, prior, draw } = self {

@@ -4,7 +4,7 @@
 //! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
 //! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
 //! - [`doctor`] finds out whether a game plays the same when it is given the same actions, and what differs if not.
-//! - [`pipeline`] goes the whole road with four function calls; [`policy_export`] makes the one file that a game ships with, for
+//! - [`pipeline`] goes the whole road with five functions; [`policy_export`] makes the one file that a game ships with, for
 //!   [`policy_file`](bevy_playbot::policy_file) to load there.
 //!
 //! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.

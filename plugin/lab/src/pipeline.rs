@@ -1,8 +1,8 @@
 //! The whole road as functions, for those who do not go it on the command line: [`record`], [`learn_skills`], [`train`],
-//! [`evaluate`](crate::eval::evaluate), [`policy`].
+//! [`evaluate`], [`policy`].
 //!
 //! ```no_run
-//! use playbot_lab::{pipeline, prelude::*, train::config_file::parse_experiment};
+//! use playbot_lab::{eval::Player, pipeline, prelude::*, train::config_file::parse_experiment};
 //! use playbot_learner::DeviceKind;
 //! # fn road(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
 //! let text = r#"(game: "lander", train: "moon:0..63", test: "moon:64..127", demos: "lander.demo", steps: 100000)"#;
@@ -13,6 +13,9 @@
 //!     println!("{} steps, return {:?}", report.step, report.episodic_return);
 //! })?;
 //! let policy = pipeline::policy(game, &trainer);
+//! let player = Player::of_file(&policy, ActionDraw::Sample);
+//! let measured = pipeline::evaluate(game, &experiment, "score-ppo", &player, 2)?;
+//! println!("{:.0} % success on {}", 100.0 * measured.success, measured.split);
 //! playbot_lab::policy_export::export_policy(game, &policy, &experiment.train, 1, "lander.policy".as_ref())?;
 //! # Ok(())
 //! # }
@@ -30,6 +33,7 @@ use thiserror::Error;
 
 use crate::{
     demo::{dataset::Demonstrations, verify::VerifyError},
+    eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
     policy_export::policy_file,
@@ -65,6 +69,9 @@ pub enum PipelineError {
     /// The training failed.
     #[error(transparent)]
     Train(#[from] TrainError),
+    /// Nothing could be measured.
+    #[error(transparent)]
+    Eval(#[from] EvalError),
 }
 
 /// Records the game's demonstrator on each of these levels into a new file, and returns the number of episodes. `noise` is
@@ -134,6 +141,31 @@ pub fn train(
         after_update(&trainer.update()?);
     }
     Ok(trainer)
+}
+
+/// Measures a player on the experiment's held-out levels, each equally often. `name` is the summary's.
+///
+/// # Errors
+///
+/// There is no such mode, the game broke its contract, or it cannot be seen as the experiment says.
+pub fn evaluate(
+    game: &dyn Game,
+    experiment: &Experiment,
+    name: &str,
+    player: &Player,
+    threads: usize,
+) -> Result<EvalSummary, PipelineError> {
+    experiment.check_test(game)?;
+    let plan = EvalPlan {
+        split: experiment.test.clone(),
+        sight: experiment.sight(),
+        episodes_per_level: experiment.eval.episodes_per_level,
+        seed: experiment.seed,
+        arenas: experiment.arenas,
+        worlds: experiment.worlds,
+        threads,
+    };
+    Ok(summarize(name, &plan.split, &eval::evaluate(game, player, &plan, |_| {})?))
 }
 
 /// What a training has learned so far, as the file that a game ships with:

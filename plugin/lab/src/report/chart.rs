@@ -45,7 +45,7 @@ pub(super) fn is_point(&(x, y): &(f64, f64)) -> bool {
 /// A line chart.
 ///
 /// ```
-/// use crate::report::{Chart, Curve};
+/// use playbot_lab::report::{Chart, Curve};
 ///
 /// let chart = Chart {
 ///     title: "Return on held-out levels".into(),

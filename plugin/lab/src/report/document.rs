@@ -34,7 +34,7 @@ pub struct Section {
 /// A report: one HTML file without scripts and without anything to load, for screens and for paper.
 ///
 /// ```
-/// use crate::report::{Report, Section};
+/// use playbot_lab::report::{Report, Section};
 ///
 /// let report = Report {
 ///     title: "CoinRun, easy".into(),

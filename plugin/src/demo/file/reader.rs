@@ -16,7 +16,7 @@ use super::{payload, preamble};
 /// after the first error it ends.
 ///
 /// ```no_run
-/// # use crate::demo::file::{DemoFileError, DemoReader};
+/// # use bevy_playbot::demo::file::{DemoFileError, DemoReader};
 /// # fn main() -> Result<(), DemoFileError> {
 /// let mut reader = DemoReader::open("demos/coinrun/easy.demo")?;
 /// let game = reader.header().game.clone();

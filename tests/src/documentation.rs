@@ -1,0 +1,13 @@
+//! What the documentation shows in Rust is compiled: these are documentation tests of this package.
+
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/tutorial.md")]
+struct Tutorial;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/recording-in-builds.md")]
+struct RecordingInBuilds;

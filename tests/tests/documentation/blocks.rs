@@ -1,0 +1,108 @@
+//! The documents, and the blocks of code in them.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// The folder of the workspace.
+pub fn workspace() -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    folder.canonicalize().unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
+}
+
+/// A document.
+pub struct Document {
+    /// Its path in the workspace.
+    pub path: String,
+    pub text: String,
+}
+
+/// A block of code.
+#[derive(Debug, PartialEq)]
+pub struct Block {
+    /// Line of the document in which it begins.
+    pub line: usize,
+    /// What stands behind the opening fence.
+    pub language: String,
+    pub text: String,
+}
+
+/// Everything that is written for readers of the repository.
+pub fn documents() -> Vec<Document> {
+    let folders = ["", "demos", "docs", "docs/how-to", "game", "plugin", "plugin/cli", "plugin/lab", "plugin/learner"];
+    let documents: Vec<_> = folders.iter().flat_map(|folder| documents_of(folder)).collect();
+    for path in ["README.md", "CONTRIBUTING.md", "docs/tutorial.md", "docs/how-to/ci.md", "plugin/cli/README.md"] {
+        assert!(documents.iter().any(|document| document.path == path), "{path} is missing");
+    }
+    documents
+}
+
+/// The documents in a folder, but for the list of changes, which tells of what was.
+fn documents_of(folder: &str) -> Vec<Document> {
+    let entries = fs::read_dir(workspace().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
+    let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
+    let mut names: Vec<_> = names.filter(|name| name.ends_with(".md") && name != "CHANGELOG.md").collect();
+    names.sort();
+    let path = |name: &String| if folder.is_empty() { name.clone() } else { format!("{folder}/{name}") };
+    names.iter().map(|name| Document { path: path(name), text: read(&path(name)) }).collect()
+}
+
+/// A file of the workspace.
+pub fn read(path: &str) -> String {
+    fs::read_to_string(workspace().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// The blocks of code of a text.
+pub fn blocks(text: &str) -> Vec<Block> {
+    let mut found = Vec::new();
+    let mut open: Option<Block> = None;
+    for (index, line) in text.lines().enumerate() {
+        match (line.trim_start().strip_prefix("```"), &mut open) {
+            (Some(_), Some(_)) => found.extend(open.take()),
+            (Some(language), None) => {
+                open = Some(Block { line: index + 1, language: language.to_owned(), text: String::new() });
+            }
+            (None, Some(block)) => {
+                block.text.push_str(line);
+                block.text.push('\n');
+            }
+            (None, None) => {}
+        }
+    }
+    assert_eq!(open, None, "a block is not closed");
+    found
+}
+
+#[test]
+fn blocks_are_found_with_their_lines() {
+    let found = blocks("a\n```sh\nb\nc\n```\nd\n```\ne\n```\n");
+    let block = |line, language: &str, text: &str| Block { line, language: language.into(), text: text.into() };
+    assert_eq!(found, [block(2, "sh", "b\nc\n"), block(7, "", "e\n")]);
+}
+
+/// Whatever is shown is checked by somebody: Rust by `cargo test --doc`, the others by the tests beside this one.
+#[test]
+fn every_block_is_of_a_kind_that_is_checked() {
+    let compiled = read("tests/src/documentation.rs");
+    for Document { path, text } in documents() {
+        for Block { line, language, .. } in blocks(&text) {
+            match language.as_str() {
+                "sh" | "ron" => {}
+                "rust" | "rust,no_run" => {
+                    let own = path.strip_suffix("README.md").map(|folder| format!("{folder}src/lib.rs"));
+                    let own = own.filter(|root| workspace().join(root).exists()).map(|root| read(&root));
+                    let is_own = own.is_some_and(|root| root.contains("include_str!(\"../README.md\")"));
+                    let is_compiled = is_own || compiled.contains(&format!("include_str!(\"../../{path}\")"));
+                    assert!(is_compiled, "{path}:{line} is compiled by nobody: add it to tests/src/documentation.rs");
+                }
+                // It is the source of a program that is compiled: see `sources`.
+                "rust,ignore" => {
+                    let before = text.lines().nth(line.saturating_sub(2)).unwrap_or_default();
+                    assert_eq!(before, "<!-- breakout -->", "{path}:{line} is compiled by nobody");
+                }
+                other => panic!("{path}:{line}: nobody checks blocks of `{other}`"),
+            }
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The example `lander` goes the whole road, and what it ships plays in an app of `bevy_playbot` alone.
+
+#[path = "../../plugin/lab/examples/lander.rs"]
+#[allow(dead_code, reason = "its `main` is for those who run the example")]
+mod lander;
+
+use bevy_playbot::{
+    headless::set_tick_rate,
+    policy_file::{PolicyFile, check_policy, install_policy},
+    prelude::*,
+};
+use playbot_lab::game::Game;
+use playbot_learner::DeviceKind;
+
+use lander::lander_rules::rules::{TICK_HZ, add_rules, capsule};
+
+/// As the example's, but small.
+const TINY: &str = r#"(
+    game: "lander", train: "moon:0..7", test: "moon:64..67", steps: 512, arenas: 4, worlds: 2,
+    skills: (window: 5, latent: 2, epochs: 2, batch: 16, hidden: [8, 8], encoder_hidden: 8, gru_hidden: 8),
+    ppo: (num_steps: 64, minibatches: 2, hidden: [8, 8]),
+    score: (horizon: 5), eval: (episodes_per_level: 2),
+)"#;
+
+#[test]
+fn the_lander_goes_the_whole_road() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("lander.policy");
+    let [learned, random] = lander::road(TINY, "moon:128..133", &path).expect("every step works");
+    assert_eq!((learned.episodes, random.episodes), (8, 8));
+    assert!(learned.return_mean.is_finite() && learned.length_mean > 1.0, "{learned:?}");
+
+    let file = PolicyFile::load(&path, DeviceKind::default()).expect("written");
+    check_policy(&lander::Lander.card(), &file).expect("made for this game");
+    let mut app = headless_app();
+    set_tick_rate(&mut app, TICK_HZ);
+    add_rules(&mut app);
+    let agent = app.world_mut().spawn((capsule(0), Control::Policy, LevelQueue::list([64, 65]))).id();
+    install_policy(app.world_mut(), &file, ActionDraw::Sample);
+    for _ in 0..1000 {
+        app.tick().expect("the policy acts as the game allows");
+    }
+    let count = app.world().get::<EpisodeCount>(agent).expect("required by Agent");
+    assert_eq!(count.finished, 2, "both levels are over after 401 ticks at most");
+}
+
+/// The recordings that are learned from are worth it.
+#[test]
+fn the_pilot_lands_softly() {
+    use playbot_lab::{eval::Player, pipeline, train::config_file::parse_experiment};
+    let experiment = parse_experiment(lander::EXPERIMENT, "lander.ron".as_ref()).expect("valid");
+    let measured = pipeline::evaluate(&lander::Lander, &experiment, "pilot", &Player::Demonstrator, 2);
+    let measured = measured.expect("the pilot can fly");
+    assert!(measured.success > 0.9, "{measured:?}");
+}

@@ -1,0 +1,140 @@
+//! The whole road as functions: each step works on what the one before has made, and says what it cannot do.
+
+#![allow(clippy::result_large_err, reason = "errors are looked at here, not handed on")]
+
+use std::path::Path;
+
+use bevy::prelude::*;
+use bevy_playbot::demo::file::{DemoFault, DemoReader};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    eval::Player,
+    pipeline::{self, PipelineError},
+    train::{Algorithm, Experiment, config_file::parse_experiment},
+};
+use playbot_learner::{DeviceKind, PolicyFile};
+use playbot_tests::{Corridor, corridor_plugin, spawn_walker};
+
+const EXPERIMENT: &str = r#"(
+    game: "corridor", train: "plain:0..7", test: "plain:8..15",
+    steps: 512, arenas: 4, worlds: 2,
+    skills: (window: 2, epochs: 4, batch: 8, hidden: [8, 8], encoder_hidden: 8, gru_hidden: 8, latent: 2, lr: 0.003),
+    ppo: (num_steps: 32, minibatches: 2, hidden: [8, 8], lr: 0.003),
+    score: (horizon: 2),
+)"#;
+
+/// The corridor with somebody who shows the way to the exit.
+struct Shown;
+
+impl Game for Shown {
+    fn name(&self) -> &'static str {
+        Corridor.name()
+    }
+    fn version(&self) -> u32 {
+        Corridor.version()
+    }
+    fn modes(&self) -> &'static [&'static str] {
+        Corridor.modes()
+    }
+    fn tick_hz(&self) -> f64 {
+        Corridor.tick_hz()
+    }
+    fn actions(&self) -> ActionSpace {
+        Corridor.actions()
+    }
+    fn observation(&self) -> ObservationSpace {
+        Corridor.observation()
+    }
+    fn build(&self, app: &mut App, _mode: &str) {
+        corridor_plugin(app);
+    }
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        spawn_walker(world, index)
+    }
+    fn demonstrator(&self) -> Option<&'static str> {
+        Some("right")
+    }
+    fn arm_demonstrator(&self, world: &mut World, agent: Entity, _noise: f64) {
+        world.entity_mut(agent).insert(BlindBot::Constant(ActionValue::Discrete(1)));
+    }
+}
+
+fn levels(text: &str) -> LevelSplit {
+    text.parse().expect("a split")
+}
+
+fn experiment(demos: &Path) -> Experiment {
+    let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
+    Experiment { demos: Some(demos.to_owned()), ..experiment }
+}
+
+#[test]
+fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let demos = folder.path().join("right.demo");
+    let episodes = pipeline::record(&Shown, &levels("plain:16..35"), 0.1, &demos).expect("recorded");
+    let reader = DemoReader::open(&demos).expect("a recording");
+    assert_eq!((episodes, reader.header().demonstrator.as_str(), reader.header().action_noise), (20, "right", 0.1));
+    let recorded: Vec<u64> = reader.map(|episode| episode.expect("whole").level_seed).collect();
+    assert_eq!(recorded, (16..=35).collect::<Vec<u64>>());
+
+    let experiment = experiment(&demos);
+    let skills = pipeline::learn_skills(&Shown, &experiment, DeviceKind::Flex, 2).expect("learned");
+    let mut steps = Vec::new();
+    let trainer = pipeline::train(&Shown, &experiment, Some(&skills), DeviceKind::Flex, 2, |report| {
+        steps.push(report.step);
+    });
+    let trainer = trainer.expect("trained");
+    assert_eq!((trainer.is_done(), steps), (true, vec![128, 256, 384, 512]), "one report for each update");
+
+    let file = pipeline::policy(&Shown, &trainer);
+    assert_eq!((file.card.game.as_str(), file.card.algorithm.as_str()), ("corridor", "score-ppo"));
+    assert!(file.card.training.starts_with("512 steps on plain:0..7"), "{}", file.card.training);
+    assert!(file.skills.is_some(), "SCORE acts with skills");
+    let path = folder.path().join("corridor.policy");
+    playbot_lab::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
+    let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
+
+    let measure = |file| {
+        let player = Player::of_file(file, ActionDraw::Sample);
+        pipeline::evaluate(&Shown, &experiment, "learned", &player, 2).expect("measured")
+    };
+    let measured = measure(&file);
+    assert_eq!((measured.method.as_str(), measured.split.as_str()), ("learned", "plain:8..15"));
+    assert_eq!(measured.episodes, 8 * u64::from(experiment.eval.episodes_per_level));
+    assert_eq!(measure(&shipped), measured, "what is shipped plays as what was trained");
+}
+
+#[test]
+fn without_skills_plain_ppo_is_trained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let experiment = Experiment { algorithm: Algorithm::Ppo, ..experiment(folder.path()) };
+    let trainer = pipeline::train(&Corridor, &experiment, None, DeviceKind::Flex, 1, |_| {}).expect("trained");
+    assert!(pipeline::policy(&Corridor, &trainer).skills.is_none());
+}
+
+#[test]
+fn each_step_says_what_it_cannot_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.demo");
+    let record = |game: &dyn Game, split: &str| pipeline::record(game, &levels(split), 0.0, &path);
+    let error = record(&Corridor, "plain:0..1").expect_err("nobody shows the corridor");
+    assert!(matches!(error, PipelineError::NoDemonstrator("corridor")), "{error}");
+    let error = record(&Shown, "plian:0..1").expect_err("no such mode");
+    assert!(matches!(error, PipelineError::Mode(_)) && error.to_string().contains("plain"), "{error}");
+    assert!(!path.exists(), "no empty recording is left");
+    record(&Shown, "plain:8..9").expect("recorded");
+    let error = record(&Shown, "plain:0..1").expect_err("it exists");
+    assert!(matches!(&error, PipelineError::Demo(error) if matches!(error.fault, DemoFault::Exists)), "{error}");
+
+    let learn = |experiment: &Experiment| pipeline::learn_skills(&Shown, experiment, DeviceKind::Flex, 1).map(|_| ());
+    let error = learn(&experiment(&path)).expect_err("these levels are held out");
+    assert!(matches!(error, PipelineError::Verify(_)) && error.to_string().contains("plain:8..15"), "{error}");
+    let error = learn(&Experiment { demos: None, ..experiment(&path) }).expect_err("no recordings are named");
+    assert!(matches!(error, PipelineError::Experiment(_)), "{error}");
+
+    let elsewhere = Experiment { test: levels("plian:8..15"), ..experiment(&path) };
+    let player = Player::Blind(BlindBot::Uniform);
+    let error = pipeline::evaluate(&Shown, &elsewhere, "random", &player, 1).expect_err("no such mode");
+    assert!(matches!(error, PipelineError::Experiment(_)) && error.to_string().contains("plain"), "{error}");
+}
