@@ -5,11 +5,11 @@
 
 use bevy::{
     input::{
-        keyboard::{KeyboardFocusLost, KeyboardInput},
+        keyboard::KeyboardInput,
         mouse::{MouseButtonInput, MouseMotion, MouseWheel},
     },
     prelude::*,
-    window::{CursorMoved, PrimaryWindow, WindowEvent},
+    window::{CursorMoved, PrimaryWindow, WindowEvent, WindowFocused},
 };
 
 use super::own_keys::OwnKeys;
@@ -34,6 +34,7 @@ pub(super) fn build(app: &mut App) {
     put_aside::<MouseMotion>(app);
     put_aside::<MouseWheel>(app);
     put_aside::<CursorMoved>(app);
+    put_aside::<WindowFocused>(app);
     put_aside::<WindowEvent>(app);
 }
 
@@ -45,6 +46,7 @@ fn put_aside<M: Message>(app: &mut App) {
 pub(super) fn take(world: &mut World) {
     let is_open = *world.resource::<Devices>() == Devices::Open;
     let keys: Vec<KeyboardInput> = lift(world);
+    let focus: Vec<WindowFocused> = lift(world);
     let mut own = world.resource_mut::<OwnKeys>();
     own.clear();
     for key in &keys {
@@ -54,7 +56,13 @@ pub(super) fn take(world: &mut World) {
             own.release(key.key_code);
         }
     }
+    // Whoever looks at another window holds no key of this one.
+    if focus.iter().any(|change| !change.focused) {
+        own.release_all();
+    }
     hand_on(world, keys, is_open);
+    // Bevy answers the loss of focus by letting go of keys, which virtual input goes on holding.
+    hand_on(world, focus, is_open);
     take_all::<MouseButtonInput>(world, is_open);
     take_all::<MouseMotion>(world, is_open);
     take_all::<MouseWheel>(world, is_open);
@@ -73,14 +81,8 @@ pub(super) fn give_back(world: &mut World) {
     swap::<MouseMotion>(world);
     swap::<MouseWheel>(world);
     swap::<CursorMoved>(world);
+    swap::<WindowFocused>(world);
     swap::<WindowEvent>(world);
-    // Whoever looks at another window holds no key of this one. Virtual input does not let go.
-    if !world.resource::<Messages<KeyboardFocusLost>>().is_empty() {
-        world.resource_mut::<OwnKeys>().release_all();
-        if *world.resource::<Devices>() == Devices::Kept {
-            world.resource_mut::<Messages<KeyboardFocusLost>>().clear();
-        }
-    }
 }
 
 /// Opens the devices to the game, or keeps them from it, which then sees them at rest.
@@ -134,6 +136,7 @@ fn is_of_person(event: &WindowEvent) -> bool {
             | Event::CursorLeft(_)
             | Event::CursorMoved(_)
             | Event::TouchInput(_)
+            | Event::WindowFocused(_)
             | Event::Ime(_)
     )
 }
@@ -145,5 +148,64 @@ fn forget_cursor(world: &mut World) {
         if window.physical_cursor_position().is_some() {
             window.set_physical_cursor_position(None);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::input::{ButtonState, InputPlugin, keyboard::Key};
+
+    use super::*;
+
+    fn send(world: &mut World, key_code: KeyCode, state: ButtonState) {
+        let (logical_key, window) = (Key::Character("x".into()), Entity::PLACEHOLDER);
+        world.write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window });
+    }
+
+    #[test]
+    fn kept_keys_are_known_to_the_window_only_and_virtual_ones_to_the_game() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Kept);
+        build(&mut app);
+        let world = app.world_mut();
+        let seen = |world: &World, key: KeyCode| world.resource::<ButtonInput<KeyCode>>().pressed(key);
+        let own = |world: &World, key: KeyCode| world.resource::<OwnKeys>().pressed(key);
+
+        send(world, KeyCode::KeyA, ButtonState::Pressed);
+        take(world);
+        send(world, KeyCode::KeyB, ButtonState::Pressed);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(own(world, KeyCode::KeyA) && !own(world, KeyCode::KeyB));
+        assert!(seen(world, KeyCode::KeyB) && !seen(world, KeyCode::KeyA));
+
+        send(world, KeyCode::KeyA, ButtonState::Released);
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(!own(world, KeyCode::KeyA) && seen(world, KeyCode::KeyB), "virtual keys stay down");
+
+        set(world, Devices::Open);
+        assert!(!seen(world, KeyCode::KeyB), "what was held by others is let go");
+        send(world, KeyCode::KeyC, ButtonState::Pressed);
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(own(world, KeyCode::KeyC) && seen(world, KeyCode::KeyC));
+    }
+
+    #[test]
+    fn a_window_without_focus_holds_nothing() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Kept);
+        build(&mut app);
+        let world = app.world_mut();
+        send(world, KeyCode::KeyA, ButtonState::Pressed);
+        take(world);
+        give_back(world);
+        world.write_message(WindowFocused { window: Entity::PLACEHOLDER, focused: false });
+        take(world);
+        assert!(!world.resource::<OwnKeys>().pressed(KeyCode::KeyA));
+        assert!(world.resource::<Messages<WindowFocused>>().is_empty(), "the game does not hear of it");
     }
 }

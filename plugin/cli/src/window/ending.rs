@@ -6,6 +6,7 @@ use bevy::{ecs::schedule::ScheduleLabel, prelude::*, window::WindowCloseRequeste
 use bevy_playbot::{
     demo::recorder::flush_unfinished,
     fault::{FaultSystems, Faults},
+    systems::PlaybotSystems,
 };
 
 use super::WindowError;
@@ -13,7 +14,7 @@ use super::WindowError;
 pub(super) fn build(app: &mut App, stop: fn() -> bool) {
     app.insert_resource(Ending { asked: false, ended: false, stop })
         .init_resource::<Verdict>()
-        .add_systems(Last, (hear_close, end).chain().before(FaultSystems));
+        .add_systems(Last, (hear_close, end).chain().after(PlaybotSystems::Reset).before(FaultSystems));
 }
 
 /// Listens in frames that have no `Last`, too.

@@ -93,6 +93,7 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
         world.run_schedule(Main);
         if let Some(failure) = system_errors::take(world) {
             world.resource_mut::<Faults>().report(failure);
+            world.run_schedule(StandStill);
         }
         world.run_schedule(WindowEnd);
     }
