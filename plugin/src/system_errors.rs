@@ -30,8 +30,8 @@ thread_local! {
     static FIRST: RefCell<Option<Failure>> = const { RefCell::new(None) };
 }
 
-/// Lets the systems of a World that runs on one thread report errors instead of panicking.
-pub(crate) fn listen(world: &mut World) {
+/// Lets the systems of a World that runs on one thread report errors instead of panicking: see [`take`].
+pub fn listen(world: &mut World) {
     world.insert_resource(FallbackErrorHandler(keep));
 }
 
@@ -50,8 +50,8 @@ fn keep(error: BevyError, context: ErrorContext) {
     });
 }
 
-/// The first failure since the last call, in words.
-pub(crate) fn take(world: &World) -> Option<String> {
+/// The first failure on this thread since the last call, in words.
+pub fn take(world: &World) -> Option<String> {
     FIRST.with_borrow_mut(Option::take).map(|failure| failure.in_words(world))
 }
 

@@ -15,7 +15,9 @@ use bevy_playbot::{
     headless::set_tick_rate,
     prelude::*,
     test_app::test_app,
-    virtual_input::{ActionAxis, InputRoute, VirtualDevices, VirtualGamepad, VirtualInput, VirtualInputPlugin},
+    virtual_input::{
+        ActionAxis, InputRoute, PressesForPeople, VirtualDevices, VirtualGamepad, VirtualInput, VirtualInputPlugin,
+    },
 };
 
 const STEP: Duration = Duration::from_millis(16);
@@ -206,6 +208,17 @@ fn an_episode_begins_with_nothing_held_whatever_came_before() {
     app.world_mut().get_mut::<Episode>(agent).expect("an agent").abandon();
     app.update();
     assert_eq!(ticks(&app).last().map(String::as_str), Some("Pd"));
+}
+
+#[test]
+fn people_press_by_their_actions_where_their_own_keys_are_kept_from_the_game() {
+    for route in [InputRoute::Direct, InputRoute::Messages] {
+        let (mut app, agent) = app_with(route, left(), actions(&[0]));
+        let left = Action(ActionValue::Discrete(1));
+        app.world_mut().entity_mut(agent).insert((Control::Human, PressesForPeople, left));
+        (0..2).for_each(|_| app.update());
+        assert!(app.world().resource::<ButtonInput<KeyCode>>().pressed(KeyCode::ArrowLeft), "{route:?}");
+    }
 }
 
 #[test]

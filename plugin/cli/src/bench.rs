@@ -7,6 +7,7 @@ use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_lab::games::Games;
 use playbot_lab::prelude::*;
 use playbot_lab::{
+    arrangement::Arrangement,
     benchmark::Benchmark,
     game::Game,
     parallel::{default_threads, on_threads},
@@ -111,11 +112,11 @@ impl Measure {
 
 /// Random actions on 64 levels, observations filled every tick.
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
-    let threads = args.threads as u32;
-    let (share, sight) = (args.arenas / threads, ObservationConfig { kind, ..ObservationConfig::default() });
+    let sight = ObservationConfig { kind, ..ObservationConfig::default() };
+    let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
     let mut worlds = Vec::new();
-    for index in 0..threads {
-        let (mut world, agents) = build_observing_world(game, mode, &sight, 1, index * share, share)?;
+    for first in arrangement.first_agents() {
+        let (mut world, agents) = build_observing_world(game, mode, &sight, 1, first, arrangement.arenas)?;
         for agent in agents {
             let queue = LevelQueue::Uniform { first: 0, last: 63 };
             world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
@@ -135,7 +136,7 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
         }
         ticks += TICKS;
     }
-    let steps = (ticks * u64::from(args.arenas)) as f64;
+    let steps = (ticks * u64::from(arrangement.total())) as f64;
     let steps_per_s = steps / start.elapsed().as_secs_f64();
     Ok(Measure { steps_per_s, parts: stages(worlds.iter_mut(), steps) })
 }

@@ -170,6 +170,7 @@ pub fn drive(
     mut after_update: impl FnMut(&UpdateReport),
 ) -> Result<bool, CliError> {
     interrupt::listen();
+    trainer.report_panics_to(run.path());
     let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
     let bar = progress::bar(title, trainer.experiment().steps, "steps");
     let mut saved = trainer.updates();

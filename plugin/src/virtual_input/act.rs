@@ -12,6 +12,7 @@ use super::{
     gamepad::VirtualGamepad,
     input_state::{InputState, Line, Touch},
     messages::InputMessages,
+    person::PressesForPeople,
 };
 use crate::{
     action::Action,
@@ -25,14 +26,14 @@ pub(super) type Pads<'w, 's> = Query<'w, 's, (Entity, &'static VirtualGamepad)>;
 
 /// The agents that virtual input plays for.
 pub(super) type Players<'w, 's> =
-    Query<'w, 's, (&'static VirtualInput, &'static Action, &'static Control, &'static Episode)>;
+    Query<'w, 's, (&'static VirtualInput, &'static Action, &'static Control, &'static Episode, Has<PressesForPeople>)>;
 
 /// What all agents want to hold and push in this tick. What a gamepad does waits until it is plugged in.
 pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: &InputState) -> Wanted {
     let mut wanted = Wanted::default();
     for &agent in order.entities() {
-        let Ok((input, action, control, episode)) = players.get(agent) else { continue };
-        if !is_virtual(*control) || !episode.is_running() {
+        let Ok((input, action, control, episode, for_people)) = players.get(agent) else { continue };
+        if !is_virtual(*control, for_people) || !episode.is_running() {
             continue;
         }
         let pad = pads.iter().find(|(_, owner)| owner.agent == agent).map(|(pad, _)| pad);

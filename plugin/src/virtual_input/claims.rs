@@ -2,16 +2,20 @@
 
 use bevy::prelude::*;
 
-use super::{axis::VirtualAxis, button::VirtualButton, component::VirtualInput};
+use super::{axis::VirtualAxis, button::VirtualButton, component::VirtualInput, person::PressesForPeople};
 use crate::{
     agent::{Agent, AgentOrder},
     control::Control,
     fault::Faults,
 };
 
-/// Whether this is played by virtual input.
-pub(super) fn is_virtual(control: Control) -> bool {
-    matches!(control, Control::Bot | Control::Policy | Control::Replay)
+/// Whether this is played by virtual input: `for_people` says whether people are.
+pub(super) fn is_virtual(control: Control, for_people: bool) -> bool {
+    match control {
+        Control::Bot | Control::Policy | Control::Replay => true,
+        Control::Human => for_people,
+        Control::Idle => false,
+    }
 }
 
 /// What only one agent of a World can have.
@@ -33,14 +37,14 @@ impl Claim {
 /// Reports agents whose mapping does not fit their actions, and agents that want what another one has, and stops them.
 pub(super) fn check_claims(
     order: Res<AgentOrder>,
-    mut agents: Query<(&Agent, &VirtualInput, &mut Control)>,
+    mut agents: Query<(&Agent, &VirtualInput, &mut Control, Has<PressesForPeople>)>,
     mut faults: ResMut<Faults>,
     mut claims: Local<Vec<(Claim, u32)>>,
 ) {
     claims.clear();
     for &entity in order.entities() {
-        let Ok((agent, input, mut control)) = agents.get_mut(entity) else { continue };
-        if !is_virtual(*control) {
+        let Ok((agent, input, mut control, for_people)) = agents.get_mut(entity) else { continue };
+        if !is_virtual(*control, for_people) {
             continue;
         }
         if input.space() != agent.actions {

@@ -133,7 +133,7 @@ fn action_of<A: InputAction>(target: Option<Entity>, mocks: &Mocks<A>) -> Option
 
 fn drive<A: InputAction>(mut agents: Agents<A>, mut mocks: Mocks<A>, mut faults: ResMut<Faults>) {
     for (agent, action, control, episode, mut driven) in &mut agents {
-        let is_played = is_virtual(*control) && episode.is_running();
+        let is_played = is_virtual(*control, false) && episode.is_running();
         if !is_played && !driven.is_mocked {
             continue;
         }

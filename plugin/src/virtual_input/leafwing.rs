@@ -155,7 +155,7 @@ fn state_of<A: Actionlike>(agent: Entity, target: Option<Entity>, states: &State
 
 fn drive<A: Actionlike>(mut agents: Agents<A>, mut states: States<A>, mut faults: ResMut<Faults>) {
     for (entity, agent, action, control, episode, mut actions) in &mut agents {
-        let is_played = is_virtual(*control) && episode.is_running();
+        let is_played = is_virtual(*control, false) && episode.is_running();
         if !is_played && actions.held.is_empty() {
             continue;
         }

@@ -6,7 +6,8 @@
 //! wants, goes on holding what it still wants, and lets go of the rest, as a person would.
 //!
 //! - It plays for [`Control::Policy`](crate::control::Control::Policy), [`Bot`](crate::control::Control::Bot) and
-//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is let go.
+//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is let go. The
+//!   exception are agents with [`PressesForPeople`], whose people do not reach the game with devices of their own.
 //! - Everything is let go at the end of an episode and at the start of the next, so that an episode begins with nothing
 //!   held, whatever came before it, and replays the same alone.
 //! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has a
@@ -54,6 +55,7 @@ pub mod leafwing;
 mod logical_key;
 mod messages;
 mod names;
+mod person;
 mod plugin;
 
 pub use action_axis::ActionAxis;
@@ -63,4 +65,5 @@ pub use component::VirtualInput;
 pub use devices::VirtualDevices;
 pub use gamepad::VirtualGamepad;
 pub use held::HeldInput;
+pub use person::PressesForPeople;
 pub use plugin::{InputRoute, VirtualInputPlugin};

@@ -23,6 +23,7 @@ use super::{
     devices::VirtualDevices,
     direct::{self, DirectInput},
     gamepad::{VirtualGamepad, connect_gamepads},
+    person::PressesForPeople,
 };
 use crate::{action::check_actions, fault::Faults, systems::PlaybotSystems};
 
@@ -55,6 +56,7 @@ impl Plugin for VirtualInputPlugin {
             .register_type::<VirtualInput>()
             .register_type::<VirtualDevices>()
             .register_type::<VirtualGamepad>()
+            .register_type::<PressesForPeople>()
             .add_observer(act::release_at_start)
             .add_observer(act::release_at_end)
             .add_systems(PreUpdate, connect_gamepads.before(InputSystems).before(act::send_messages));

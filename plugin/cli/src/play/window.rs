@@ -4,6 +4,7 @@ use std::path::Path;
 
 use bevy_playbot::{
     demo::file::{DemoHeader, DemoSummary},
+    placement::TickPlacement,
     vision::ObservationConfig,
 };
 use playbot_lab::games::Games;
@@ -30,6 +31,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut window = GameWindow::open(WindowSetup { game, playlist, partner, sight, seed, stop: interrupt::asked })?;
     // Not before there is a window: a recording without one would only be in the way.
     if let Some(path) = &args.record {
+        window.check_recording()?;
         window.record(args.existing.open(path, header)?);
     }
     interrupt::listen();
@@ -74,7 +76,10 @@ fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
 
 fn announce(game: &dyn Game, args: &Args) {
     if let Some(keys) = game.key_bindings() {
-        tell!("{}; R again, N next level, P pause, - and = zoom, Escape ends", keys.help());
+        let zoom = if game.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
+        tell!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
+    } else {
+        tell!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
     }
     if args.partner.is_named() {
         tell!("Tab hands over and takes over again");

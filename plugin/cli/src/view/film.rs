@@ -5,6 +5,7 @@ use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
 
 use super::{
     caption::{Caption, NARROWEST},
+    numbers::Numbers,
     screen::{Colour, Screen},
     stage::Shot,
 };
@@ -17,9 +18,15 @@ pub type Png = (Vec<u8>, [usize; 2]);
 
 /// How shots are drawn.
 pub struct Film {
-    options: ImageOptions,
-    scale: usize,
+    subject: Subject,
     tick_hz: f64,
+}
+
+/// What is above the captions.
+enum Subject {
+    /// Pictures of a form, enlarged so many times.
+    Pictures(ImageOptions, usize),
+    Numbers(Numbers),
 }
 
 impl Film {
@@ -29,10 +36,15 @@ impl Film {
     ///
     /// Such a picture is too large.
     pub fn new(options: ImageOptions, scale: u32, tick_hz: f64) -> Result<Self, CliError> {
-        let film = Self { options, scale: scale as usize, tick_hz };
+        let film = Self { subject: Subject::Pictures(options, scale as usize), tick_hz };
         let [width, height] = film.size();
         Screen::check_size(width, height)?;
         Ok(film)
+    }
+
+    /// Numbers instead of pictures.
+    pub fn of_numbers(numbers: Numbers, tick_hz: f64) -> Self {
+        Self { subject: Subject::Numbers(numbers), tick_hz }
     }
 
     /// One observation ([`Observation::image`](bevy_playbot::observation::Observation::image)) and nothing else; stacked pictures side by side, the oldest on the left.
@@ -43,8 +55,34 @@ impl Film {
     pub fn still(&self, image: &[u8]) -> Result<Png, CliError> {
         let [width, height] = self.size();
         let mut screen = Screen::new(width, height, BACKGROUND)?;
-        self.draw(&mut screen, image);
+        self.draw(&mut screen, image, &[]);
         Ok((to_png(&screen)?, [width, height]))
+    }
+
+    /// One shot with its caption.
+    ///
+    /// # Errors
+    ///
+    /// The picture is too large for a PNG.
+    pub fn captioned(&self, shot: &Shot) -> Result<Png, CliError> {
+        let (mut screen, caption) = self.screen(std::slice::from_ref(shot))?;
+        self.draw_shot(&mut screen, &caption, shot);
+        Ok((to_png(&screen)?, [screen.width, screen.height]))
+    }
+
+    /// Room for any of the shots, and for what stands below it.
+    fn screen(&self, shots: &[Shot]) -> Result<(Screen, Caption), CliError> {
+        let [width, height] = self.size();
+        let width = width.max(NARROWEST);
+        let skills = shots.iter().map(|shot| shot.skill.len()).max().unwrap_or(0);
+        let caption = Caption::new(width, skills);
+        Ok((Screen::new(width, height + caption.height(), BACKGROUND)?, caption))
+    }
+
+    fn draw_shot(&self, screen: &mut Screen, caption: &Caption, shot: &Shot) {
+        screen.block(0, 0, screen.width, screen.height, BACKGROUND);
+        self.draw(screen, &shot.image, &shot.vector);
+        caption.draw(screen, self.size()[1], shot);
     }
 
     /// All shots one after the other, again and again, each with its caption. `drawn` hears each that is done.
@@ -53,11 +91,7 @@ impl Film {
     ///
     /// The pictures are too large for a PNG.
     pub fn animated(&self, shots: &[Shot], drawn: impl FnMut()) -> Result<Png, CliError> {
-        let [width, height] = self.size();
-        let width = width.max(NARROWEST);
-        let skills = shots.iter().map(|shot| shot.skill.len()).max().unwrap_or(0);
-        let caption = Caption::new(width, skills);
-        let mut screen = Screen::new(width, height + caption.height(), BACKGROUND)?;
+        let (mut screen, caption) = self.screen(shots)?;
         let mut bytes = Vec::new();
         self.encode(&mut bytes, &mut screen, shots, &caption, drawn).map_err(too_large)?;
         Ok((bytes, [screen.width, screen.height]))
@@ -71,16 +105,13 @@ impl Film {
         caption: &Caption,
         mut drawn: impl FnMut(),
     ) -> Result<(), EncodingError> {
-        let top = self.size()[1];
         let mut encoder = encoder(bytes, screen);
         encoder.set_animated(shots.len() as u32, 0)?;
         let (numerator, denominator) = self.delay();
         encoder.set_frame_delay(numerator, denominator)?;
         let mut writer = encoder.write_header()?;
         for shot in shots {
-            screen.block(0, 0, screen.width, screen.height, BACKGROUND);
-            self.draw(screen, &shot.image);
-            caption.draw(screen, top, shot);
+            self.draw_shot(screen, caption, shot);
             writer.write_image_data(screen.bytes())?;
             drawn();
         }
@@ -96,19 +127,27 @@ impl Film {
         }
     }
 
-    /// Width and height of the enlarged pictures, side by side.
+    /// Width and height of the enlarged pictures, side by side, or of the numbers.
     fn size(&self) -> [usize; 2] {
-        let ImageOptions { width, height, stack, .. } = self.options;
-        let gaps = (stack as usize - 1) * self.scale;
-        [stack as usize * width as usize * self.scale + gaps, height as usize * self.scale]
+        match &self.subject {
+            Subject::Pictures(ImageOptions { width, height, stack, .. }, scale) => {
+                let gaps = (*stack as usize - 1) * scale;
+                [*stack as usize * *width as usize * scale + gaps, *height as usize * scale]
+            }
+            Subject::Numbers(numbers) => numbers.size(),
+        }
     }
 
-    fn draw(&self, screen: &mut Screen, image: &[u8]) {
-        let (width, height) = (self.options.width as usize, self.options.height as usize);
-        let picture = width * height * self.options.colours() as usize;
-        for (number, planes) in image.chunks_exact(picture).enumerate() {
-            let x = number * (width + 1) * self.scale;
-            screen.planes(planes, width, height, self.scale, (x, 0));
+    fn draw(&self, screen: &mut Screen, image: &[u8], vector: &[f32]) {
+        match &self.subject {
+            Subject::Pictures(options, scale) => {
+                let (width, height) = (options.width as usize, options.height as usize);
+                let picture = width * height * options.colours() as usize;
+                for (number, planes) in image.chunks_exact(picture).enumerate() {
+                    screen.planes(planes, width, height, *scale, (number * (width + 1) * scale, 0));
+                }
+            }
+            Subject::Numbers(numbers) => numbers.draw(screen, vector),
         }
     }
 }

@@ -3,6 +3,7 @@
 mod caption;
 pub mod film;
 pub mod font;
+mod numbers;
 mod options;
 pub mod screen;
 mod stage;
@@ -27,10 +28,12 @@ use super::{
     progress,
 };
 use film::Film;
+use numbers::Numbers;
 use stage::{Shot, Stage};
 
 /// Writes what a bot sees as a PNG: one observation, or with --episode a whole episode as an animated PNG with tick,
-/// action, value and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it.
+/// action, value and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it. Of a
+/// game that has a camera of its own it is what that sees; of one that cannot be drawn, the numbers, with a bar for each.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot view coinrun --seed 5
@@ -87,15 +90,19 @@ const MOST_BYTES: usize = 1 << 30;
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let (mut stage, sight, name) = open_stage(game, &args)?;
-    let film = Film::new(sight.image, args.scale, game.tick_hz())?;
+    let pictures = sight.is_image().then(|| Film::new(sight.image, args.scale, game.tick_hz())).transpose()?;
     let shots = take(&mut stage, &args)?;
+    let numbers = || Numbers::new(game.observation().names, args.scale, &shots);
+    let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
     let (bytes, size) = if args.episode {
         let bar = progress::bar("draw", shots.len() as u64, "frames");
         let drawn = film.animated(&shots, || bar.inc(1));
         bar.finish_and_clear();
         drawn?
-    } else {
+    } else if sight.is_image() {
         film.still(&shots[0].image)?
+    } else {
+        film.captioned(&shots[0])?
     };
     write(&args.out, &bytes)?;
     let written = Written { player: &name, frames: shots.len(), bytes: bytes.len(), size };
@@ -123,10 +130,19 @@ fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig,
     Ok((Stage::playing(game, mode, &sight, args.seed.into(), &chosen.player)?, sight, chosen.name))
 }
 
-/// The pictures that are shown: those that the policy reads, or those that were asked for.
+/// The pictures that are shown: those that the policy reads, or those that were asked for, or else those that the game
+/// has. Numbers for a game without any.
 fn sight(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
     let own = chosen.map(|chosen| chosen.sight).filter(ObservationConfig::is_image);
-    let mut sight = own.unwrap_or(ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() });
+    let is_asked_for = !args.image.is_empty();
+    let kind = if game.picture().is_some() || is_asked_for && !game.has_camera() {
+        ObservationKind::Raster
+    } else if game.has_camera() {
+        ObservationKind::Camera
+    } else {
+        ObservationKind::Vector
+    };
+    let mut sight = own.unwrap_or(ObservationConfig { kind, ..ObservationConfig::default() });
     if args.camera {
         sight.kind = ObservationKind::Camera;
     }
@@ -165,7 +181,7 @@ fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
         bar.set_length(u64::from(shot.tick) + 1);
         bar.set_position(u64::from(shot.tick) + 1);
         if args.episode {
-            kept += shot.image.len();
+            kept += shot.image.len() + size_of_val(shot.vector.as_slice());
             if kept > MOST_BYTES {
                 return Err(CliError::Usage(format!(
                     "the pictures of {} ticks take more than {} MiB of memory: try smaller pictures, or a shorter stack",

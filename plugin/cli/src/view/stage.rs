@@ -19,6 +19,8 @@ pub struct Shot {
     pub tick: u32,
     /// What it saw, as in [`Observation::image`].
     pub image: Vec<u8>,
+    /// What it saw in numbers.
+    pub vector: Vec<f32>,
     /// What it did, in words.
     pub action: String,
     /// Return that its policy expected, if it has a critic.
@@ -115,6 +117,7 @@ impl Stage {
         Shot {
             tick: self.ticks,
             image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
+            vector: agent.get::<Observation>().map(|seen| seen.vector.clone()).unwrap_or_default(),
             action: agent.get::<Action>().map(|action| self.in_words(&action.0)).unwrap_or_default(),
             // A policy without a critic says 0 to everything.
             value: decided.map(|decision| decision.value).filter(|value| *value != 0.0),

@@ -1,16 +1,20 @@
 //! Putting the window together.
 
+use std::time::Duration;
+
 use bevy::{
     app::{PanicHandlerPlugin, TerminalCtrlCHandlerPlugin},
     prelude::*,
-    window::{ExitCondition, WindowResolution},
+    window::{ExitCondition, PresentMode, WindowResolution},
     winit::{UpdateMode, WinitSettings},
 };
 use bevy_playbot::{
     camera::TileLayerPlugin,
     demo::{file::DemoWriter, recorder::Recorder},
-    headless::set_fixed_step,
+    headless::{set_fixed_step, set_frame_rate},
     keyboard::KeyboardPlugin,
+    placement::TickPlacement,
+    virtual_input::PressesForPeople,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_lab::prelude::*;
@@ -20,7 +24,7 @@ use super::{
     Partner, Playlist, WindowError, camera,
     ending::{self, Verdict},
     error::catch,
-    keys, pace, score,
+    frames, keys, own_keys, pace, score,
     seats::Seats,
     title,
 };
@@ -28,7 +32,7 @@ use super::{
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;
 /// Longest time between two frames. Frames are drawn for the eye; ticks have their own rate.
-const FRAME: std::time::Duration = std::time::Duration::from_micros(16_667);
+const FRAME: Duration = Duration::from_micros(16_667);
 
 /// What is played in a window, and who plays beside the person.
 pub struct WindowSetup<'a> {
@@ -50,6 +54,8 @@ pub struct WindowSetup<'a> {
 pub struct GameWindow {
     app: App,
     agent: Entity,
+    /// The game in which a person's actions are not known.
+    unrecorded: Option<&'static str>,
 }
 
 impl GameWindow {
@@ -57,13 +63,24 @@ impl GameWindow {
     ///
     /// # Errors
     ///
-    /// No display, nothing that can draw, or a game without keys or a picture.
+    /// No display, nothing that can draw, or a game whose ticks are no frames, without keys or a picture.
     pub fn open(setup: WindowSetup) -> Result<Self, WindowError> {
+        setup.sight.check(setup.game)?;
+        match setup.game.placement() {
+            TickPlacement::Fixed => Self::with_our_camera(setup),
+            TickPlacement::Frame => Self::as_it_is(setup),
+        }
+    }
+
+    /// A game that is drawn for us.
+    fn with_our_camera(setup: WindowSetup) -> Result<Self, WindowError> {
         let WindowSetup { game, playlist, partner, sight, seed, stop } = setup;
         let keys = game.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
-        sight.check(game)?;
-        let mut app = bevy_app(game.name())?;
+        let resolution = WindowResolution::new(SIDE, SIDE);
+        let window = Window { title: game.name().to_owned(), resolution, ..default() };
+        let mut app = bevy_app(window, ImagePlugin::default_nearest())?;
+        set_pace(&mut app, UpdateMode::reactive(FRAME), UpdateMode::reactive_low_power(FRAME));
         app.add_plugins((PlaybotPlugin::default(), KeyboardPlugin, TileLayerPlugin));
         set_fixed_step(&mut app, game.tick_hz());
         add_game(game, &mut app, playlist.mode(), &sight, seed)?;
@@ -71,10 +88,8 @@ impl GameWindow {
             // Those who see pictures have brought it already.
             game.build_picture(&mut app);
         }
-        let agent = spawn_agents(game, app.world_mut(), &sight, 0, 1)[0];
-        let seats = Seats::new(game, app.world_mut(), agent, partner);
-        app.world_mut().entity_mut(agent).insert((Control::Human, keys, playlist.queue()));
-        app.insert_resource(seats).insert_resource(playlist);
+        let agent = seat(&mut app, game, &sight, partner, playlist);
+        app.world_mut().entity_mut(agent).insert(keys);
         camera::build(&mut app, picture.width);
         let has_space_view = game.has_space_view();
         #[cfg(feature = "view3d")]
@@ -82,14 +97,64 @@ impl GameWindow {
             super::solid::build(&mut app, game);
         }
         ending::build(&mut app, stop);
+        own_keys::build(&mut app);
         keys::build(&mut app);
         if has_space_view && cfg!(not(feature = "view3d")) {
             keys::excuse_view(&mut app);
         }
         pace::build(&mut app);
         score::build(&mut app);
-        title::build(&mut app, game.name());
-        Ok(Self { app, agent })
+        title::build(&mut app, game.name(), Update);
+        Ok(Self { app, agent, unrecorded: None })
+    }
+
+    /// A game that draws itself, and whose ticks are frames: in a window like the one that it has headless.
+    fn as_it_is(setup: WindowSetup) -> Result<Self, WindowError> {
+        let WindowSetup { game, playlist, partner, sight, seed, stop } = setup;
+        let window = Window {
+            title: game.name().to_owned(),
+            resolution: WindowResolution::new(1280, 720),
+            // Where things are may depend on it.
+            resizable: false,
+            // The frames of the game have a rate of their own.
+            present_mode: PresentMode::AutoNoVsync,
+            ..default()
+        };
+        let mut app = bevy_app(window, ImagePlugin::default())?;
+        app.add_plugins(PlaybotPlugin { placement: TickPlacement::Frame });
+        add_game(game, &mut app, playlist.mode(), &sight, seed)?;
+        let hz = game.tick_hz();
+        set_frame_rate(&mut app, hz);
+        // Nothing but the clock starts a frame.
+        let wait = Duration::from_secs_f64(1.0 / hz);
+        let by_the_clock = UpdateMode::Reactive {
+            wait,
+            react_to_device_events: false,
+            react_to_user_events: false,
+            react_to_window_events: false,
+        };
+        set_pace(&mut app, by_the_clock, by_the_clock);
+        let agent = seat(&mut app, game, &sight, partner, playlist);
+        let unrecorded = match game.key_bindings() {
+            Some(keys) => {
+                app.world_mut().entity_mut(agent).insert((keys, PressesForPeople));
+                None
+            }
+            None => Some(game.name()),
+        };
+        ending::build(&mut app, stop);
+        frames::build(&mut app, game.name(), hz);
+        score::build(&mut app);
+        Ok(Self { app, agent, unrecorded })
+    }
+
+    /// Checks that what a person does can be recorded.
+    ///
+    /// # Errors
+    ///
+    /// The game is not played with keys alone.
+    pub fn check_recording(&self) -> Result<(), WindowError> {
+        self.unrecorded.map_or(Ok(()), |game| Err(WindowError::NotRecorded(game)))
     }
 
     /// Records every episode from now on, whoever decides.
@@ -112,38 +177,46 @@ impl GameWindow {
     }
 }
 
+/// The agent, under a person's control, and whoever takes over.
+fn seat(
+    app: &mut App,
+    game: &dyn Game,
+    sight: &ObservationConfig,
+    partner: Option<Partner>,
+    playlist: Playlist,
+) -> Entity {
+    let agent = spawn_agents(game, app.world_mut(), sight, 0, 1)[0];
+    let seats = Seats::new(game, app.world_mut(), agent, partner);
+    app.world_mut().entity_mut(agent).insert((Control::Human, playlist.queue()));
+    app.insert_resource(seats).insert_resource(playlist);
+    agent
+}
+
+/// When frames come, with the keyboard and without it.
+fn set_pace(app: &mut App, focused_mode: UpdateMode, unfocused_mode: UpdateMode) {
+    app.insert_resource(WinitSettings { focused_mode, unfocused_mode });
+}
+
 /// Bevy with a window, silent and without its own ways of stopping.
-fn bevy_app(title: &str) -> Result<App, WindowError> {
+fn bevy_app(window: Window, images: ImagePlugin) -> Result<App, WindowError> {
     let no_display = std::env::var_os("DISPLAY").is_none_or(|display| display.is_empty());
     if cfg!(target_os = "linux") && no_display {
         return Err(WindowError::NoDisplay("DISPLAY is not set".to_owned()));
     }
     let window = WindowPlugin {
-        primary_window: Some(Window {
-            title: title.to_owned(),
-            name: Some("playbot".to_owned()),
-            resolution: WindowResolution::new(SIDE, SIDE),
-            ..default()
-        }),
+        primary_window: Some(Window { name: Some("playbot".to_owned()), ..window }),
         // A recording is finished first: see `ending`.
         exit_condition: ExitCondition::DontExit,
         close_when_requested: false,
         ..default()
     };
-    let plugins = DefaultPlugins
-        .set(window)
-        .set(ImagePlugin::default_nearest())
-        .disable::<PanicHandlerPlugin>()
-        .disable::<TerminalCtrlCHandlerPlugin>();
+    let plugins =
+        DefaultPlugins.set(window).set(images).disable::<PanicHandlerPlugin>().disable::<TerminalCtrlCHandlerPlugin>();
     let mut app = App::new();
     // Bevy's plugins panic where there is no display or no adapter.
     catch(|| {
         app.add_plugins(plugins);
     })
     .map_err(WindowError::of_panic)?;
-    app.insert_resource(WinitSettings {
-        focused_mode: UpdateMode::reactive(FRAME),
-        unfocused_mode: UpdateMode::reactive_low_power(FRAME),
-    });
     Ok(app)
 }

@@ -2,10 +2,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use bevy::{prelude::*, window::WindowCloseRequested};
+use bevy::{ecs::schedule::ScheduleLabel, prelude::*, window::WindowCloseRequested};
 use bevy_playbot::{
     demo::recorder::flush_unfinished,
     fault::{FaultSystems, Faults},
+    systems::PlaybotSystems,
 };
 
 use super::WindowError;
@@ -13,7 +14,12 @@ use super::WindowError;
 pub(super) fn build(app: &mut App, stop: fn() -> bool) {
     app.insert_resource(Ending { asked: false, ended: false, stop })
         .init_resource::<Verdict>()
-        .add_systems(Last, (hear_close, end).chain().before(FaultSystems));
+        .add_systems(Last, (hear_close, end).chain().after(PlaybotSystems::Reset).before(FaultSystems));
+}
+
+/// Listens in frames that have no `Last`, too.
+pub(super) fn listen_in(app: &mut App, schedule: impl ScheduleLabel) {
+    app.add_systems(schedule, (hear_close, end).chain());
 }
 
 /// Whether the window is to end.

@@ -32,6 +32,12 @@ pub enum WindowError {
     /// The keyboard means nothing to the game.
     #[error("{0} has no keys for a person to play with")]
     NoKeys(&'static str),
+    /// What a person does is nothing that a recording could hold.
+    #[error(
+        "what a person does in {0} cannot be recorded, since it is not played with keys alone: leave out --record, or \
+         record its bots with `playbot record`"
+    )]
+    NotRecorded(&'static str),
     /// The game, or what the policy sees of it, cannot be drawn.
     #[error(transparent)]
     Vision(#[from] VisionError),

@@ -1,28 +1,45 @@
 //! The keys that are the window's own: the game's are in its [`KeyBindings`](bevy_playbot::key_bindings::KeyBindings).
 
-use bevy::{input::InputSystems, prelude::*};
+use bevy::{
+    ecs::schedule::{IntoScheduleConfigs, ScheduleConfigs},
+    ecs::system::ScheduleSystem,
+    prelude::*,
+};
 use bevy_playbot::{demo::recorder::flush_unfinished, fault::Faults};
 use playbot_lab::prelude::*;
 
-use super::{Playlist, camera::Zoom, ending::Ending, pace::Pace, seats::Seats, title::Notice};
+use super::{
+    Playlist,
+    camera::Zoom,
+    ending::Ending,
+    own_keys::{OwnKeys, OwnKeysRead},
+    pace::Pace,
+    seats::Seats,
+    title::Notice,
+};
 
 pub(super) fn build(app: &mut App) {
-    app.add_systems(PreUpdate, (hand_over, change_level, other_keys).after(InputSystems));
+    app.add_systems(PreUpdate, systems().after(OwnKeysRead));
+}
+
+/// What the keys do.
+pub(super) fn systems() -> ScheduleConfigs<ScheduleSystem> {
+    (hand_over, change_level, other_keys).into_configs()
 }
 
 /// Has V say why it does nothing, where ants could be seen in space by another build of the program.
 pub(super) fn excuse_view(app: &mut App) {
-    let says = |keys: Res<ButtonInput<KeyCode>>, mut notice: ResMut<Notice>| {
+    let says = |keys: Res<OwnKeys>, mut notice: ResMut<Notice>| {
         if keys.just_pressed(KeyCode::KeyV) {
             notice.say("no view in space: this program was built without --features view3d");
         }
     };
-    app.add_systems(PreUpdate, says.after(InputSystems));
+    app.add_systems(PreUpdate, says.after(OwnKeysRead));
 }
 
 /// Tab: the partner takes over, or gives back.
 fn hand_over(
-    keys: Res<ButtonInput<KeyCode>>,
+    keys: Res<OwnKeys>,
     seats: Res<Seats>,
     mut agents: Query<(&mut Control, &mut ActiveSkill)>,
     mut notice: ResMut<Notice>,
@@ -42,12 +59,7 @@ fn hand_over(
 }
 
 /// R plays the level again, N the next one.
-fn change_level(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut playlist: ResMut<Playlist>,
-    mut pace: ResMut<Pace>,
-    mut commands: Commands,
-) {
+fn change_level(keys: Res<OwnKeys>, mut playlist: ResMut<Playlist>, mut pace: ResMut<Pace>, mut commands: Commands) {
     let next = keys.just_pressed(KeyCode::KeyN);
     if !next && !keys.just_pressed(KeyCode::KeyR) {
         return;
@@ -73,20 +85,18 @@ fn leave_level(world: &mut World) {
 }
 
 /// P pauses, plus and minus change how much is seen, Escape and Ctrl-Q end.
-fn other_keys(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut pace: ResMut<Pace>,
-    mut zoom: ResMut<Zoom>,
-    mut ending: ResMut<Ending>,
-) {
+fn other_keys(keys: Res<OwnKeys>, mut pace: ResMut<Pace>, zoom: Option<ResMut<Zoom>>, mut ending: ResMut<Ending>) {
     if keys.just_pressed(KeyCode::KeyP) {
         pace.toggle_pause();
     }
-    if keys.any_just_pressed([KeyCode::Minus, KeyCode::NumpadSubtract]) {
-        zoom.out();
-    }
-    if keys.any_just_pressed([KeyCode::Equal, KeyCode::NumpadAdd]) {
-        zoom.closer();
+    // Games with cameras of their own know no zoom.
+    if let Some(mut zoom) = zoom {
+        if keys.any_just_pressed([KeyCode::Minus, KeyCode::NumpadSubtract]) {
+            zoom.out();
+        }
+        if keys.any_just_pressed([KeyCode::Equal, KeyCode::NumpadAdd]) {
+            zoom.closer();
+        }
     }
     let control = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
     if keys.just_pressed(KeyCode::Escape) || control && keys.just_pressed(KeyCode::KeyQ) {

@@ -28,6 +28,8 @@ pub(super) struct Pace {
     paused: bool,
     /// Time since start at which the rest after an episode is over.
     rest_until: Duration,
+    /// The same where the clock rests as well: frames that are left of it.
+    rest_frames: u32,
 }
 
 impl Pace {
@@ -39,6 +41,21 @@ impl Pace {
     /// Goes on at once.
     pub fn go_on(&mut self) {
         *self = Self::default();
+    }
+
+    /// Rests at the end of an episode, for so many frames a second.
+    pub fn rest_in_frames(&mut self, hz: f64) {
+        self.rest_frames = (REST.as_secs_f64() * hz).ceil() as u32;
+    }
+
+    /// Whether the game stands still in this frame, where that is decided frame by frame.
+    pub fn is_still_frame(&mut self) -> bool {
+        if self.paused {
+            return true;
+        }
+        let rests = self.rest_frames > 0;
+        self.rest_frames = self.rest_frames.saturating_sub(1);
+        rests
     }
 
     /// Whether the person has paused.

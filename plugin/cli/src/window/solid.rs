@@ -1,11 +1,14 @@
 //! A view in space for games that have one, and the key that changes between it and the view from above.
 
 use bevy::{
-    camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, input::InputSystems, prelude::*,
-    transform::helper::TransformHelper,
+    camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, prelude::*, transform::helper::TransformHelper,
 };
 
-use super::{camera::Zoom, seats::Seats};
+use super::{
+    camera::Zoom,
+    own_keys::{OwnKeys, OwnKeysRead},
+    seats::Seats,
+};
 use playbot_lab::{game::Game, space_view::CameraFocus};
 
 /// From what it follows to the eye at the nearest zoom, metres: so steep that the wall behind an ant does not hide it.
@@ -18,7 +21,7 @@ pub(super) fn build(app: &mut App, game: &dyn Game) {
     app.insert_resource(Solid(true))
         .insert_resource(ClearColor(Color::srgb(0.62, 0.72, 0.82)))
         .add_systems(Startup, spawn_camera)
-        .add_systems(PreUpdate, change_view.after(InputSystems))
+        .add_systems(PreUpdate, change_view.after(OwnKeysRead))
         .add_systems(PostUpdate, (choose, follow).before(TransformSystems::Propagate));
 }
 
@@ -35,7 +38,7 @@ fn spawn_camera(mut commands: Commands) {
 }
 
 /// V: from above, or in space.
-fn change_view(keys: Res<ButtonInput<KeyCode>>, mut solid: ResMut<Solid>) {
+fn change_view(keys: Res<OwnKeys>, mut solid: ResMut<Solid>) {
     if keys.just_pressed(KeyCode::KeyV) {
         solid.0 = !solid.0;
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bevy::{prelude::*, window::PrimaryWindow};
+use bevy::{ecs::schedule::ScheduleLabel, prelude::*, window::PrimaryWindow, winit::WINIT_WINDOWS};
 use playbot_lab::prelude::*;
 
 use super::{Playlist, pace::Pace, score::LastEpisode, seats::Seats};
@@ -10,10 +10,11 @@ use super::{Playlist, pace::Pace, score::LastEpisode, seats::Seats};
 /// How long a notice is shown.
 const NOTICE: Duration = Duration::from_secs(3);
 
-pub(super) fn build(app: &mut App, game: &'static str) {
+/// Writes the title in `schedule`.
+pub(super) fn build(app: &mut App, game: &'static str, schedule: impl ScheduleLabel) {
     app.insert_resource(GameName(game))
         .init_resource::<Notice>()
-        .add_systems(Update, (age_notice, write_title).chain());
+        .add_systems(schedule, (age_notice, write_title).chain());
 }
 
 #[derive(Resource)]
@@ -77,6 +78,16 @@ fn write_title(
     if window.title != title {
         window.title = title;
     }
+}
+
+/// Hands the title on at once, in frames in which Bevy's own systems do not.
+pub(super) fn show(window: Single<(Entity, &Window), With<PrimaryWindow>>) {
+    let (entity, window) = *window;
+    WINIT_WINDOWS.with_borrow(|windows| {
+        if let Some(shown) = windows.get_window(entity) {
+            shown.set_title(&window.title);
+        }
+    });
 }
 
 #[cfg(test)]

@@ -36,7 +36,9 @@ impl Input {
 
     /// What a person's keys mean: for games that are played with nothing else.
     pub(super) fn bindings(&self) -> Option<KeyBindings> {
-        let is_keys = !self.keys.is_empty() && self.pressed == Some(VirtualInput::keys(self.keys.clone()));
+        let is_keys = self.space.is_none()
+            && !self.keys.is_empty()
+            && self.pressed == Some(VirtualInput::keys(self.keys.clone()));
         is_keys.then(|| KeyBindings::of_sets(&self.keys))
     }
 }

@@ -1,7 +1,5 @@
 //! The beginning of an episode.
 
-use std::time::Duration;
-
 use bevy::prelude::*;
 
 use super::{
@@ -35,12 +33,12 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
 
 fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
     if let Some(system) = &mut foreign.restart {
-        discard_overstep(world);
+        set_clock_back(world);
         return system.demand(world);
     }
     match foreign.game.description.restart.clone() {
         Restart::Own(own) => {
-            discard_overstep(world);
+            set_clock_back(world);
             match own.0 {
                 Own::State(enter) => enter(world),
                 Own::System(_) => Ok(()),
@@ -70,7 +68,8 @@ fn start_again(world: &mut World, foreign: &Foreign) {
     }
 }
 
-/// The clock at the start of a program: this frame has no length, and the next one is the first that has.
+/// The clock at the start of a program: this frame has no length, and the next one is the first that has. Fixed steps begin
+/// anew, too, wherever the episode before stopped between two of them.
 fn set_clock_back(world: &mut World) {
     if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>() {
         let mut fresh = Time::<Virtual>::from_max_delta(clock.max_delta());
@@ -82,12 +81,5 @@ fn set_clock_back(world: &mut World) {
     }
     if let Some(mut clock) = world.get_resource_mut::<Time>() {
         *clock = Time::default();
-    }
-}
-
-/// Fixed steps begin anew with the episode, wherever the one before stopped between two of them.
-fn discard_overstep(world: &mut World) {
-    if let Some(mut clock) = world.get_resource_mut::<Time<Fixed>>() {
-        clock.discard_overstep(Duration::MAX);
     }
 }

@@ -29,13 +29,13 @@ pub(super) enum Own {
 }
 
 impl Restart {
-    /// A system that begins the game anew.
+    /// A system that begins the game anew. The clock is set back to 0 before it.
     pub fn system<M: 'static>(system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
         Self::Own(OwnRestart(Own::System(SystemFactory::new(system, |()| ()))))
     }
 
     /// The state in which the game begins: it is left, if the game is in it, and entered again, with everything that the
-    /// game does on the way.
+    /// game does on the way. The clock is set back to 0 before it.
     pub fn state<S: FreelyMutableState + Clone>(state: S) -> Self {
         Self::Own(OwnRestart(Own::State(Arc::new(move |world: &mut World| enter(world, state.clone())))))
     }

@@ -231,6 +231,7 @@ impl RunDir {
         let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
         learner.set_length(experiment);
         let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
+        trainer.report_panics_to(&self.path);
         for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }

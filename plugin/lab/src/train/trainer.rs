@@ -1,6 +1,6 @@
 //! The training loop, one update at a time: the caller owns the progress bar and decides when to stop.
 
-use std::{collections::VecDeque, time::Instant};
+use std::{collections::VecDeque, path::Path, time::Instant};
 
 use bevy::prelude::World;
 use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel, SkillSource};
@@ -22,6 +22,7 @@ use crate::sensors::GameSensors;
 use bevy_playbot::{
     episode::EpisodeEnded,
     fault::Fault,
+    panics::PanicReports,
     policy::in_words,
     skill_prior::SkillPrior,
     vision::{ObservationConfig, UnknownObservation, VisionError},
@@ -276,6 +277,15 @@ impl Trainer {
     /// The Worlds that play, to look into or to measure.
     pub fn worlds_mut(&mut self) -> impl Iterator<Item = &mut World> {
         self.collectors.iter_mut().map(Collector::world_mut)
+    }
+
+    /// Writes what is kept of a panic of the game into this folder, instead of the one for temporary files.
+    pub fn report_panics_to(&mut self, folder: &Path) {
+        for world in self.worlds_mut() {
+            if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
+                reports.move_to(folder);
+            }
+        }
     }
 
     /// Where the policy's skills come from, if it has any.

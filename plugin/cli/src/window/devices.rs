@@ -1,0 +1,211 @@
+//! The person's devices, kept from the game or handed on to it.
+//!
+//! Between two frames the window system writes its messages into empty lists, while those of the game lie aside. So
+//! what the person does can be told from what virtual input does, message by message.
+
+use bevy::{
+    input::{
+        keyboard::KeyboardInput,
+        mouse::{MouseButtonInput, MouseMotion, MouseWheel},
+    },
+    prelude::*,
+    window::{CursorMoved, PrimaryWindow, WindowEvent, WindowFocused},
+};
+
+use super::own_keys::OwnKeys;
+
+/// Whether the game sees the person's devices.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Devices {
+    /// It sees them as they are.
+    Open,
+    /// It sees nothing of them.
+    Kept,
+}
+
+/// The messages that do not count at the moment: between frames the game's, in frames nobody's.
+#[derive(Resource)]
+struct Aside<M: Message>(Messages<M>);
+
+pub(super) fn build(app: &mut App) {
+    app.init_resource::<OwnKeys>();
+    put_aside::<KeyboardInput>(app);
+    put_aside::<MouseButtonInput>(app);
+    put_aside::<MouseMotion>(app);
+    put_aside::<MouseWheel>(app);
+    put_aside::<CursorMoved>(app);
+    put_aside::<WindowFocused>(app);
+    put_aside::<WindowEvent>(app);
+}
+
+fn put_aside<M: Message>(app: &mut App) {
+    app.add_message::<M>().insert_resource(Aside::<M>(Messages::default()));
+}
+
+/// At the start of a frame: reads the person's keys, and hands on what the game may see.
+pub(super) fn take(world: &mut World) {
+    let is_open = *world.resource::<Devices>() == Devices::Open;
+    let keys: Vec<KeyboardInput> = lift(world);
+    let focus: Vec<WindowFocused> = lift(world);
+    let mut own = world.resource_mut::<OwnKeys>();
+    own.clear();
+    for key in &keys {
+        if key.state.is_pressed() {
+            own.press(key.key_code);
+        } else {
+            own.release(key.key_code);
+        }
+    }
+    // Whoever looks at another window holds no key of this one.
+    if focus.iter().any(|change| !change.focused) {
+        own.release_all();
+    }
+    hand_on(world, keys, is_open);
+    // Bevy answers the loss of focus by letting go of keys, which virtual input goes on holding.
+    hand_on(world, focus, is_open);
+    take_all::<MouseButtonInput>(world, is_open);
+    take_all::<MouseMotion>(world, is_open);
+    take_all::<MouseWheel>(world, is_open);
+    take_all::<CursorMoved>(world, is_open);
+    let events: Vec<WindowEvent> = lift(world);
+    hand_on(world, events.into_iter().filter(|event| is_open || !is_of_person(event)).collect(), true);
+    if !is_open {
+        forget_cursor(world);
+    }
+}
+
+/// At the end of a frame: makes room for what the window system writes.
+pub(super) fn give_back(world: &mut World) {
+    swap::<KeyboardInput>(world);
+    swap::<MouseButtonInput>(world);
+    swap::<MouseMotion>(world);
+    swap::<MouseWheel>(world);
+    swap::<CursorMoved>(world);
+    swap::<WindowFocused>(world);
+    swap::<WindowEvent>(world);
+}
+
+/// Opens the devices to the game, or keeps them from it, which then sees them at rest.
+pub(super) fn set(world: &mut World, devices: Devices) {
+    if *world.resource::<Devices>() == devices {
+        return;
+    }
+    world.insert_resource(devices);
+    if let Some(mut keys) = world.get_resource_mut::<ButtonInput<KeyCode>>() {
+        keys.release_all();
+    }
+    if let Some(mut buttons) = world.get_resource_mut::<ButtonInput<MouseButton>>() {
+        buttons.release_all();
+    }
+}
+
+fn swap<M: Message>(world: &mut World) {
+    world.resource_scope(|world, mut aside: Mut<Aside<M>>| {
+        std::mem::swap(&mut aside.0, &mut *world.resource_mut::<Messages<M>>());
+    });
+}
+
+/// Brings the game's messages back, and returns those of the window system.
+fn lift<M: Message>(world: &mut World) -> Vec<M> {
+    swap::<M>(world);
+    world.resource_mut::<Aside<M>>().0.drain().collect()
+}
+
+fn hand_on<M: Message>(world: &mut World, messages: Vec<M>, is_open: bool) {
+    if is_open && !messages.is_empty() {
+        world.resource_mut::<Messages<M>>().write_batch(messages);
+    }
+}
+
+fn take_all<M: Message>(world: &mut World, is_open: bool) {
+    let messages: Vec<M> = lift(world);
+    hand_on(world, messages, is_open);
+}
+
+/// Whether it tells of what a person does to the game, and not to the window.
+fn is_of_person(event: &WindowEvent) -> bool {
+    use WindowEvent as Event;
+    matches!(
+        event,
+        Event::KeyboardInput(_)
+            | Event::KeyboardFocusLost(_)
+            | Event::MouseButtonInput(_)
+            | Event::MouseMotion(_)
+            | Event::MouseWheel(_)
+            | Event::CursorEntered(_)
+            | Event::CursorLeft(_)
+            | Event::CursorMoved(_)
+            | Event::TouchInput(_)
+            | Event::WindowFocused(_)
+            | Event::Ime(_)
+    )
+}
+
+/// Games may ask the window where the cursor is.
+fn forget_cursor(world: &mut World) {
+    let mut windows = world.query_filtered::<&mut Window, With<PrimaryWindow>>();
+    for mut window in windows.iter_mut(world) {
+        if window.physical_cursor_position().is_some() {
+            window.set_physical_cursor_position(None);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::input::{ButtonState, InputPlugin, keyboard::Key};
+
+    use super::*;
+
+    fn send(world: &mut World, key_code: KeyCode, state: ButtonState) {
+        let (logical_key, window) = (Key::Character("x".into()), Entity::PLACEHOLDER);
+        world.write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window });
+    }
+
+    #[test]
+    fn kept_keys_are_known_to_the_window_only_and_virtual_ones_to_the_game() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Kept);
+        build(&mut app);
+        let world = app.world_mut();
+        let seen = |world: &World, key: KeyCode| world.resource::<ButtonInput<KeyCode>>().pressed(key);
+        let own = |world: &World, key: KeyCode| world.resource::<OwnKeys>().pressed(key);
+
+        send(world, KeyCode::KeyA, ButtonState::Pressed);
+        take(world);
+        send(world, KeyCode::KeyB, ButtonState::Pressed);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(own(world, KeyCode::KeyA) && !own(world, KeyCode::KeyB));
+        assert!(seen(world, KeyCode::KeyB) && !seen(world, KeyCode::KeyA));
+
+        send(world, KeyCode::KeyA, ButtonState::Released);
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(!own(world, KeyCode::KeyA) && seen(world, KeyCode::KeyB), "virtual keys stay down");
+
+        set(world, Devices::Open);
+        assert!(!seen(world, KeyCode::KeyB), "what was held by others is let go");
+        send(world, KeyCode::KeyC, ButtonState::Pressed);
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(own(world, KeyCode::KeyC) && seen(world, KeyCode::KeyC));
+    }
+
+    #[test]
+    fn a_window_without_focus_holds_nothing() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Kept);
+        build(&mut app);
+        let world = app.world_mut();
+        send(world, KeyCode::KeyA, ButtonState::Pressed);
+        take(world);
+        give_back(world);
+        world.write_message(WindowFocused { window: Entity::PLACEHOLDER, focused: false });
+        take(world);
+        assert!(!world.resource::<OwnKeys>().pressed(KeyCode::KeyA));
+        assert!(world.resource::<Messages<WindowFocused>>().is_empty(), "the game does not hear of it");
+    }
+}

@@ -1,0 +1,127 @@
+//! Games whose ticks are frames: each frame of the window is one, or it shows the state as it is.
+//!
+//! The game stands still only if nothing of it runs: a frame without a tick would still move it, and a recording would
+//! know nothing of that.
+
+use bevy::{
+    ecs::schedule::{ScheduleLabel, Schedules, SingleThreadedExecutor},
+    prelude::*,
+    time::TimeReceiver,
+};
+use bevy_playbot::{
+    action::Action, control::Control, episode::Episode, fault::Faults, key_bindings::KeyBindings,
+    placement::TickSchedules, system_errors,
+};
+use playbot_lab::prelude::*;
+
+use super::{
+    devices::{self, Devices},
+    ending, keys,
+    own_keys::OwnKeys,
+    pace::Pace,
+    seats::Seats,
+    title,
+};
+
+/// Everything that a frame of the window does.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct WindowFrame;
+
+/// Before the game's frame: the window's own keys.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct WindowStart;
+
+/// After the game's frame, or in its place.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct WindowEnd;
+
+/// What a frame in which the game stands still must not miss.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct StandStill;
+
+/// Frames of the game in a second of its time.
+#[derive(Resource)]
+struct FrameRate(f64);
+
+/// Runs the game of an app, with `hz` frames a second, one in each frame of the window.
+pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
+    devices::build(app);
+    app.insert_resource(FrameRate(hz))
+        .insert_resource(Devices::Open)
+        .init_resource::<Pace>()
+        .add_observer(rest)
+        .init_schedule(WindowStart)
+        .init_schedule(WindowEnd)
+        .init_schedule(StandStill)
+        .add_systems(WindowStart, keys::systems())
+        .add_systems(StandStill, title::show)
+        .add_systems(WindowFrame, run_frame);
+    ending::listen_in(app, StandStill);
+    title::build(app, game, WindowEnd);
+    let decide = TickSchedules::of(app).decide;
+    app.add_systems(decide, decide_by_hand.in_set(PlaybotSystems::Decide));
+    // Virtual input and title are for the thread that the window belongs to.
+    app.edit_schedule(WindowFrame, |schedule| {
+        schedule.set_executor(SingleThreadedExecutor::new());
+    });
+    app.main_mut().update_schedule = Some(WindowFrame.intern());
+}
+
+/// The end of an episode is seen for a moment.
+fn rest(_: On<EpisodeEnded>, rate: Res<FrameRate>, mut pace: ResMut<Pace>) {
+    pace.rest_in_frames(rate.0);
+}
+
+fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
+    if !*has_begun {
+        *has_begun = true;
+        begin(world);
+    }
+    choose_devices(world);
+    devices::take(world);
+    world.run_schedule(WindowStart);
+    // Tab may just have been pressed.
+    choose_devices(world);
+    if world.resource_mut::<Pace>().is_still_frame() {
+        // The renderer sends one message a frame, and bears no more than two that nobody has read.
+        if let Some(times) = world.get_resource::<TimeReceiver>() {
+            let _ = times.0.try_recv();
+        }
+        world.run_schedule(WindowEnd);
+        world.run_schedule(StandStill);
+    } else {
+        world.run_schedule(Main);
+        if let Some(failure) = system_errors::take(world) {
+            world.resource_mut::<Faults>().report(failure);
+            world.run_schedule(StandStill);
+        }
+        world.run_schedule(WindowEnd);
+    }
+    devices::give_back(world);
+}
+
+/// Runs systems one after the other, in the order that they have headless.
+fn begin(world: &mut World) {
+    for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
+        schedule.set_executor(SingleThreadedExecutor::new());
+    }
+    system_errors::listen(world);
+}
+
+/// A person without bindings plays with the devices themselves; nobody else's game sees them.
+fn choose_devices(world: &mut World) {
+    let agent = world.resource::<Seats>().agent;
+    let is_person = world.get::<Control>(agent) == Some(&Control::Human);
+    let is_open = is_person && world.get::<KeyBindings>(agent).is_none();
+    devices::set(world, if is_open { Devices::Open } else { Devices::Kept });
+}
+
+/// The keys of this frame are its action, which then presses the game's keys in the same frame. A short tap counts for one
+/// tick.
+fn decide_by_hand(keys: Res<OwnKeys>, mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action)>) {
+    for (control, bindings, episode, mut action) in &mut agents {
+        if *control == Control::Human && episode.is_running() {
+            action.0 = bindings.action(|key| keys.pressed(key) || keys.just_pressed(key));
+        }
+    }
+}

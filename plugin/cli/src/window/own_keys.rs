@@ -1,0 +1,17 @@
+//! The keys that a person really holds, whatever the game is told.
+
+use bevy::{input::InputSystems, prelude::*};
+
+/// What is held and was pressed on the person's keyboard, as of this frame of the window.
+#[derive(Resource, Clone, Default, Deref, DerefMut)]
+pub(super) struct OwnKeys(pub(super) ButtonInput<KeyCode>);
+
+/// The set in which they are read, in `PreUpdate`, where the game sees the same keyboard.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct OwnKeysRead;
+
+/// For games that the person's keyboard is open to.
+pub(super) fn build(app: &mut App) {
+    let read = |keys: Res<ButtonInput<KeyCode>>, mut own: ResMut<OwnKeys>| own.0.clone_from(&keys);
+    app.init_resource::<OwnKeys>().add_systems(PreUpdate, read.in_set(OwnKeysRead).after(InputSystems));
+}
