@@ -16,7 +16,7 @@ use crate::{
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
-    system_errors,
+    renewal, system_errors,
 };
 
 /// Number of fixed ticks since the World began.
@@ -90,6 +90,7 @@ pub fn into_world(mut app: App) -> World {
 }
 
 /// Runs one tick. Under [`TickPlacement::Frame`] that may take several frames, while a level is being made ready.
+/// A World with a [`Renewal`](renewal::Renewal) is replaced by a new one before an episode begins in it.
 ///
 /// # Errors
 ///
@@ -113,6 +114,9 @@ const QUICK_FRAMES: u32 = 60;
 /// Runs frames up to and with the next tick.
 fn run_frames(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
+    if renewal::renew_if_due(world)? {
+        world.insert_resource(before);
+    }
     system_errors::clear();
     for frame in 1.. {
         world.run_schedule(Main);

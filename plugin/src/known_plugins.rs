@@ -58,10 +58,34 @@ pub(crate) fn missing_by_type(world: &World) -> Vec<&'static str> {
         (TypeId::of::<ButtonInput<KeyCode>>(), "`ButtonInput<KeyCode>` (`InputPlugin`)"),
         (TypeId::of::<ButtonInput<MouseButton>>(), "`ButtonInput<MouseButton>` (`InputPlugin`)"),
         (TypeId::of::<ClearColor>(), "`ClearColor` (`CameraPlugin`)"),
+        (TypeId::of::<Touches>(), "`Touches` (`InputPlugin`)"),
+        (TypeId::of::<Time>(), "`Time` (`TimePlugin`)"),
+        (TypeId::of::<Time<Fixed>>(), "`Time<Fixed>` (`TimePlugin`)"),
     ];
     let is_missing = |id: TypeId| {
         let asked_for = world.components().get_id(id);
         asked_for.is_some_and(|id| !world.contains_resource_by_id(id))
     };
     known.into_iter().filter(|(id, _)| is_missing(*id)).map(|(_, words)| words).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::ecs::system::BoxedSystem;
+
+    use super::*;
+
+    #[test]
+    fn what_is_asked_for_and_not_there_is_told_without_names() {
+        let mut world = World::new();
+        assert_eq!(missing_by_type(&world), Vec::<&str>::new(), "nobody asks for anything");
+        let ask = |_: Res<AssetServer>, _: Res<ButtonInput<KeyCode>>, _: Res<Time>| {};
+        let mut system: BoxedSystem = Box::new(IntoSystem::into_system(ask));
+        system.initialize(&mut world);
+        let keys = "`ButtonInput<KeyCode>` (`InputPlugin`)";
+        assert_eq!(missing_by_type(&world), ["`AssetServer` (`AssetPlugin`)", keys, "`Time` (`TimePlugin`)"]);
+        world.init_resource::<ButtonInput<KeyCode>>();
+        world.init_resource::<Time>();
+        assert_eq!(missing_by_type(&world), ["`AssetServer` (`AssetPlugin`)"]);
+    }
 }

@@ -104,6 +104,7 @@ pub mod policy_file;
 pub mod prelude;
 pub mod raster;
 mod reflect;
+pub mod renewal;
 pub mod reward;
 pub mod skill_prior;
 pub mod state_hash;

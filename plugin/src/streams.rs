@@ -49,6 +49,13 @@ impl AgentStreams {
         Self { level: stream("level"), action: stream("action"), skill: stream("skill"), seeded: true }
     }
 
+    /// Begins the streams of agent `index`, unless they have been begun.
+    pub(crate) fn seed(&mut self, seed: PlaybotSeed, index: u32) {
+        if !self.seeded {
+            *self = Self::new(seed.0, index);
+        }
+    }
+
     /// Streams in the middle of their run, as a checkpoint keeps them.
     pub fn restored(level: ChaCha8Rng, action: ChaCha8Rng, skill: ChaCha8Rng) -> Self {
         Self { level, action, skill, seeded: true }
@@ -58,8 +65,6 @@ impl AgentStreams {
 /// Gives agents their streams, unless they brought their own.
 pub(crate) fn seed_streams(seed: Res<PlaybotSeed>, mut added: Query<(&Agent, &mut AgentStreams), Added<Agent>>) {
     for (agent, mut streams) in &mut added {
-        if !streams.seeded {
-            *streams = AgentStreams::new(seed.0, agent.index);
-        }
+        streams.seed(*seed, agent.index);
     }
 }

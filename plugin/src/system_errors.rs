@@ -121,6 +121,8 @@ fn nameless(world: &World, context: &str, message: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use bevy::ecs::system::BoxedSystem;
+
     use super::*;
 
     #[test]
@@ -137,5 +139,18 @@ mod tests {
         assert!(text.contains("`Bang`") && text.contains("`add_message`"), "{text}");
         let text = in_words("system `x`", "Odd", "it is odd");
         assert_eq!(text, "system `x` has a parameter `Odd` that does not work: it is odd");
+    }
+
+    #[test]
+    fn without_names_the_missing_resources_of_bevy_are_told_by_their_types() {
+        let mut world = World::new();
+        let text = nameless(&world, "system `<Enable the debug feature to see the name>`", "Resource does not exist");
+        assert!(text.starts_with("a system cannot run") && text.contains("probably one of the game's own"), "{text}");
+        let mut system: BoxedSystem = Box::new(IntoSystem::into_system(|_: Res<ButtonInput<MouseButton>>| {}));
+        system.initialize(&mut world);
+        let text = nameless(&world, "system `aim`", "Resource does not exist");
+        for part in ["system `aim` cannot run", "`ButtonInput<MouseButton>` (`InputPlugin`)", "feature `debug`"] {
+            assert!(text.contains(part), "`{part}` is missing in: {text}");
+        }
     }
 }

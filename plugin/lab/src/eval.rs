@@ -21,6 +21,7 @@ use bevy_playbot::{
     headless::tick_world,
     level::LevelQueue,
     policy::{ActionDraw, ActivePolicy},
+    renewal::Renewal,
     skill_prior::SkillPrior,
     vision::{ObservationConfig, VisionError},
 };
@@ -209,8 +210,11 @@ fn stage(
     let (per_world, total) = (arrangement.arenas, arrangement.total() as usize);
     let sight = if matches!(player, Player::Policy { .. }) { plan.sight } else { ObservationConfig::default() };
     let (mut world, agents) = build_observing_world(game, &plan.split.mode, &sight, plan.seed, first, per_world)?;
-    world.init_resource::<Results>();
-    world.add_observer(note_result);
+    Renewal::set_up(&mut world, |world| {
+        world.init_resource::<Results>();
+        world.add_observer(note_result);
+    });
+    Renewal::carry_resource::<Results>(&mut world);
     let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
@@ -228,11 +232,10 @@ fn play_out(
     followed: Option<&dyn Game>,
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<Trail>, Fault> {
-    let mut agents = world.query_filtered::<&Control, With<Agent>>();
     let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
     let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
     let mut trails = Vec::new();
-    while agents.iter(world).any(|control| control.is_active()) {
+    while everybody.iter().any(|agent| world.get::<Control>(*agent).is_some_and(|control| control.is_active())) {
         tick_world(world)?;
         let ended = std::mem::take(&mut world.resource_mut::<Results>().0);
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {

@@ -1,5 +1,7 @@
 //! What the plugin needs to know of a game in order to build it headless, many arenas at a time.
 
+use std::sync::Arc;
+
 use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use crate::{
@@ -76,6 +78,12 @@ pub trait Game: Send + Sync {
     /// Most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any
     /// number. Whoever plays many arenas at a time builds more Worlds instead; one agent more is a fault.
     fn arenas_per_world(&self) -> Option<u32> {
+        None
+    }
+
+    /// The game again, if its Worlds are to be built anew for each episode: see [`Renewal`](bevy_playbot::renewal::Renewal).
+    /// `None` for a game that restarts in the World it has.
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
         None
     }
 

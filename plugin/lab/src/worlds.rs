@@ -4,15 +4,20 @@ use bevy::prelude::*;
 use bevy_playbot::{
     agent::AgentLimit,
     demo::{file::DemoHeader, recorder::demo_actions},
-    fault::Faults,
+    fault::{Fault, Faults},
     headless::{headless_app, headless_frame_app, into_world, set_tick_rate},
     panics::{EpisodeTrace, PanicReports},
     placement::TickPlacement,
     policy::PlaybotSeed,
+    renewal::Renewal,
     vision::{ObservationConfig, VisionError},
 };
 
-use crate::{game::Game, sensors::GameSensors, stage_clock};
+use crate::{
+    game::Game,
+    sensors::GameSensors,
+    stage_clock::{self, StageClock},
+};
 
 /// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see vectors.
 ///
@@ -28,6 +33,26 @@ pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u3
 ///
 /// The pictures cannot be made: see [`VisionError`].
 pub fn build_observing_world(
+    game: &dyn Game,
+    mode: &str,
+    sight: &ObservationConfig,
+    seed: u64,
+    first: u32,
+    count: u32,
+) -> Result<(World, Vec<Entity>), VisionError> {
+    let (mut world, agents) = build_once(game, mode, sight, seed, first, count)?;
+    if let Some(game) = game.built_anew() {
+        let (mode, sight) = (mode.to_owned(), *sight);
+        world.insert_resource(Renewal::new(move || {
+            let built = build_once(&*game, &mode, &sight, seed, first, count);
+            built.map(|(world, _)| world).map_err(|error| Fault(error.to_string()))
+        }));
+        Renewal::carry_resource::<StageClock>(&mut world);
+    }
+    Ok((world, agents))
+}
+
+fn build_once(
     game: &dyn Game,
     mode: &str,
     sight: &ObservationConfig,

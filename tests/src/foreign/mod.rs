@@ -2,3 +2,4 @@
 
 pub mod catch;
 pub mod rooms;
+pub mod stubborn;

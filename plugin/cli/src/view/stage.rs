@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use bevy_playbot::{
     demo::{file::DemoEpisode, replay::Divergence},
     policy::Decision,
+    renewal::Renewal,
     vision::ObservationConfig,
 };
 use playbot_lab::prelude::*;
@@ -84,8 +85,11 @@ impl Stage {
     fn new(game: &dyn Game, mode: &str, sight: &ObservationConfig, level: u64) -> Result<Self, CliError> {
         let (mut world, agents) = build_observing_world(game, mode, sight, 0, 0, 1)?;
         let agent = agents[0];
-        world.init_resource::<End>();
-        world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(*ended));
+        Renewal::set_up(&mut world, |world| {
+            world.init_resource::<End>();
+            world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(*ended));
+        });
+        Renewal::carry_resource::<End>(&mut world);
         // The sensor for pictures has taken the place of the vector, which a player may read.
         let vector = VectorSensor::new(game.observation().names);
         world.entity_mut(agent).insert((vector, LevelQueue::Always(level)));

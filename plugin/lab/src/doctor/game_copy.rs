@@ -17,6 +17,7 @@ use bevy_playbot::{
     level::LevelQueue,
     observation::{Observation, VectorSensor},
     policy::AgentStreams,
+    renewal::Renewal,
     reward::Reward,
     state_hash::StateHash,
 };
@@ -88,6 +89,7 @@ impl GameCopy {
             self.world.entity_mut(agent).insert(Action(uniform(&self.space, draws)));
         }
         self.world.resource_mut::<Ends>().0.clear();
+        let before = self.world.id();
         let world = &mut self.world;
         // A copy that panicked is never touched again, whatever state it was left in.
         self.fault = match catch_unwind(AssertUnwindSafe(|| tick_world(world))) {
@@ -95,6 +97,10 @@ impl GameCopy {
             Ok(Err(fault)) => Some(fault.to_string()),
             Err(panic) => Some(format!("the game panicked: {}", message(&*panic))),
         };
+        if self.world.id() != before {
+            // Another World has taken its place, with other entities.
+            self.census = Census::default();
+        }
         self.census.update(&self.world);
     }
 
@@ -145,8 +151,10 @@ impl GameCopy {
 
 /// Adds what a copy needs beside the game.
 fn prepare(world: &mut World) {
-    world.init_resource::<Ends>();
-    world.add_observer(|event: On<EpisodeEnded>, mut ends: ResMut<Ends>| ends.0.push((event.entity, event.end)));
+    Renewal::set_up(world, |world| {
+        world.init_resource::<Ends>();
+        world.add_observer(|event: On<EpisodeEnded>, mut ends: ResMut<Ends>| ends.0.push((event.entity, event.end)));
+    });
 }
 
 /// A World with the plugin and an agent, without a game: to tell the game's types from the others.

@@ -5,6 +5,8 @@ use bevy::{
     time::{Real, TimeSystems},
 };
 
+use bevy_playbot::renewal::Renewal;
+
 /// `Time<Real>` as it was before this frame.
 #[derive(Resource)]
 struct Before(Time<Real>);
@@ -14,6 +16,10 @@ struct Before(Time<Real>);
 /// A World without a window takes the length of a tick for that of a frame, so that reading the wall clock changes
 /// nothing in it, and everything in a window.
 pub(super) fn slow_down(world: &mut World) {
+    Renewal::set_up(world, slow_down_one);
+}
+
+fn slow_down_one(world: &mut World) {
     let Some(now) = world.get_resource::<Time<Real>>() else { return };
     let before = Before(*now);
     world.insert_resource(before);

@@ -18,6 +18,7 @@ use bevy_playbot::{
     key_bindings::KeyBindings,
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
+    renewal::Renewal,
 };
 
 /// A game that knows nothing of this plugin, with what an agent does, sees and gets there: see the
@@ -117,6 +118,10 @@ impl Game for ForeignGame {
         Some(1)
     }
 
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        matches!(self.description.restart, Restart::Rebuild).then(|| Arc::new(self.clone()) as Arc<dyn Game>)
+    }
+
     fn problem(&self) -> Option<String> {
         let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
         if has_no_actions(&input.space()) {
@@ -174,6 +179,7 @@ impl Game for ForeignGame {
     }
 
     fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        Renewal::carry_component::<ForeignBot>(world);
         world.entity_mut(agent).insert(ForeignBot { noise });
     }
 }

@@ -35,6 +35,7 @@ impl Plugin for ForeignPlugin {
         app.register_type::<LevelSeed>()
             .init_resource::<LevelSeed>()
             .add_observer(restart::start)
+            .add_observer(restart::announce)
             .init_schedule(BeforeGame)
             .add_systems(BeforeGame, note_what_is_built);
         let TickSchedules { decide, judge, .. } = TickSchedules::of(app);

@@ -4,9 +4,12 @@ use bevy::prelude::*;
 
 use super::{
     restart_kind::{Own, Restart},
-    runtime::{Foreign, LevelSeed, with_foreign},
+    runtime::{Foreign, ForeignCell, LevelSeed, with_foreign},
 };
-use bevy_playbot::episode::{Episode, StartEpisode};
+use bevy_playbot::{
+    episode::{Episode, StartEpisode},
+    renewal::{EpisodeAhead, Renewal},
+};
 
 /// Begins the game anew as soon as the schedule allows it.
 pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, mut commands: Commands) {
@@ -19,8 +22,7 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 
 fn begin(world: &mut World, agent: Entity, level: u64) {
     with_foreign(world, agent, |world, foreign| {
-        let level = foreign.game.level_count().map_or(level, |levels| level % levels.max(1));
-        world.insert_resource(LevelSeed(level));
+        world.insert_resource(LevelSeed(foreign.level_of(level)));
         restart(world, foreign)?;
         if let Some(system) = &mut foreign.level {
             system.demand(world)?;
@@ -48,7 +50,32 @@ fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
             start_again(world, foreign);
             Ok(())
         }
+        Restart::Rebuild => demand_a_new_world(world, foreign),
     }
+}
+
+/// The World must have been built for this episode. Its first frames have begun the game already.
+fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
+    let others = "`Restart::Startup`, `Restart::state` or `Restart::system`";
+    if !world.contains_resource::<Renewal>() {
+        return Err(format!(
+            "`Restart::Rebuild` builds a World anew, which a window's cannot be: play it without a window, or let it \
+             restart with {others}"
+        ));
+    }
+    if std::mem::replace(&mut foreign.has_begun, true) {
+        return Err(format!(
+            "`Restart::Rebuild` needs a new World for each episode, and this one has had its episode: run it with \
+             `tick_world`, or let the game restart with {others}"
+        ));
+    }
+    set_clock_back(world);
+    Ok(())
+}
+
+/// The systems of the game's start find the level.
+pub(super) fn announce(event: On<EpisodeAhead>, cell: Res<ForeignCell>, mut seed: ResMut<LevelSeed>) {
+    seed.0 = cell.lock().level_of(event.level);
 }
 
 /// Despawns what the game has spawned, and does again what is done once when a program starts.

@@ -14,6 +14,10 @@ pub enum Restart {
     /// `PreStartup`, `Startup` and `PostStartup` run again. Resources stay as they are, unless those systems insert them:
     /// set back what counts in [`ForeignGame::level`](super::ForeignGame::level).
     Startup,
+    /// The World is built anew, as if the program were started again for each episode: the last resort, for games whose
+    /// resources, `Local`s or timers survive [`Startup`](Self::Startup). It takes far longer, loads assets again, and is for
+    /// Worlds without a window only. `Startup` already finds the level in [`LevelSeed`](super::LevelSeed).
+    Rebuild,
     /// The game's own way: see [`Restart::system`] and [`Restart::state`].
     Own(OwnRestart),
 }

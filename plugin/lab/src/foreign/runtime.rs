@@ -71,6 +71,8 @@ pub(super) struct Foreign {
     pub(super) startup: Vec<InternedScheduleLabel>,
     /// Frames since the last restart.
     pub(super) frames: u32,
+    /// Whether an episode has begun in this World, where each has its own.
+    pub(super) has_begun: bool,
 }
 
 impl Foreign {
@@ -81,7 +83,7 @@ impl Foreign {
                 Own::System(system) => Some(system.make()),
                 Own::State(_) => None,
             },
-            Restart::Startup => None,
+            Restart::Startup | Restart::Rebuild => None,
         };
         let part = |(system, is_delta): &(super::factory::SystemFactory<f32>, bool)| RewardPart {
             system: system.make(),
@@ -102,7 +104,13 @@ impl Foreign {
             built: None,
             startup,
             frames: 0,
+            has_begun: false,
         }
+    }
+
+    /// The level that is played when this one is asked for.
+    pub(super) fn level_of(&self, level: u64) -> u64 {
+        self.game.level_count().map_or(level, |levels| level % levels.max(1))
     }
 }
 

@@ -4,7 +4,15 @@ use bevy::prelude::*;
 use playbot_learner::{Actions, LearnError, ObsKind, Observations, Policy, Rollout, RolloutStep};
 
 use crate::sensors::GameSensors;
-use crate::{game::Game, split::LevelSplit, train::arena_state::ActionLog, worlds::build_observing_world};
+use crate::{
+    game::Game,
+    split::LevelSplit,
+    train::{
+        arena_state::ActionLog,
+        cut_episodes::{CutEpisodes, cut_episodes, push_state},
+    },
+    worlds::build_observing_world,
+};
 use bevy_playbot::{
     action::Action,
     agent::{Agent, AgentOrder},
@@ -17,6 +25,7 @@ use bevy_playbot::{
     observation::Observation,
     placement::TickSchedules,
     policy::{ActionDraw, ActivePolicy, AgentStreams, Decision},
+    renewal::Renewal,
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior, draw_skills},
     systems::{ObserveSchedule, PlaybotSystems},
@@ -61,16 +70,21 @@ impl Collector {
     ) -> Result<Self, VisionError> {
         let (mut world, agents) = build_observing_world(game, &split.mode, sight, seed, first, count)?;
         let kind = sight.obs_kind(game);
-        world.init_resource::<Finished>();
-        world.add_observer(note_finished);
+        Renewal::set_up(&mut world, |world| {
+            world.init_resource::<Finished>();
+            world.add_observer(note_finished);
+            let judge = world.resource::<TickSchedules>().judge;
+            world.schedule_scope(judge, |_, schedule| {
+                schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
+            });
+        });
+        Renewal::carry_resource::<Finished>(&mut world);
+        Renewal::carry_resource::<Collecting>(&mut world);
+        Renewal::carry_component::<ActionLog>(&mut world);
         world.insert_resource(Collecting { rollout: Rollout::new(0, kind, 0, &game.actions()), kind });
         if let Some(prior) = prior {
             world.insert_resource(prior);
         }
-        let judge = world.resource::<TickSchedules>().judge;
-        world.schedule_scope(judge, |_, schedule| {
-            schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
-        });
         for (&agent, index) in agents.iter().zip(first..) {
             world.entity_mut(agent).insert((
                 AgentStreams::new(seed, index),
@@ -149,13 +163,6 @@ fn peek(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(),
         rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
     }
     Ok(())
-}
-
-fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
-    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
-        skills.extend_from_slice(&skill.z);
-        observation.push_to(observations);
-    }
 }
 
 /// One tick of all agents, before it becomes part of the rollout.
@@ -257,60 +264,4 @@ fn push_tick(rollout: &mut Rollout, rows: &Rows, final_values: &[f32], cut: &Cut
         rollout.push_cut(row, cut.obs.row(i, width), z)?;
     }
     Ok(())
-}
-
-/// The last states of the episodes that ran out of time in one tick.
-struct CutEpisodes {
-    agents: Vec<usize>,
-    obs: Observations,
-    z: Vec<f32>,
-    values: Vec<f32>,
-}
-
-impl CutEpisodes {
-    fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
-        Self { agents, obs: Observations::empty(kind), z: Vec::new(), values: Vec::new() }
-    }
-}
-
-/// The last state of each episode that ran out of time in this tick, with its value.
-///
-/// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
-/// episode.
-fn cut_episodes(
-    world: &mut World,
-    entities: &[Entity],
-    policy: &Policy,
-    kind: &ObsKind,
-) -> Result<CutEpisodes, LearnError> {
-    let agents: Vec<_> = (0..entities.len())
-        .filter(|&row| {
-            world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
-        })
-        .collect();
-    let mut cut = CutEpisodes::new(agents, kind);
-    if cut.agents.is_empty() {
-        return Ok(cut);
-    }
-    let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
-    world.run_schedule(ObserveSchedule);
-    for (i, &row) in cut.agents.iter().enumerate() {
-        let skill_from = cut.z.len();
-        push_state(world, entities[row], &mut cut.z, &mut cut.obs);
-        let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
-        if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
-            let last = cut.obs.row(i, kind.numbers());
-            let mean = prior.prior.sample(last, 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
-            cut.z.truncate(skill_from);
-            cut.z.extend(mean);
-        }
-    }
-    cut.values = policy.values(&cut.z, &cut.obs, cut.agents.len())?;
-    // The row that is being written belongs to the state before the action.
-    for (&entity, before) in entities.iter().zip(before) {
-        if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
-            *observation = before;
-        }
-    }
-    Ok(cut)
 }

@@ -10,6 +10,7 @@ mod config_error;
 pub mod config_file;
 mod config_keys;
 mod config_set;
+mod cut_episodes;
 pub mod default_experiment;
 mod experiment_checks;
 mod experiment_error;

@@ -1,0 +1,205 @@
+//! `Restart::Rebuild`: episodes of a game that cannot be set back otherwise, each in a World of its own.
+
+use std::{path::Path, sync::Arc};
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    demo::{
+        file::{DemoEpisode, DemoReader, DemoWriter},
+        replay::Divergence,
+    },
+    renewal::Renewal,
+    vision::ObservationConfig,
+};
+use playbot_lab::{
+    demo::verify::{ReplayStage, verify_file},
+    eval::{EpisodeResult, EvalPlan, Player, evaluate},
+    foreign::{ForeignGame, Restart},
+    prelude::*,
+    train::{
+        Algorithm, Trainer,
+        checkpoint::Which,
+        config_file::parse_experiment,
+        run_dir::{RunDir, RunInfo},
+    },
+    worlds::build_world,
+};
+use playbot_learner::DeviceKind;
+use playbot_tests::foreign::stubborn::{Gusts, Planted, stubborn_game};
+
+fn is_active(world: &World, agent: Entity) -> bool {
+    world.get::<Control>(agent).is_some_and(|control| control.is_active())
+}
+
+/// State hashes of the episodes of one agent that always does the same.
+fn traces(game: &ForeignGame, levels: &[u64]) -> Vec<Vec<u64>> {
+    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list(levels)));
+    let (mut traces, mut trace) = (Vec::new(), Vec::new());
+    while traces.len() < levels.len() {
+        world.tick().expect("sound");
+        trace.push(world.get::<StateHash>(agents[0]).expect("an agent").0);
+        if world.get::<EpisodeCount>(agents[0]).expect("an agent").finished > traces.len() as u64 {
+            traces.push(std::mem::take(&mut trace));
+        }
+    }
+    traces
+}
+
+#[test]
+fn an_episode_is_the_same_whenever_it_is_played() {
+    let rebuilt = traces(&stubborn_game(Restart::Rebuild), &[1, 2, 1, 2]);
+    assert_eq!(rebuilt[0], rebuilt[2]);
+    assert_eq!(rebuilt[1], rebuilt[3]);
+    assert_ne!(rebuilt[0], rebuilt[1], "the hash sees the level");
+    let restarted = traces(&stubborn_game(Restart::Startup), &[1, 2, 1, 2]);
+    assert_eq!(restarted[0].len(), 20, "nobody pushes the ball: only the clock ends the episode");
+    assert_ne!(restarted[0], restarted[2], "the gusts outlive `Restart::Startup`");
+}
+
+#[test]
+fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
+    #[derive(Resource, Default)]
+    struct Ends(u32);
+    let (mut world, agents) = build_world(&stubborn_game(Restart::Rebuild), "default", 0, 0, 1);
+    Renewal::set_up(&mut world, |world| {
+        world.init_resource::<Ends>();
+        world.add_observer(|_: On<EpisodeEnded>, mut ends: ResMut<Ends>| ends.0 += 1);
+    });
+    Renewal::carry_resource::<Ends>(&mut world);
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([3, 5, 8])));
+    let mut seen = vec![world.id()];
+    let mut ticks = 0;
+    while is_active(&world, agents[0]) {
+        world.tick().expect("sound");
+        ticks += 1;
+        if seen.last() != Some(&world.id()) {
+            seen.push(world.id());
+        }
+        let episode = world.get::<Episode>(agents[0]).expect("the same agent");
+        assert_eq!(*world.resource::<Planted>(), Planted(episode.level), "`Startup` knows the level");
+        // A frame that starts the clock, one that begins the level, and at most 20 ticks, or 21 for the last World.
+        assert!(world.resource::<Gusts>().0 <= 4, "the gusts begin anew");
+    }
+    assert_eq!((ticks, seen.len()), (61, 3), "20 ticks in each World; the last tick has nobody to play");
+    assert_eq!(world.resource::<Ends>().0, 3);
+    assert_eq!(world.resource::<bevy_playbot::headless::Tick>().0, 61);
+    assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 3);
+}
+
+/// Records the demonstrator, with noise.
+fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>) {
+    let (mut world, agents) = build_world(game, "default", 5, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(path, game.demo_header("default")).expect("a fresh file")));
+    game.arm_demonstrator(&mut world, agents[0], 0.4);
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list(levels)));
+    while is_active(&world, agents[0]) {
+        world.tick().expect("sound");
+    }
+    let recorder = world.resource::<Recorder>();
+    assert_eq!(recorder.episodes(), world.get::<EpisodeCount>(agents[0]).expect("an agent").finished);
+}
+
+/// Replays a recording, the last episode first.
+fn replayed_backwards(game: &ForeignGame, path: &Path) -> Vec<Option<Divergence>> {
+    let reader = DemoReader::open_for_game(path, game.name(), game.version(), None).expect("readable");
+    let mut episodes: Vec<DemoEpisode> = reader.map(|episode| episode.expect("whole")).collect();
+    episodes.reverse();
+    let mut stage = ReplayStage::new(game, "default");
+    let play = |episode| stage.play(Arc::new(episode), |_, _| {}).expect("sound");
+    episodes.into_iter().map(play).collect()
+}
+
+#[test]
+fn recordings_replay_in_any_order() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("rebuilt.demo");
+    let game = stubborn_game(Restart::Rebuild);
+    record(&game, &path, vec![0, 1, 2, 3, 0, 1]);
+    let report = verify_file(&game, &path, |_| {}).expect("readable");
+    assert_eq!((report.episodes, &report.divergences), (6, &Vec::new()));
+    assert_eq!(replayed_backwards(&game, &path), vec![None; 6]);
+    let path = folder.path().join("restarted.demo");
+    let game = stubborn_game(Restart::Startup);
+    record(&game, &path, vec![0, 1, 2, 3, 0, 1]);
+    let divergences = replayed_backwards(&game, &path);
+    assert!(divergences.iter().any(Option::is_some), "the order counts with `Restart::Startup`");
+}
+
+#[test]
+fn what_is_measured_does_not_depend_on_what_was_played_before() {
+    let measure = |arenas, threads| -> Vec<EpisodeResult> {
+        let split = "default:0..5".parse().expect("a split");
+        let sight = ObservationConfig::default();
+        let plan = EvalPlan { split, sight, episodes_per_level: 2, seed: 1, arenas, worlds: 1, threads };
+        evaluate(&stubborn_game(Restart::Rebuild), &Player::Demonstrator, &plan, |_| {}).expect("can be played")
+    };
+    let alone = measure(1, 1);
+    assert_eq!(alone.len(), 12);
+    assert!(alone.chunks(2).all(|pair| pair[0] == pair[1]), "both episodes of a level are the same: {alone:?}");
+    assert_eq!(alone, measure(4, 2));
+}
+
+const EXPERIMENT: &str = r#"(
+    game: "stubborn", train: "default:0..7", test: "default:8..15", demos: "unused",
+    steps: 512, arenas: 4, worlds: 2, algorithm: "ppo",
+    ppo: (num_steps: 32, minibatches: 2, hidden: [8], lr: 0.003),
+)"#;
+
+fn fresh(game: &ForeignGame, threads: usize) -> Trainer {
+    let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
+    Trainer::new(game, &experiment, None, DeviceKind::Flex, threads).expect("fits")
+}
+
+/// Trains into a folder, and returns what the run has written at its end.
+fn train(folder: &Path, mut trainer: Trainer, stop_after: u64) -> Vec<Vec<u8>> {
+    let info = RunInfo {
+        algorithm: Algorithm::Ppo,
+        seed: 1,
+        version: "test".into(),
+        revision: "test".into(),
+        game_version: 1,
+        skills: None,
+        device: DeviceKind::Flex,
+    };
+    let run = match RunDir::create(folder, trainer.experiment(), &info, false) {
+        Ok(run) => run,
+        Err(_) => RunDir::open(folder).expect("a run").0,
+    };
+    while !trainer.is_done() && trainer.updates() < stop_after {
+        let report = trainer.update().expect("learns");
+        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
+    }
+    run.save(&mut trainer).expect("writable");
+    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
+    let files = [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()];
+    files.into_iter().map(|path| std::fs::read(path).expect("written")).collect()
+}
+
+#[test]
+fn a_training_that_was_stopped_in_the_middle_of_episodes_goes_on_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (whole, halved) = (folder.path().join("whole"), folder.path().join("halved"));
+    let game = stubborn_game(Restart::Rebuild);
+    let expected = train(&whole, fresh(&game, 2), u64::MAX);
+    // 64 ticks in each arena by then: at least two Worlds have been replaced in each.
+    train(&halved, fresh(&game, 1), 2);
+    let (run, experiment, _) = RunDir::open(&halved).expect("readable");
+    let resumed = run.resume(&game, &experiment, DeviceKind::Flex, 2).expect("replays");
+    assert_eq!(resumed.updates(), 2);
+    assert!(train(&halved, resumed, u64::MAX) == expected, "stopping in the middle changed the result");
+}
+
+#[test]
+fn a_world_that_cannot_be_built_anew_names_the_other_restarts() {
+    let (mut world, agents) = build_world(&stubborn_game(Restart::Rebuild), "default", 0, 0, 1);
+    // What a window's World lacks.
+    world.remove_resource::<Renewal>();
+    world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(3)));
+    let text = world.tick().expect_err("a fault").to_string();
+    for part in ["level 3", "`stubborn`", "`Restart::Rebuild`", "a window", "`Restart::Startup`", "`Restart::state`"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+}
