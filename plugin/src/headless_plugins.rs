@@ -6,17 +6,7 @@ use bevy::{
     window::{ExitCondition, WindowPlugin, WindowResolution},
 };
 
-/// The app has no screen, so that nothing needs to be drawn but what agents ask for.
-#[derive(Resource, Clone, Copy, Debug)]
-pub(crate) struct NoScreen;
-
-struct NoScreenPlugin;
-
-impl Plugin for NoScreenPlugin {
-    fn build(&self, app: &mut App) {
-        app.insert_resource(NoScreen);
-    }
-}
+use crate::no_screen::NoScreenPlugin;
 
 /// Bevy's `DefaultPlugins`, as this program is built with them, for a World that nobody looks at: input, assets, states,
 /// text, meshes and materials are there, and a window of 1280 by 720 that exists for the game only. There is no event

@@ -37,6 +37,8 @@ impl UnknownName {
 }
 
 /// The candidate most like `name`, if one is like it at all.
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     candidates
         .iter()

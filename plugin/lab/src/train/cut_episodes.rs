@@ -1,0 +1,74 @@
+//! Episodes that ran out of time: the states in which they stopped, and what these were still worth.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    episode::{Episode, EpisodeEnd},
+    observation::Observation,
+    skill_prior::{ActiveSkill, SkillPrior},
+    systems::ObserveSchedule,
+};
+use playbot_learner::{LearnError, ObsKind, Observations, Policy};
+
+/// The last states of the episodes that ran out of time in one tick.
+pub(super) struct CutEpisodes {
+    pub(super) agents: Vec<usize>,
+    pub(super) obs: Observations,
+    pub(super) z: Vec<f32>,
+    pub(super) values: Vec<f32>,
+}
+
+impl CutEpisodes {
+    pub(super) fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
+        Self { agents, obs: Observations::empty(kind), z: Vec::new(), values: Vec::new() }
+    }
+}
+
+/// The last state of each episode that ran out of time in this tick, with its value.
+///
+/// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
+/// episode.
+pub(super) fn cut_episodes(
+    world: &mut World,
+    entities: &[Entity],
+    policy: &Policy,
+    kind: &ObsKind,
+) -> Result<CutEpisodes, LearnError> {
+    let agents: Vec<_> = (0..entities.len())
+        .filter(|&row| {
+            world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
+        })
+        .collect();
+    let mut cut = CutEpisodes::new(agents, kind);
+    if cut.agents.is_empty() {
+        return Ok(cut);
+    }
+    let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
+    world.run_schedule(ObserveSchedule);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let skill_from = cut.z.len();
+        push_state(world, entities[row], &mut cut.z, &mut cut.obs);
+        let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
+        if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
+            let last = cut.obs.row(i, kind.numbers());
+            let mean = prior.prior.sample(last, 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
+            cut.z.truncate(skill_from);
+            cut.z.extend(mean);
+        }
+    }
+    cut.values = policy.values(&cut.z, &cut.obs, cut.agents.len())?;
+    // The row that is being written belongs to the state before the action.
+    for (&entity, before) in entities.iter().zip(before) {
+        if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
+            *observation = before;
+        }
+    }
+    Ok(cut)
+}
+
+/// Adds what an agent sees now, and its skill.
+pub(super) fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
+    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
+        skills.extend_from_slice(&skill.z);
+        observation.push_to(observations);
+    }
+}
