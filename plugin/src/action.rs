@@ -42,6 +42,8 @@ pub(crate) fn plugin(app: &mut App) {
 }
 
 /// Why an action does not belong to its space, or `None` if it does.
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     match (action, space) {
         (ActionValue::Discrete(index), ActionSpace::Discrete(n)) if (*index as usize) < *n => None,
@@ -61,6 +63,7 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
 
 /// Reports actions that do not belong to their agent's space, with agent and tick, and stops those agents: a game need
 /// not be able to bear what its agents cannot do.
+#[doc(hidden)]
 pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
     for (agent, action, episode, mut control) in &mut agents {
         if !control.is_active() || !episode.is_running() {

@@ -45,6 +45,8 @@ impl AgentOrder {
 /// Most agents that the World of a game can hold.
 #[derive(Resource, Clone, Copy, Debug, Reflect)]
 #[reflect(Resource)]
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub struct AgentLimit {
     /// Name of the game.
     pub game: &'static str,
@@ -53,6 +55,7 @@ pub struct AgentLimit {
 }
 
 /// Whether nothing can be done in this space.
+#[doc(hidden)]
 pub fn has_no_actions(space: &ActionSpace) -> bool {
     matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
 }

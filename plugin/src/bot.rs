@@ -32,6 +32,8 @@ pub(crate) fn run_blind_bots(
 }
 
 /// A uniformly random action of a space.
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     match space {
         ActionSpace::Discrete(n) => ActionValue::Discrete(rng.random_range(0..*n as u32)),

@@ -45,6 +45,8 @@ pub struct FaultOccurred {
 
 /// In `Last`: faults are announced. Systems before it may still [`take`](Faults::take) them.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub struct FaultSystems;
 
 impl Faults {

@@ -17,16 +17,8 @@ use crate::{
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
     renewal, system_errors,
+    tick::Tick,
 };
-
-/// Number of fixed ticks since the World began.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Resource)]
-pub struct Tick(pub u64);
-
-pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
-    tick.0 += 1;
-}
 
 /// An app with time and [`PlaybotPlugin`], and nothing that needs a screen, a GPU or the clock.
 ///
@@ -59,6 +51,8 @@ pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
 
 /// An app with all that Bevy brings, except a screen, for games in which a frame is a tick:
 /// [`HeadlessPlugins`](crate::headless_plugins::HeadlessPlugins), with or without a renderer, and [`PlaybotPlugin`] under [`TickPlacement::Frame`].
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
     let mut app = App::new();
     app.add_plugins((plugins, PlaybotPlugin { placement: TickPlacement::Frame }));
@@ -68,6 +62,7 @@ pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
 
 /// Gives every frame the same length, however long it takes: `hz` frames are a second of game time. With a window, it is
 /// for the window to draw no more than that.
+#[doc(hidden)]
 pub fn set_frame_rate(app: &mut App, hz: f64) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / hz)));
 }
@@ -79,6 +74,7 @@ pub fn set_frame_rate(app: &mut App, hz: f64) {
 ///
 /// Schedules are set to run on the thread that calls them: Bevy's own threads cost more than they bring in a World of
 /// this size, and several Worlds side by side use the cores better.
+#[doc(hidden)]
 pub fn into_world(mut app: App) -> World {
     app.finish();
     app.cleanup();
@@ -96,6 +92,7 @@ pub fn into_world(mut app: App) -> World {
 ///
 /// The first breach of contract of the game in this tick: see [`Faults`]. A panic, in Worlds with
 /// [`PanicReports`](crate::panics::PanicReports).
+#[doc(hidden)]
 pub fn tick_world(world: &mut World) -> Result<(), Fault> {
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(true);

@@ -6,17 +6,7 @@ use bevy::{
     window::{ExitCondition, WindowPlugin, WindowResolution},
 };
 
-/// The app has no screen, so that nothing needs to be drawn but what agents ask for.
-#[derive(Resource, Clone, Copy, Debug)]
-pub(crate) struct NoScreen;
-
-struct NoScreenPlugin;
-
-impl Plugin for NoScreenPlugin {
-    fn build(&self, app: &mut App) {
-        app.insert_resource(NoScreen);
-    }
-}
+use crate::no_screen::NoScreenPlugin;
 
 /// Bevy's `DefaultPlugins`, as this program is built with them, for a World that nobody looks at: input, assets, states,
 /// text, meshes and materials are there, and a window of 1280 by 720 that exists for the game only. There is no event
@@ -60,7 +50,7 @@ fn without_screen(plugins: PluginGroupBuilder, draws: bool) -> PluginGroupBuilde
     use bevy::render::{RenderPlugin, pipelined_rendering::PipelinedRenderingPlugin};
     let render_creation = if draws { crate::camera::drawing() } else { crate::camera::not_drawing() };
     let renderer = RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
-    let plugins = without_event_loop(plugins.set(renderer));
+    let plugins = without_event_loop(plugins.set(renderer)).add(crate::camera::RenderListPlugin);
     if plugins.contains::<PipelinedRenderingPlugin>() { plugins.disable::<PipelinedRenderingPlugin>() } else { plugins }
 }
 

@@ -23,6 +23,8 @@ pub struct KeyboardPlugin;
 /// Keys that were pressed since the last tick, whether or not they are still held.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub struct TappedKeys(Vec<KeyCode>);
 
 impl TappedKeys {

@@ -94,7 +94,10 @@ pub mod key_bindings;
 pub mod keyboard;
 mod known_plugins;
 pub mod level;
+mod no_screen;
 pub mod observation;
+// For playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub mod panics;
 pub mod placement;
 pub mod plugin;
@@ -109,10 +112,12 @@ pub mod reward;
 pub mod skill_prior;
 pub mod state_hash;
 pub mod streams;
+#[doc(hidden)]
 pub mod system_errors;
 pub mod systems;
 pub mod takeover;
 pub mod test_app;
+pub mod tick;
 pub mod unknown_name;
 pub mod virtual_input;
 pub mod vision;

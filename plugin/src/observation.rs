@@ -6,13 +6,7 @@ use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations};
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    agent::Agent,
-    control::Control,
-    episode::Episode,
-    fault::Faults,
-    vision::{ImageSensor, is_observed},
-};
+use crate::{agent::Agent, episode::Episode, fault::Faults};
 
 /// Names and number of the values of a vector observation, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,7 +61,7 @@ pub struct Observation {
     /// Values in the order of the sensor's names; empty without a [`VectorSensor`].
     pub vector: Vec<f32>,
     /// Pixels `[channels, height, width]` of 0 to 255, top row first; empty without an
-    /// [`ImageSensor`]. With stacked pictures the oldest comes first.
+    /// [`ImageSensor`](crate::vision::ImageSensor). With stacked pictures the oldest comes first.
     pub image: Vec<u8>,
 }
 
@@ -124,23 +118,6 @@ pub(crate) fn check_observations(
                 at(),
                 sensor.space.names[bad],
                 observation.vector[bad]
-            ));
-        }
-    }
-}
-
-/// Reports images of the wrong length, with agent and tick.
-pub(crate) fn check_images(
-    agents: Query<(&Agent, &ImageSensor, &Observation, &Control, &Episode)>,
-    mut faults: ResMut<Faults>,
-) {
-    for (agent, sensor, observation, control, episode) in &agents {
-        let (expected, got) = (sensor.0.shape().numbers(), observation.image.len());
-        if is_observed(control, episode) && got != expected {
-            faults.report(format!(
-                "agent {}, level {}, tick {}: the observation's image has {got} bytes, its sensor makes {expected}; add \
-                 the sensor and its plugin, and leave the image to them",
-                agent.index, episode.level, episode.tick
             ));
         }
     }

@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
 };
 
-use crate::{agent::Agent, control::Control, episode::Episode, headless::Tick};
+use crate::{agent::Agent, control::Control, episode::Episode, tick::Tick};
 
 /// What a tick is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
@@ -50,6 +50,8 @@ impl TickSchedules {
 /// Which frames are ticks, under [`TickPlacement::Frame`]: not the first, which only starts the clock, and none while an
 /// agent waits for its level.
 #[derive(Resource, Clone, Copy, Debug, Default)]
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub struct FrameGate {
     frames: u64,
     held: bool,
@@ -79,6 +81,7 @@ pub(crate) fn has_begun(gate: Res<FrameGate>) -> bool {
 }
 
 /// A run condition: whether this frame is a tick. Always under [`TickPlacement::Fixed`], where systems run in ticks only.
+#[doc(hidden)]
 pub fn is_tick(gate: Option<Res<FrameGate>>) -> bool {
     gate.is_none_or(|gate| gate.is_tick)
 }

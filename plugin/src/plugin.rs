@@ -5,10 +5,11 @@ use bevy::{ecs::schedule::ScheduleLabel, input::InputSystems, prelude::*};
 use crate::{
     action, agent, bot, demo, episode,
     fault::{FaultSystems, Faults, announce_faults},
-    headless, observation,
+    observation,
     placement::{self, FrameGate, TickPlacement, TickSchedules},
     policy, reflect, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
+    tick, vision,
 };
 
 /// Adds agents, episodes, skills, policies, recording and replay to a game.
@@ -24,7 +25,7 @@ impl Plugin for PlaybotPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<agent::AgentOrder>()
             .init_resource::<Faults>()
-            .init_resource::<headless::Tick>()
+            .init_resource::<tick::Tick>()
             .add_plugins((action::plugin, episode::plugin, observation::plugin))
             .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin, reflect::plugin))
             .init_schedule(ObserveSchedule)
@@ -48,7 +49,7 @@ impl Plugin for PlaybotPlugin {
             );
         match self.placement {
             TickPlacement::Fixed => {
-                app.add_systems(FixedFirst, headless::count_tick);
+                app.add_systems(FixedFirst, tick::count_tick);
             }
             TickPlacement::Frame => place_in_frames(app),
         }
@@ -89,7 +90,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
             )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
-            (run_observe_schedule, observation::check_observations, observation::check_images)
+            (run_observe_schedule, observation::check_observations, vision::check_images)
                 .chain()
                 .in_set(PlaybotSystems::Observe),
             (

@@ -13,7 +13,7 @@ use crate::{
     fault::Faults,
     observation::{Observation, start_batch},
     skill_prior::ActiveSkill,
-    vision::ImageSensor,
+    vision::{ImageSensor, seen_as},
 };
 
 /// How an action is taken from the policy's distribution.
@@ -155,30 +155,11 @@ fn misfit(
     Some(format!(
         "agent {}: the policy was made for {}, {} skill values and {:?}, but the game gives {}, {} and {:?}; {way_out}",
         agent.index,
-        in_words(&wanted),
+        wanted.describe(),
         spaces.0,
         spaces.1,
-        in_words(&seen),
+        seen.describe(),
         skill.z.len(),
         agent.actions
     ))
-}
-
-/// What a reader of observations like `wanted` gets from an agent, which may have sensors of both kinds.
-pub(crate) fn seen_as(wanted: &ObsKind, observation: &Observation, sensor: Option<&ImageSensor>) -> ObsKind {
-    let image = sensor.map(|sensor| sensor.0.shape()).filter(|shape| shape.numbers() == observation.image.len());
-    let vector = ObsKind::Vector(observation.vector.len());
-    match (wanted, image) {
-        (ObsKind::Image(_), Some(shape)) => ObsKind::Image(shape),
-        (ObsKind::Vector(_), Some(shape)) if observation.vector.is_empty() => ObsKind::Image(shape),
-        _ => vector,
-    }
-}
-
-/// An observation in a message: `26 observation values`, or the size of an image.
-pub fn in_words(kind: &ObsKind) -> String {
-    match kind {
-        ObsKind::Vector(values) => format!("{values} observation values"),
-        ObsKind::Image(_) => kind.to_string(),
-    }
 }

@@ -11,11 +11,11 @@ use crate::{
         replay::Replay,
     },
     fault::{FaultOccurred, Faults},
-    headless::Tick,
     key_bindings::KeyBindings,
     level::LevelQueue,
     reward::Reward,
     state_hash::StateHash,
+    tick::Tick,
 };
 
 pub(crate) fn plugin(app: &mut App) {

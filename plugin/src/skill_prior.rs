@@ -9,9 +9,8 @@ use crate::{
     episode::Episode,
     fault::Faults,
     observation::Observation,
-    policy::{in_words, seen_as},
     streams::AgentStreams,
-    vision::ImageSensor,
+    vision::{ImageSensor, seen_as},
 };
 
 /// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every `horizon` fixed ticks
@@ -61,6 +60,8 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
 }
 
 /// Draws for the agents whose skill has run out, in one batch.
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,
@@ -106,7 +107,7 @@ pub fn draw_skills(
 fn misfit(prior: &Prior, agent: &Agent, observation: &Observation, sensor: Option<&ImageSensor>) -> Option<String> {
     let wanted = prior.observation()?;
     let seen = seen_as(&wanted, observation, sensor);
-    let (number, wanted_words, seen_words) = (agent.index, in_words(&wanted), in_words(&seen));
+    let (number, wanted_words, seen_words) = (agent.index, wanted.describe(), seen.describe());
     (wanted != seen).then(|| {
         format!(
             "agent {number}: the skill prior was made for {wanted_words}, but the game gives {seen_words}; load the \

@@ -4,10 +4,7 @@
 use std::time::Instant;
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    headless::{PlaybotAppExt, Tick},
-    vision::Frame,
-};
+use bevy_playbot::{headless::PlaybotAppExt, tick::Tick, vision::Frame};
 
 use crate::memory::resident_kib;
 

@@ -77,7 +77,7 @@ fn a_target_that_is_gone_is_named() {
     let fault = fault(&mut world);
     assert!(fault.contains("agent 6") && fault.contains(&format!("the target {gone}")), "{fault}");
     let frame = world.get::<bevy_playbot::vision::Frame>(other).expect("a frame");
-    assert_eq!(frame.tick, Some(world.resource::<bevy_playbot::headless::Tick>().0), "others go on seeing");
+    assert_eq!(frame.tick, Some(world.resource::<bevy_playbot::tick::Tick>().0), "others go on seeing");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_playbot::{
     camera::{CameraSensor, ReadbackDelay},
-    headless::Tick,
+    tick::Tick,
     vision::{Frame, ImageOptions, Stage, TileLayer, VisionSystems},
 };
 use playbot_lab::prelude::*;

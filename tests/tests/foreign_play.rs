@@ -8,7 +8,7 @@ use bevy_playbot::{
         file::{DemoHeader, DemoWriter},
         recorder::demo_actions,
     },
-    headless::Tick,
+    tick::Tick,
     vision::ObservationConfig,
 };
 use playbot_lab::{

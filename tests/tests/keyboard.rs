@@ -8,10 +8,7 @@ use bevy::{
     prelude::*,
     time::TimeUpdateStrategy,
 };
-use bevy_playbot::{
-    headless::{Tick, set_fixed_step},
-    keyboard::KeyboardPlugin,
-};
+use bevy_playbot::{headless::set_fixed_step, keyboard::KeyboardPlugin, tick::Tick};
 use playbot_lab::prelude::*;
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 

@@ -13,9 +13,10 @@ use bevy::{
 use bevy_playbot::{
     demo::file::{Decider, DemoEnd, DemoReader, merge_demos},
     fault::FaultOccurred,
-    headless::{Tick, set_fixed_step},
+    headless::set_fixed_step,
     prelude::*,
     takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest},
+    tick::Tick,
 };
 use playbot_learner::{DeviceKind, Learner as _, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner};
 use playbot_tests::{Cell, Drift, corridor_plugin, spawn_walker};

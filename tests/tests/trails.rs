@@ -7,10 +7,11 @@ use playbot_games::{
     registry,
 };
 use playbot_lab::{
+    drawing::Shape,
     eval::{EvalPlan, Player, Trail, evaluate, evaluate_with_trails},
     floor_plan::FloorPlan,
     game::Game,
-    report::{Floor, Shape, TrailChart, Visits, Walker},
+    report::{Floor, TrailChart, Visits, Walker},
 };
 
 fn game(name: &str) -> &'static dyn Game {

@@ -8,11 +8,10 @@ use playbot_lab::prelude::*;
 use playbot_lab::{
     demo::dataset::Demonstrations,
     train::{
-        Algorithm, Experiment, Trainer,
+        Algorithm, Experiment, TrainError, Trainer,
         checkpoint::Which,
         config_file::parse_experiment,
         run_dir::{RunDir, RunError, RunInfo},
-        trainer::TrainError,
     },
     worlds::build_world,
 };

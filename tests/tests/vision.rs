@@ -5,7 +5,8 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
-    headless::{Tick, into_world},
+    headless::into_world,
+    tick::Tick,
     vision::{
         BlankEpisodes, Frame, ImageOptions, ImageSensor, ObservationConfig, ObservationKind, PaintedVelocity,
         VisionPlugin, VisionSystems,

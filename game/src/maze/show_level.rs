@@ -4,8 +4,8 @@ use std::{fs::File, io::Read, path::Path};
 
 use bevy::math::{Rect, Vec2};
 use playbot_lab::{
+    drawing::{Drawing, MarkForm, Rgb, Shape},
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
-    report::{Drawing, MarkForm, Rgb, Shape},
 };
 use serde_json::json;
 

@@ -144,13 +144,21 @@ impl Game for Maze2d {
     fn benchmarks(&self) -> Vec<Benchmark> {
         vec![
             Benchmark::simulate("vector", "medium"),
-            Benchmark::simulate("physics", "medium").of(&Maze2d { physics: true }),
+            Benchmark::simulate("physics", "medium"),
             Benchmark::simulate("rapier", "medium+contact=rapier"),
             Benchmark::simulate("random", "random"),
-            Benchmark::simulate("sighted", "random").of(&Sighted(Maze2d { physics: false })),
+            Benchmark::simulate("sighted", "random"),
             Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster),
             Benchmark::train("vector", "medium"),
         ]
+    }
+
+    fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
+        match benchmark.case {
+            "physics" => Some(&Maze2d { physics: true }),
+            "sighted" => Some(&Sighted(Maze2d { physics: false })),
+            _ => None,
+        }
     }
 
     fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {

@@ -91,7 +91,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 
 /// The measurements of a game: their names, the game that is played, and how.
 fn cases(game: &dyn Game) -> Vec<(String, &dyn Game, Benchmark)> {
-    let of = |case: Benchmark| (case.name(game), case.game.map_or(game, |other| other as &dyn Game), case);
+    let of = |case: Benchmark| (case.name(game.name()), game.benchmarked(&case).unwrap_or(game), case);
     game.benchmarks().into_iter().map(of).collect()
 }
 

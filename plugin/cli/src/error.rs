@@ -19,8 +19,8 @@ use playbot_lab::{
     runs::RunsError,
     split::SplitError,
     train::{
-        arena_state::RestoreError, config::ExperimentError, config_file::ConfigError, run_dir::RunError,
-        study::StudyError, trainer::TrainError,
+        TrainError, arena_state::RestoreError, config::ExperimentError, config_file::ConfigError, run_dir::RunError,
+        study::StudyError,
     },
 };
 use playbot_learner::{FileError, LearnError};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
-    policy::{ActionDraw, in_words},
+    policy::ActionDraw,
     skill_prior::SkillPrior,
     vision::{ObservationConfig, ObservationKind},
 };
@@ -271,7 +271,7 @@ pub fn check_skills(
     Err(CliError::Usage(format!(
         "{} holds skills for {} and {:?}, which are those of {whose}, not of `{}`: {advice}",
         path.display(),
-        in_words(&model.observation()),
+        model.observation().describe(),
         model.action_space(),
         game.name()
     )))

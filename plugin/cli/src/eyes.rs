@@ -15,9 +15,10 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
+    output,
     player::Chosen,
     progress,
-    view::{self, film::to_png, screen::Screen},
+    view::{film::to_png, screen::Screen},
 };
 
 /// Compares what the camera and the raster see of the same moments: a policy that is trained on one should not notice
@@ -240,7 +241,7 @@ fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), Cli
     for (name, bytes) in
         [("worst.png", to_png(&screen)?), ("table.md", text.into_bytes()), ("results.json", json.into_bytes())]
     {
-        view::write(&folder.join(name), &bytes)?;
+        output::write(&folder.join(name), &bytes)?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use crate::{
     error::{CliError, Outcome, print_line},
     output,
     plot::PlotFile,
-    view::{self, film::Film},
+    view::film::Film,
 };
 
 /// Shows the layout of a level.
@@ -67,7 +67,7 @@ fn write(path: &Path, file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> 
         LevelPicture::Pixels { image, pixels } => {
             output::png(&path.to_string_lossy())
                 .map_err(|why| CliError::Usage(format!("{}: {why}", path.display())))?;
-            view::write(path, &Film::new(*image, 1, tick_hz)?.still(pixels)?.0)
+            output::write(path, &Film::new(*image, 1, tick_hz)?.still(pixels)?.0)
         }
     }
 }

@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_lab::train::run_dir::write_atomically;
+
 use super::error::CliError;
 
 /// Makes the folder that a file lies in, and tries whether one can be written there.
@@ -31,6 +33,16 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
 pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     let folder = path.parent().unwrap_or(path);
     fs::create_dir_all(folder).map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))
+}
+
+/// Writes a file, and makes the folder it lies in.
+///
+/// # Errors
+///
+/// The folder or the file cannot be written.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    make_folder_of(path)?;
+    Ok(write_atomically(path, bytes)?)
 }
 
 /// The file in the same folder whose name goes on with `ending`.

@@ -4,10 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
-    policy::{ActionDraw, in_words},
-    policy_file::policy_observation,
-    skill_prior::SkillPrior,
-    vision::ObservationConfig,
+    policy::ActionDraw, policy_file::policy_observation, skill_prior::SkillPrior, vision::ObservationConfig,
 };
 use playbot_lab::sensors::GameSensors;
 use playbot_lab::{
@@ -116,13 +113,13 @@ impl Chosen {
         if (policy.observation(), policy.action_space()) == (seen, acts) {
             return Ok(());
         }
-        let (reads, made_for) = (in_words(&policy.observation()), policy.action_space());
+        let (reads, made_for) = (policy.observation().describe(), policy.action_space());
         Err(CliError::Usage(format!(
             "the policy {} was made for {reads} and {made_for:?}, but `{}` has {} and {acts:?}: use one that was \
              trained for this game and this version",
             self.name,
             game.name(),
-            in_words(&seen)
+            seen.describe()
         )))
     }
 }

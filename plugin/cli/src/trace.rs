@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use playbot_lab::{
     games::Games,
-    inspect::{InspectError, TraceRequest, trace_actions},
+    inspect::{InspectError, TraceRequest},
+    trace::trace_actions,
 };
 
 use crate::error::{CliError, Outcome, print_line};

@@ -7,11 +7,10 @@ use playbot_lab::{
     game::Game,
     parallel::default_threads,
     train::{
-        Algorithm, Experiment, Trainer, UpdateReport,
+        Algorithm, Experiment, TrainError, Trainer, UpdateReport,
         checkpoint::Which,
         checksum::file_checksum,
         run_dir::{RunDir, RunError, RunInfo},
-        trainer::TrainError,
     },
 };
 use playbot_learner::{DeviceKind, SkillModel};

@@ -2,10 +2,8 @@
 
 use bevy_playbot::vision::ObservationKind;
 
-use crate::game::Game;
-
 /// One measurement of speed.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Benchmark {
     /// Its name, after the game's.
     pub case: &'static str,
@@ -15,14 +13,12 @@ pub struct Benchmark {
     pub observation: ObservationKind,
     /// Whether a learner learns, too.
     pub train: bool,
-    /// Another game than the one that names it, such as the same one with physics.
-    pub game: Option<&'static dyn Game>,
 }
 
 impl Benchmark {
     /// Random actions in this mode, with state vectors.
     pub const fn simulate(case: &'static str, mode: &'static str) -> Self {
-        Self { case, mode, observation: ObservationKind::Vector, train: false, game: None }
+        Self { case, mode, observation: ObservationKind::Vector, train: false }
     }
 
     /// PPO in this mode, on state vectors.
@@ -35,13 +31,8 @@ impl Benchmark {
         Self { observation, ..self }
     }
 
-    /// The same, of another game.
-    pub const fn of(self, game: &'static dyn Game) -> Self {
-        Self { game: Some(game), ..self }
-    }
-
-    /// Its whole name: `sim/coinrun/vector`.
-    pub fn name(&self, game: &dyn Game) -> String {
-        format!("{}/{}/{}", if self.train { "train" } else { "sim" }, game.name(), self.case)
+    /// Its whole name, with that of the game: `sim/coinrun/vector`.
+    pub fn name(&self, game: &str) -> String {
+        format!("{}/{game}/{}", if self.train { "train" } else { "sim" }, self.case)
     }
 }

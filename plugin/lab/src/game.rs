@@ -167,6 +167,12 @@ pub trait Game: Send + Sync {
         modes.map_or_else(Vec::new, |mode| vec![Benchmark::simulate("vector", mode), Benchmark::train("vector", mode)])
     }
 
+    /// Another game that is played for one of its [`benchmarks`](Self::benchmarks), such as the same one with physics;
+    /// `None` for itself.
+    fn benchmarked(&self, _benchmark: &Benchmark) -> Option<&dyn Game> {
+        None
+    }
+
     /// Shows a level.
     ///
     /// # Errors
@@ -187,7 +193,7 @@ pub trait Game: Send + Sync {
     }
 
     /// The game's own way of playing given actions and printing the state after each, with what is to be said about it at
-    /// the end, if anything. `None` where [`trace_actions`](crate::inspect::trace_actions) does.
+    /// the end, if anything. `None` where [`trace_actions`](crate::trace::trace_actions) does.
     fn trace(&self, _request: &TraceRequest, _print: Print) -> Option<Result<Option<String>, InspectError>> {
         None
     }

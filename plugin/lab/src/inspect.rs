@@ -2,17 +2,14 @@
 
 use std::path::Path;
 
-use bevy::prelude::*;
 use bevy_playbot::{
-    action::misfit,
     fault::Fault,
-    prelude::*,
     unknown_name::UnknownName,
     vision::{ImageOptions, VisionError},
 };
 use thiserror::Error;
 
-use crate::{game::Game, mode::ModeError, report::Drawing, worlds::build_world};
+use crate::{drawing::Drawing, mode::ModeError};
 
 /// The game cannot show that.
 #[derive(Debug, Error)]
@@ -95,70 +92,6 @@ pub struct TraceRequest<'a> {
 
 /// Takes one line of output.
 pub type Print<'a> = &'a mut dyn FnMut(String) -> Result<(), InspectError>;
-
-/// Plays given discrete actions and prints the columns of [`Game::trace_row`], the reward and whether the episode ended.
-///
-/// # Errors
-///
-/// The actions are not the game's, or it broke its contract.
-pub fn trace_actions(game: &dyn Game, request: &TraceRequest, print: Print) -> Result<(), InspectError> {
-    let mode = request.mode.or(game.modes().last().copied()).unwrap_or_default();
-    game.check_mode(mode)?;
-    if !request.start.is_empty() {
-        return Err(InspectError::Usage(format!("--start is not for {}: its levels say where to start", game.name())));
-    }
-    let actions = read_actions(game, request)?;
-    let (mut world, agents) = build_world(game, mode, 0, 0, 1);
-    let agent = agents[0];
-    world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(request.seed)));
-    let columns = game.trace_columns();
-    if !request.json {
-        let names: String = columns.iter().map(|name| format!(" {name:>12}")).collect();
-        print(format!("{:>5}{names} {:>6} done", "step", "reward"))?;
-    }
-    for (step, action) in actions.into_iter().enumerate() {
-        world.entity_mut(agent).insert(Action(ActionValue::Discrete(action)));
-        world.tick()?;
-        let row: Vec<_> = game.trace_row(&world, agent).into_iter().map(plain).collect();
-        let reward = plain(world.get::<Reward>(agent).map_or(0.0, Reward::get));
-        let done = world.get::<Episode>(agent).is_none_or(|episode| !episode.is_running());
-        if request.json {
-            print(format!("[{},{reward},{}]", row.join(","), u8::from(done)))?;
-        } else {
-            let values: String = row.iter().map(|value| format!(" {value:>12}")).collect();
-            print(format!("{:>5}{values} {reward:>6} {done}", step + 1))?;
-        }
-        if done {
-            break;
-        }
-    }
-    Ok(())
-}
-
-fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, InspectError> {
-    let space = game.actions();
-    if matches!(space, ActionSpace::Continuous(_)) {
-        return Err(InspectError::Usage(format!("`{}` has continuous actions, which cannot be traced", game.name())));
-    }
-    let actions = match request.file {
-        None => request.actions.to_vec(),
-        Some(path) => {
-            let text = read_text(path)?;
-            let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
-            let parsed: Result<Vec<u32>, _> =
-                words.map(|word| word.parse().map_err(|_| no_action(path, word))).collect();
-            parsed?
-        }
-    };
-    match actions.iter().find_map(|&action| misfit(&ActionValue::Discrete(action), &space)) {
-        Some(why) => Err(InspectError::Usage(why)),
-        None => Ok(actions),
-    }
-}
-
-fn no_action(path: &Path, word: &str) -> InspectError {
-    InspectError::Usage(format!("{}: `{word}` is not an action; write numbers from 0", path.display()))
-}
 
 /// The text of a file.
 ///

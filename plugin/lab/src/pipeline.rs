@@ -38,7 +38,7 @@ use crate::{
     mode::ModeError,
     policy_export::policy_file,
     split::LevelSplit,
-    train::{Experiment, Trainer, UpdateReport, config::ExperimentError, trainer::TrainError},
+    train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
     worlds::build_world,
 };
 

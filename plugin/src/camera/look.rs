@@ -15,7 +15,7 @@ use super::{
     renderer::Renderer,
     request::{Asked, Request, report, requests},
 };
-use crate::{fault::Faults, headless::Tick, vision::Frame};
+use crate::{fault::Faults, tick::Tick, vision::Frame};
 
 /// How long shaders and images may take to load, in seconds.
 const PATIENCE: u64 = 60;

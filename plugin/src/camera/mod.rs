@@ -30,6 +30,7 @@ mod look;
 mod plugin;
 mod prepare;
 mod readback;
+mod render_list;
 mod renderer;
 mod request;
 mod scene_schedule;
@@ -38,8 +39,15 @@ mod tiles;
 
 pub(crate) use adapter::{creation as drawing, none as not_drawing};
 pub use error::CameraError;
-pub use eye::SensorCamera;
 pub use plugin::CameraSensorPlugin;
-pub use readback::ReadbackDelay;
+pub(crate) use render_list::RenderListPlugin;
 pub use sensor::{CameraSensor, CameraSource};
-pub use tiles::{TileBorder, TileLayerPlugin};
+pub use tiles::TileBorder;
+
+// For playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
+pub use eye::SensorCamera;
+#[doc(hidden)]
+pub use readback::ReadbackDelay;
+#[doc(hidden)]
+pub use tiles::TileLayerPlugin;

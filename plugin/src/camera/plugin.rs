@@ -16,7 +16,7 @@ use super::{
     scene_schedule::add_renderer,
 };
 use crate::{
-    headless_plugins::NoScreen,
+    no_screen::NoScreen,
     systems::ObserveSchedule,
     vision::{VisionError, VisionPlugin, VisionSystems},
 };

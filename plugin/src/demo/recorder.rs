@@ -73,6 +73,8 @@ pub struct Recording {
 }
 
 /// The kind of actions as a recording's header has it.
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn demo_actions(space: &ActionSpace) -> DemoActions {
     match space {
         ActionSpace::Discrete(n) => DemoActions::Discrete(*n),
@@ -157,6 +159,7 @@ pub fn record_ticks(
 /// # Errors
 ///
 /// The file could not be written.
+#[doc(hidden)]
 pub fn flush_unfinished(world: &mut World) -> Result<(), DemoFileError> {
     let entities = world.resource::<AgentOrder>().entities().to_vec();
     for entity in entities {

@@ -70,6 +70,8 @@ impl Replay {
 }
 
 /// The action of one tick of a recording.
+// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
 pub fn recorded_action(actions: &EpisodeActions, tick: usize) -> Option<ActionValue> {
     match actions {
         EpisodeActions::Discrete(list) => list.get(tick).map(|index| ActionValue::Discrete(*index)),

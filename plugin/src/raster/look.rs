@@ -17,7 +17,7 @@ use crate::{
     control::Control,
     episode::Episode,
     fault::Faults,
-    headless::Tick,
+    tick::Tick,
     vision::{Frame, ImageSensor, is_observed},
 };
 

@@ -14,8 +14,8 @@ use crate::{
     control::Control,
     episode::{Episode, EpisodeCount},
     fault::Faults,
-    headless::Tick,
     observation::Observation,
+    tick::Tick,
 };
 
 /// Why a frame cannot become an observation.

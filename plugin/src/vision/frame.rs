@@ -11,6 +11,6 @@ use bevy::prelude::*;
 pub struct Frame {
     /// `[height, width]` pixels of `[red, green, blue, 255]`.
     pub pixels: Vec<[u8; 4]>,
-    /// The tick ([`Tick`](crate::headless::Tick)) it was taken in; `None` before the first.
+    /// The tick ([`Tick`](crate::tick::Tick)) it was taken in; `None` before the first.
     pub tick: Option<u64>,
 }

@@ -13,6 +13,7 @@
 
 mod blank;
 mod card;
+mod check_images;
 mod compose;
 mod difference;
 mod frame;
@@ -20,35 +21,32 @@ mod observation_config;
 mod options;
 mod planes;
 mod plugin;
+mod seen_as;
 mod sprite_image;
 mod stack;
 mod stage;
+mod systems;
 mod tile_layer;
 mod velocity;
 
-pub use blank::BlankEpisodes;
 pub use card::UnknownObservation;
-pub use difference::{CLOSE, Difference};
 pub use frame::Frame;
 pub use observation_config::{ObservationConfig, ObservationKind, Picture};
 pub use options::{ImageOptions, ImageSensor, MAX_SIDE, VisionError};
-pub use plugin::VisionPlugin;
 pub use stage::Stage;
+pub use systems::VisionSystems;
 pub use tile_layer::TileLayer;
 pub use velocity::PaintedVelocity;
 
+// For playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
+pub use blank::BlankEpisodes;
+#[doc(hidden)]
+pub use difference::{CLOSE, Difference};
+#[doc(hidden)]
+pub use plugin::VisionPlugin;
+
+pub(crate) use check_images::check_images;
 pub(crate) use compose::is_observed;
+pub(crate) use seen_as::seen_as;
 pub(crate) use sprite_image::{NO_IMAGE, lacks_image};
-
-use bevy::ecs::schedule::SystemSet;
-
-/// Parts of [`ObserveSchedule`](crate::systems::ObserveSchedule) for agents that see pictures, in this order.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum VisionSystems {
-    /// The game brings what is drawn up to date: transforms, sprites, tiles.
-    Dress,
-    /// Sensors fill each agent's [`Frame`].
-    Look,
-    /// The frame's tick is checked, and the observation made of it.
-    Compose,
-}

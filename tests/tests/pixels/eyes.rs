@@ -3,7 +3,7 @@
 use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind, VisionError};
 use playbot_lab::{
     prelude::*,
-    train::{Experiment, Trainer, collect::Collector, trainer::TrainError},
+    train::{Experiment, TrainError, Trainer, collect::Collector},
     worlds::build_observing_world,
 };
 use playbot_learner::{DeviceKind, Learner as _, ObsKind, Observations, PolicySpec, PpoLearner};

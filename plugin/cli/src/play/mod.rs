@@ -1,64 +1,13 @@
 //! `playbot play`.
 
+mod args;
+#[cfg(not(feature = "window"))]
+mod no_window;
 #[cfg(feature = "window")]
 mod window;
 
-use std::path::PathBuf;
-
-use super::{player::PlayerArgs, recording::Existing};
-
-/// Opens a window in which a person plays, records what is played, and hands over to a policy or a bot and back.
-#[derive(clap::Args)]
-#[command(after_help = "Keys:
-  those of the game, printed at the start
-  Tab        hand over to the policy or bot, and take over again
-  R, N       play the level again, go to the next one
-  P          pause
-  -, =       see more, see less
-  V          ants from above or in space, in a program with the feature view3d
-  Escape     end, as do Ctrl-Q and closing the window
-
-A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
-
-Examples:
-  playbot play coinrun --seed 7
-  playbot play coinrun --levels 0..63 --record my.demo
-  playbot play coinrun --run runs/first --record mixed.demo
-  playbot play coinrun --mode easy --bot search")]
-#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window only"))]
-pub struct Args {
-    /// Name of the game.
-    game: String,
-    /// Mode of the game, such as hard; the game's last one unless the levels name one.
-    #[arg(long)]
-    mode: Option<String>,
-    /// Level to begin with; the first of the levels if none is named.
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Levels, as first..last or mode:first..last, both included; all if none are named.
-    #[arg(long)]
-    levels: Option<String>,
-    /// Recording to write.
-    #[arg(long, value_name = "FILE")]
-    record: Option<PathBuf>,
-    #[command(flatten)]
-    existing: Existing,
-    /// Who plays, for the recording.
-    #[arg(long, default_value = "human")]
-    name: String,
-    /// Who takes over with Tab.
-    #[command(flatten)]
-    partner: PlayerArgs,
-}
-
+pub use args::Args;
+#[cfg(not(feature = "window"))]
+pub use no_window::run;
 #[cfg(feature = "window")]
 pub use window::run;
-
-#[cfg(not(feature = "window"))]
-pub fn run(_: Args, _: &playbot_lab::games::Games) -> Result<super::error::Outcome, super::error::CliError> {
-    Err(super::error::CliError::Usage(
-        "this program was built without a window: build with `cargo build --release --features window`, which needs no \
-         system packages"
-            .to_owned(),
-    ))
-}

@@ -1,56 +1,6 @@
 //! Drawings as files.
 
 mod painter;
+mod plot_file;
 
-use std::path::{Path, PathBuf};
-
-use playbot_lab::report::Drawing;
-
-use super::{error::CliError, view};
-
-/// A file for a drawing, of a kind that is known.
-#[derive(Clone, Debug)]
-pub struct PlotFile {
-    path: PathBuf,
-    is_svg: bool,
-}
-
-impl PlotFile {
-    /// A file by its path; its ending says its kind. The folder it lies in is made, so that nothing is computed for a file
-    /// that cannot be written.
-    ///
-    /// # Errors
-    ///
-    /// The ending is neither `.png` nor `.svg`, the path is that of a folder, or its folder cannot be made.
-    pub fn new(path: &Path) -> Result<Self, CliError> {
-        let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
-        let is_svg = match ending.as_deref() {
-            Some("svg") => true,
-            Some("png") => false,
-            _ => {
-                return Err(CliError::Usage(format!(
-                    "{}: a picture is written as .png or .svg; choose one of them",
-                    path.display()
-                )));
-            }
-        };
-        if path.is_dir() {
-            return Err(CliError::Usage(format!("{} is a folder: name a file for the picture", path.display())));
-        }
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)
-                .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
-        }
-        Ok(Self { path: path.to_owned(), is_svg })
-    }
-
-    /// Writes a drawing.
-    ///
-    /// # Errors
-    ///
-    /// It is too large for a PNG, or cannot be written.
-    pub fn write(&self, drawing: &Drawing) -> Result<(), CliError> {
-        let bytes = if self.is_svg { drawing.to_svg().into_bytes() } else { painter::to_png(drawing)? };
-        view::write(&self.path, &bytes)
-    }
-}
+pub use plot_file::PlotFile;

@@ -1,7 +1,7 @@
 //! Painting a drawing as pixels.
 
 use bevy::math::Vec2;
-use playbot_lab::report::{Drawing, MarkForm, Rgb, Shape};
+use playbot_lab::drawing::{Drawing, MarkForm, Rgb, Shape};
 
 use crate::{
     error::CliError,

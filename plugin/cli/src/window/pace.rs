@@ -7,7 +7,7 @@ use bevy::{
     prelude::*,
     time::TimeSystems,
 };
-use bevy_playbot::{headless::Tick, keyboard::TappedKeys, vision::VisionSystems};
+use bevy_playbot::{keyboard::TappedKeys, tick::Tick, vision::VisionSystems};
 use playbot_lab::prelude::*;
 
 /// How long the end of an episode stays to be seen.

@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn resources_and_observers_are_no_entities_of_the_game() {
         let (mut world, mut census) = (World::new(), Census::default());
-        world.init_resource::<bevy_playbot::headless::Tick>();
+        world.init_resource::<bevy_playbot::tick::Tick>();
         world.add_observer(|_: On<Add, Brick>| {});
         let brick = world.spawn(Brick).id();
         census.update(&world);

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::chart::Chart;
-use super::escape::{escape, with_code_spans};
 use super::svg::{CHART_STYLE, draw};
 use super::table::Table;
+use crate::escape::{escape, with_code_spans};
 
 const PAGE_STYLE: &str = include_str!("page.css");
 /// Reports with more sections than this begin with a list of them.

@@ -3,7 +3,7 @@
 //! - [`Chart`] draws [`Curve`]s as SVG, [`to_svg`] several charts in one file, [`sparkline`] a curve as text.
 //! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`]; a [`PlainTable`] holds any text.
 //! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
-//! - [`TrailChart`] draws where agents went on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a [`Drawing`].
+//! - [`TrailChart`] draws where agents went on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a [`Drawing`](crate::drawing::Drawing).
 //! - [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
 //!   no network. It follows the reader's light or dark setting and prints.
@@ -13,8 +13,6 @@
 mod axis;
 mod chart;
 mod document;
-mod drawing;
-mod escape;
 mod line;
 mod mark;
 mod number;
@@ -34,7 +32,6 @@ mod trails;
 
 pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
-pub use drawing::{Drawing, MarkForm, Rgb, Shape};
 pub use number::{readable, readable_with_spread, whole};
 pub use result::{ResultRow, ResultTable};
 pub use sparkline::sparkline;

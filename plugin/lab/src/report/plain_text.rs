@@ -1,7 +1,7 @@
 //! Tables of text for the console.
 
-use super::escape::one_line;
 use super::table::{PlainTable, number_columns};
+use crate::escape::one_line;
 
 impl PlainTable {
     /// The table for the console, with aligned columns; ends with a line feed.

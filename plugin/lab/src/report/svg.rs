@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use super::axis::Axis;
 use super::chart::{Chart, is_point};
-use super::escape::escape;
 use super::line::{band_paths, line_path, stretches};
 use super::mark::Mark;
 use super::number::tick_labels;
 use super::text_width::{spread, text_width, wrap};
+use crate::escape::escape;
 
 /// Colours and fonts of a chart, for light and dark surroundings.
 pub(super) const CHART_STYLE: &str = include_str!("chart.css");

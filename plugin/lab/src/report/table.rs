@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::escape::escape;
 use super::number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent};
 use super::result::{Rank, ResultRow, ResultTable, rank_key, ranks};
+use crate::escape::escape;
 
 /// A table of text.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
 //! Results for the console.
 
-use super::escape::one_line;
 use super::number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent};
 use super::result::{Rank, ResultRow, ResultTable, rank_key, ranks};
+use crate::escape::one_line;
 
 const HEADINGS: [&str; 7] = ["method", "split", "episodes", "return", "success", "length", "steps/s"];
 /// The first columns are words, the others numbers.

@@ -6,7 +6,7 @@ use super::error::RunsError;
 use crate::train::{
     json_lines::JsonLines,
     metrics_log::{EPISODE_MEANS, EPISODES, MetricsLog, SPS, scalars},
-    trainer::RECENT,
+    progress::RECENT,
 };
 use bevy_playbot::unknown_name::UnknownName;
 

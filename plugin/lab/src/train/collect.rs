@@ -3,16 +3,11 @@
 use bevy::prelude::*;
 use playbot_learner::{Actions, LearnError, ObsKind, Observations, Policy, Rollout, RolloutStep};
 
-use crate::sensors::GameSensors;
-use crate::{
-    game::Game,
-    split::LevelSplit,
-    train::{
-        arena_state::ActionLog,
-        cut_episodes::{CutEpisodes, cut_episodes, push_state},
-    },
-    worlds::build_observing_world,
+use super::{
+    arena_state::ActionLog,
+    cut_episodes::{CutEpisodes, cut_episodes, push_state},
 };
+use crate::{game::Game, sensors::GameSensors, split::LevelSplit, worlds::build_observing_world};
 use bevy_playbot::{
     action::Action,
     agent::{Agent, AgentOrder},

@@ -1,34 +1,24 @@
-//! The last states of episodes that run out of time: what a learner values where the game could have gone on.
+//! Episodes that ran out of time: the states in which they stopped, and what these were still worth.
 
 use bevy::prelude::*;
-use playbot_learner::{LearnError, ObsKind, Observations, Policy};
-
 use bevy_playbot::{
     episode::{Episode, EpisodeEnd},
     observation::Observation,
     skill_prior::{ActiveSkill, SkillPrior},
     systems::ObserveSchedule,
 };
-
-/// Adds what an agent sees, and the skill it holds.
-pub(super) fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
-    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
-        skills.extend_from_slice(&skill.z);
-        observation.push_to(observations);
-    }
-}
+use playbot_learner::{LearnError, ObsKind, Observations, Policy};
 
 /// The last states of the episodes that ran out of time in one tick.
 pub(super) struct CutEpisodes {
-    /// Rows of the agents.
-    pub agents: Vec<usize>,
-    pub obs: Observations,
-    pub z: Vec<f32>,
-    pub values: Vec<f32>,
+    pub(super) agents: Vec<usize>,
+    pub(super) obs: Observations,
+    pub(super) z: Vec<f32>,
+    pub(super) values: Vec<f32>,
 }
 
 impl CutEpisodes {
-    pub fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
+    pub(super) fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
         Self { agents, obs: Observations::empty(kind), z: Vec::new(), values: Vec::new() }
     }
 }
@@ -73,4 +63,12 @@ pub(super) fn cut_episodes(
         }
     }
     Ok(cut)
+}
+
+/// Adds what an agent sees now, and its skill.
+pub(super) fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
+    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
+        skills.extend_from_slice(&skill.z);
+        observation.push_to(observations);
+    }
 }

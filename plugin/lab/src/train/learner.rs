@@ -8,7 +8,7 @@ use std::{
 pub use playbot_learner::LearnerMetrics;
 use playbot_learner::{DeviceKind, FileError, PolicySpec, PpoLearner, SacLearner, SkillModel};
 
-use super::{algorithm::Algorithm, config::Experiment, trainer::TrainError};
+use super::{algorithm::Algorithm, config::Experiment, train_error::TrainError};
 use crate::game::Game;
 use crate::sensors::GameSensors;
 use bevy_playbot::vision::ObservationConfig;

@@ -16,7 +16,7 @@ use super::{
     json_lines::{JsonLines, append_json_line},
     run_dir::{RunError, io_error, write_atomically},
     tensorboard::{Event, EventFolder, EventKind},
-    trainer::UpdateReport,
+    update_report::UpdateReport,
 };
 
 /// Tag of the success rate of the last 100 episodes.

@@ -26,9 +26,12 @@ use super::{
     config_file::read_experiment,
     learner::Learner,
     metrics_log::MetricsLog,
+    progress::Progress,
     replaced_run::ReplacedRun,
     run_lock::RunLock,
-    trainer::{self, Progress, TrainError, Trainer, UpdateReport},
+    train_error::TrainError,
+    trainer::{self, Trainer},
+    update_report::UpdateReport,
 };
 use crate::game::Game;
 

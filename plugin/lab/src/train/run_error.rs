@@ -8,7 +8,7 @@ use std::{
 use playbot_learner::FileError;
 use thiserror::Error;
 
-use super::{config_file::ConfigError, trainer::TrainError};
+use super::{config_file::ConfigError, train_error::TrainError};
 
 /// A run's folder cannot be used.
 #[derive(Debug, Error)]

@@ -1,157 +1,24 @@
 //! The training loop, one update at a time: the caller owns the progress bar and decides when to stop.
 
-use std::{collections::VecDeque, path::Path, time::Instant};
+use std::{path::Path, time::Instant};
 
 use bevy::prelude::World;
+use bevy_playbot::{fault::Fault, skill_prior::SkillPrior};
 use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel, SkillSource};
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{
-    arena_state::RestoreError,
-    checkpoint::CheckpointSummary,
     collect::Collector,
-    config::{Algorithm, Experiment, ExperimentError},
-    learner::{Learner, LearnerMetrics},
-    metrics_log::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
+    config::Experiment,
+    learner::Learner,
+    progress::Progress,
+    train_error::TrainError,
+    update_report::{Timing, UpdateReport},
 };
-use crate::arrangement::Arrangement;
-use crate::game::Game;
-use crate::parallel::on_threads;
-use crate::sensors::GameSensors;
-use bevy_playbot::{
-    episode::EpisodeEnded,
-    fault::Fault,
-    panics::PanicReports,
-    policy::in_words,
-    skill_prior::SkillPrior,
-    vision::{ObservationConfig, UnknownObservation, VisionError},
-};
-
-/// Episodes over which the current return, length and success rate are averaged.
-pub(crate) const RECENT: usize = 100;
+use crate::{arrangement::Arrangement, game::Game, parallel::on_threads, sensors::GameSensors};
+use bevy_playbot::panics::PanicReports;
 
 /// Rows on which the first policy is compared with the decoder.
 const INITIAL_KL_ROWS: usize = 1024;
-
-/// Training cannot go on.
-#[derive(Debug, Error)]
-pub enum TrainError {
-    /// The experiment makes no sense.
-    #[error(transparent)]
-    Experiment(#[from] ExperimentError),
-    /// The game cannot be seen this way.
-    #[error(transparent)]
-    Vision(#[from] VisionError),
-    /// The algorithm needs a skill model.
-    #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
-    NoSkills(Algorithm),
-    /// The algorithm does not learn from play.
-    #[error("{0} is not trained: measure its skill model with `playbot eval --skills`")]
-    NotTrained(Algorithm),
-    /// The skill model was learned for another game.
-    #[error(
-        "the skill model was learned for {} and {model_actions:?}, but `{game}` has {} and {game_actions:?}: learn one \
-         from demonstrations of this game", in_words(.model_obs), in_words(.game_obs)
-    )]
-    ForeignSkills {
-        /// The game.
-        game: String,
-        /// Observation of the model.
-        model_obs: playbot_learner::ObsKind,
-        /// Actions of the model.
-        model_actions: playbot_learner::ActionSpace,
-        /// Observation of the game.
-        game_obs: playbot_learner::ObsKind,
-        /// Actions of the game.
-        game_actions: playbot_learner::ActionSpace,
-    },
-    /// The skill model was learned from other pictures, or from vectors.
-    #[error(
-        "the skill model was learned from {model}, but `observation` and `image` of the experiment say {experiment}: \
-         learn skills with this experiment, `playbot learn-skills`, or change it to what the model has seen"
-    )]
-    SkillObservation {
-        /// What the model has seen.
-        model: ObservationConfig,
-        /// What agents see in the experiment.
-        experiment: ObservationConfig,
-    },
-    /// The file of the skill model says of its pictures what this version does not know.
-    #[error(transparent)]
-    UnknownObservation(#[from] UnknownObservation),
-    /// The game broke its contract.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-    /// The learner cannot go on, for instance because a loss is not a number.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
-    /// A checkpoint could not be brought back.
-    #[error(transparent)]
-    Restore(#[from] RestoreError),
-}
-
-/// A finished episode as the moving averages keep it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct RecentEpisode {
-    total_reward: f64,
-    ticks: u32,
-    success: bool,
-    /// Ticks whose action was clipped; missing in checkpoints from before it was counted.
-    #[serde(default)]
-    clipped: u32,
-}
-
-/// What one update brought. Everything in it is the same in every run with the same seed, except `timing`.
-#[derive(Clone, Debug)]
-pub struct UpdateReport {
-    /// Updates done, this one included.
-    pub update: u64,
-    /// Environment steps done, over all arenas together.
-    pub step: u64,
-    /// Episodes that have ended. Before the 100th the means below are of fewer, and of short ones more than of long.
-    pub episodes: u64,
-    /// Mean return of the last 100 episodes; `None` before the first has ended.
-    pub episodic_return: Option<f64>,
-    /// Mean length of the last 100 episodes, ticks.
-    pub episodic_length: Option<f64>,
-    /// Success rate of the last 100 episodes.
-    pub success_rate: Option<f64>,
-    /// Share of the ticks of the last 100 episodes whose action was clipped to the game's range; only for continuous
-    /// actions.
-    pub clipped_share: Option<f64>,
-    /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
-    pub initial_kl: Option<f32>,
-    /// What the learner reports.
-    pub learner: LearnerMetrics,
-    /// Where the time went.
-    pub timing: Timing,
-}
-
-impl UpdateReport {
-    /// Everything measured, by TensorBoard tag; the same numbers in every run with the same seed.
-    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
-        let episodes = [
-            (EPISODES, Some(self.episodes as f64)),
-            (EPISODIC_RETURN, self.episodic_return),
-            (EPISODIC_LENGTH, self.episodic_length),
-            (SUCCESS_RATE, self.success_rate),
-            (CLIPPED_SHARE, self.clipped_share),
-            ("score/initial_kl", self.initial_kl.map(f64::from)),
-        ];
-        let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
-        known.chain(self.learner.scalars()).collect()
-    }
-}
-
-/// Wall-clock seconds of one update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Timing {
-    /// Simulating, observing and deciding.
-    pub collect_s: f64,
-    /// Learning.
-    pub learn_s: f64,
-}
 
 /// One algorithm being trained on one experiment.
 pub struct Trainer {
@@ -160,15 +27,6 @@ pub struct Trainer {
     pub(crate) learner: Learner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
-}
-
-/// How far the training is.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Progress {
-    pub(crate) updates: u64,
-    pub(crate) steps: u64,
-    pub(crate) episodes: u64,
-    pub(crate) recent: VecDeque<RecentEpisode>,
 }
 
 impl Trainer {
@@ -308,63 +166,4 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     experiment.check_levels(game)?;
     experiment.sight().check(game)?;
     Ok(experiment.check_memory(game)?)
-}
-
-impl Progress {
-    fn note(&mut self, finished: &[EpisodeEnded]) {
-        self.episodes += finished.len() as u64;
-        self.recent.extend(finished.iter().map(|episode| RecentEpisode {
-            total_reward: episode.total_reward,
-            ticks: episode.ticks,
-            success: episode.success,
-            clipped: episode.clipped,
-        }));
-        let surplus = self.recent.len().saturating_sub(RECENT);
-        self.recent.drain(..surplus);
-    }
-
-    /// Mean over the last episodes; `None` before the first has ended.
-    fn mean(&self, value: fn(&RecentEpisode) -> f64) -> Option<f64> {
-        let n = self.recent.len();
-        (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
-    }
-
-    fn episodic_return(&self) -> Option<f64> {
-        self.mean(|episode| episode.total_reward)
-    }
-
-    fn success_rate(&self) -> Option<f64> {
-        self.mean(|episode| f64::from(u8::from(episode.success)))
-    }
-
-    /// Share of the clipped ticks among those of the last episodes.
-    fn clipped_share(&self) -> Option<f64> {
-        let ticks = self.mean(|episode| f64::from(episode.ticks)).filter(|ticks| *ticks > 0.0)?;
-        Some(self.mean(|episode| f64::from(episode.clipped))? / ticks)
-    }
-
-    /// How good the policy is, where enough episodes have ended to say so.
-    pub(crate) fn summary(&self) -> CheckpointSummary {
-        let settled = |mean: Option<f64>| mean.filter(|_| self.recent.len() == RECENT);
-        CheckpointSummary {
-            step: self.steps,
-            episodic_return: settled(self.episodic_return()),
-            success_rate: settled(self.success_rate()),
-        }
-    }
-
-    fn report(&self, learner: LearnerMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
-        UpdateReport {
-            update: self.updates,
-            step: self.steps,
-            episodes: self.episodes,
-            episodic_return: self.episodic_return(),
-            episodic_length: self.mean(|episode| f64::from(episode.ticks)),
-            success_rate: self.success_rate(),
-            clipped_share: self.clipped_share(),
-            initial_kl,
-            learner,
-            timing,
-        }
-    }
 }

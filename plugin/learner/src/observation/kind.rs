@@ -43,6 +43,14 @@ impl ObsKind {
         }
     }
 
+    /// It in a message: `26 observation values`, or the size of an image.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Vector(values) => format!("{values} observation values"),
+            Self::Image(_) => self.to_string(),
+        }
+    }
+
     /// `Ok` if `other`, what `who` observes, is the same.
     ///
     /// # Errors

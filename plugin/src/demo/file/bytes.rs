@@ -1,6 +1,6 @@
 //! Little-endian reading and writing of the values inside a frame.
 
-use super::error::EpisodeFault;
+use super::episode_fault::EpisodeFault;
 
 /// Which way a list is stored: the shorter of the two is chosen.
 const PLAIN: u8 = 0;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::EpisodeFault;
+use super::episode_fault::EpisodeFault;
 use super::header::{DemoActions, DemoHeader};
 
 /// Who decided the action of a tick.

@@ -5,7 +5,7 @@
 //! ```
 
 use super::episode::DemoEpisode;
-use super::error::EpisodeFault;
+use super::episode_fault::EpisodeFault;
 use super::header::DemoHeader;
 use super::payload;
 

@@ -24,6 +24,7 @@
 
 mod bytes;
 mod episode;
+mod episode_fault;
 mod error;
 mod find;
 mod frame;
@@ -42,12 +43,21 @@ mod tests;
 mod writer;
 
 pub use episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions};
-pub use error::{DemoFault, DemoFileError, EpisodeFault};
+pub use episode_fault::EpisodeFault;
+pub use error::{DemoFault, DemoFileError};
 pub use find::find_demos;
-pub use header::{DEMO_FORMAT, DemoActions, DemoHeader};
-pub use merge::{MergeReport, merge_demos};
-pub use preamble::DEMO_MAGIC;
+pub use header::{DemoActions, DemoHeader};
 pub use reader::DemoReader;
-pub use repair::{DroppedRegion, RepairReport, repair, repair_with_header};
-pub use summary::DemoSummary;
 pub use writer::DemoWriter;
+
+// For playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
+pub use header::DEMO_FORMAT;
+#[doc(hidden)]
+pub use merge::{MergeReport, merge_demos};
+#[doc(hidden)]
+pub use preamble::DEMO_MAGIC;
+#[doc(hidden)]
+pub use repair::{DroppedRegion, RepairReport, repair, repair_with_header};
+#[doc(hidden)]
+pub use summary::DemoSummary;

@@ -19,7 +19,7 @@
 
 use super::bytes::{Cursor, malformed, put_list, put_plain};
 use super::episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions};
-use super::error::EpisodeFault;
+use super::episode_fault::EpisodeFault;
 use super::header::{DemoActions, DemoHeader};
 
 /// Appends the episode to `out`, after [`DemoEpisode::check`] against the header.

@@ -1,6 +1,6 @@
 //! Colours on white paper that people with any kind of colour vision can tell apart.
 
-use crate::report::drawing::Rgb;
+use crate::drawing::Rgb;
 
 pub const INK: Rgb = [31, 35, 40];
 pub const SOFT: Rgb = [87, 96, 106];

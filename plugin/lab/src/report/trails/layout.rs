@@ -8,10 +8,8 @@ use super::{
     frame::Frame,
     panel::{Content, goal_mark, start_mark},
 };
-use crate::report::{
-    drawing::{Drawing, Rgb, Shape},
-    text_width::text_width,
-};
+use crate::drawing::{Drawing, Rgb, Shape};
+use crate::report::text_width::text_width;
 
 /// Floors that are drawn.
 const MOST_FLOORS: usize = 6;

@@ -9,9 +9,9 @@ use super::{
     visits::Visits,
 };
 use crate::{
+    drawing::{MarkForm, Shape},
     eval::Trail,
     floor_plan::FloorPlan,
-    report::drawing::{MarkForm, Shape},
 };
 
 /// Most trajectories in one drawing: more could not be told apart.

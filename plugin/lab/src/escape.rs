@@ -3,7 +3,7 @@
 /// Escapes text for the content and the attributes of HTML and SVG.
 ///
 /// Control characters, which neither may hold, become U+FFFD; tabs and line feeds stay.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -22,7 +22,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// Text on one line without control characters, so that it cannot steer a terminal.
-pub(super) fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_whitespace() { ' ' } else { c })
         .map(|c| if c.is_control() { '\u{fffd}' } else { c })
@@ -30,7 +30,7 @@ pub(super) fn one_line(text: &str) -> String {
 }
 
 /// Escaped text with `code` between backticks set as code. A backtick without a partner stays.
-pub(super) fn with_code_spans(text: &str) -> String {
+pub(crate) fn with_code_spans(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
     while let Some((before, (code, after))) =

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use bevy::math::{Rect, Vec2};
 
-use super::escape::escape;
+use crate::escape::escape;
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];

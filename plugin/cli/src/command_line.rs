@@ -1,0 +1,177 @@
+//! What can be said on the command line, and who does it.
+
+use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+use playbot_lab::{game::Game, games::Games};
+
+use crate::{
+    bench, config, demo, doctor,
+    error::{CliError, Outcome},
+    eval, eyes, interrupt, learn_skills, level, play, policy, quickstart, record, runs, study, trace, train, view,
+};
+
+/// Playtesting bots that learn from demonstrations.
+#[derive(Parser)]
+#[command(name = "playbot", version, after_help = EXAMPLES)]
+struct Cli {
+    /// What to do; `quickstart` if nothing is given.
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    /// Print what happens inside; twice for more.
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  playbot                                          learn, train and test on CoinRun in a few minutes
+  playbot level coinrun --mode hard --seed 7       show a level
+  playbot record coinrun --levels easy:0..9 --out my.demo
+  playbot play coinrun --seed 7 --record my.demo   play it yourself
+  playbot demo verify demos/coinrun
+  playbot doctor coinrun                           is the game the same every time?
+  playbot doctor coinrun                           is the game the same every time?
+  playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
+  playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
+  playbot eval --run runs/first --json
+  playbot policy export --run runs/first --out coinrun.policy
+  playbot config show --set ppo.lr=0.0003          an experiment with all its values
+  playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
+  playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
+  playbot runs compare runs/first runs/second --plot compare.svg
+
+Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
+130 stopped by Ctrl-C before it was done.";
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
+    Quickstart(quickstart::Args),
+    /// Record the game's demonstrator.
+    Record(record::Args),
+    /// Play in a window, record, and hand over to a policy and back.
+    Play(play::Args),
+    /// Look at, check, repair and join recordings.
+    Demo(demo::Args),
+    /// Check that a game plays the same when it is given the same actions, and find what differs.
+    Doctor(doctor::Args),
+    /// Learn the skill model from recordings.
+    LearnSkills(learn_skills::Args),
+    /// Train a policy.
+    Train(train::Args),
+    /// Compare variants of an experiment over several seeds.
+    Study(study::Args),
+    /// Show experiments with all their values, and the presets to build them on.
+    Config(config::Args),
+    /// Measure policies and baselines, every level equally often.
+    Eval(eval::Args),
+    /// Compare what the camera and the raster see.
+    Eyes(eyes::Args),
+    /// Make and look at policy files.
+    Policy(policy::Args),
+    /// List, show and compare trainings.
+    Runs(runs::Args),
+    /// Show a level.
+    Level(level::Args),
+    /// Play given actions and print the state after each.
+    Trace(trace::Args),
+    /// Write what a bot sees as a picture, or an episode as a moving one.
+    View(view::Args),
+    /// Measure speed.
+    Bench(bench::Args),
+}
+
+/// Whether the command line can be read: whoever writes commands into documentation asks it. `args` begin with the name of
+/// the program. Nothing is run, and no game is asked whether it has what they name.
+///
+/// # Errors
+///
+/// What is wrong with them, in words.
+#[doc(hidden)]
+pub fn check_usage<Args>(args: Args) -> Result<(), String>
+where
+    Args: IntoIterator<Item: Into<OsString> + Clone>,
+{
+    match Cli::try_parse_from(args) {
+        Ok(_) => Ok(()),
+        // Asking for help is no mistake.
+        Err(error) if !error.use_stderr() => Ok(()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Runs the command line on the process's arguments, for these games. The first one is meant by verbs that name none.
+///
+/// Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration, 130 stopped by Ctrl-C.
+pub fn main(games: &[&dyn Game]) -> ExitCode {
+    #[cfg(all(target_os = "linux", feature = "camera"))]
+    crate::mesa::hush();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Asking for help is no mistake; anything else is a wrong usage, which is 3 here.
+            let code = if error.use_stderr() { 3 } else { 0 };
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    init_tracing(cli.verbose);
+    let games = match Games::new(games) {
+        Ok(games) => games,
+        Err(error) => {
+            tell!("error: {error}");
+            return ExitCode::from(3);
+        }
+    };
+    let verb = cli.verb.unwrap_or_else(|| Verb::Quickstart(quickstart::Args::default()));
+    match std::panic::catch_unwind(AssertUnwindSafe(|| run(verb, &games))) {
+        Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
+        Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
+        Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
+        Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            tell!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+        Err(_) => {
+            tell!("error: the program failed, which is a bug in it; please report the lines above");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
+    match verb {
+        Verb::Quickstart(args) => quickstart::run(args, games),
+        Verb::Record(args) => record::run(args, games),
+        Verb::Play(args) => play::run(args, games),
+        Verb::Demo(args) => demo::run(args, games),
+        Verb::Doctor(args) => doctor::run(args, games),
+        Verb::LearnSkills(args) => learn_skills::run(args, games),
+        Verb::Train(args) => train::run(args, games),
+        Verb::Study(args) => study::run(args, games),
+        Verb::Config(args) => config::run(args, games),
+        Verb::Eval(args) => eval::run(args, games),
+        Verb::Eyes(args) => eyes::run(args, games),
+        Verb::Policy(args) => policy::run(args, games),
+        Verb::Runs(args) => runs::run(args),
+        Verb::Level(args) => level::run(args, games),
+        Verb::Trace(args) => trace::run(args, games),
+        Verb::View(args) => view::run(args, games),
+        Verb::Bench(args) => bench::run(args, games),
+    }
+}
+
+/// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
+/// to warn of.
+const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
+
+fn init_tracing(verbose: u8) {
+    let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
+    // What cannot be written is not worth a word, which could not be written either.
+    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
+    format.with_writer(std::io::stderr).init();
+}

@@ -1,0 +1,49 @@
+//! What can be said of playing.
+
+use std::path::PathBuf;
+
+use crate::{player::PlayerArgs, recording::Existing};
+
+/// Opens a window in which a person plays, records what is played, and hands over to a policy or a bot and back.
+#[derive(clap::Args)]
+#[command(after_help = "Keys:
+  those of the game, printed at the start
+  Tab        hand over to the policy or bot, and take over again
+  R, N       play the level again, go to the next one
+  P          pause
+  -, =       see more, see less
+  V          ants from above or in space, in a program with the feature view3d
+  Escape     end, as do Ctrl-Q and closing the window
+
+A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
+
+Examples:
+  playbot play coinrun --seed 7
+  playbot play coinrun --levels 0..63 --record my.demo
+  playbot play coinrun --run runs/first --record mixed.demo
+  playbot play coinrun --mode easy --bot search")]
+#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window only"))]
+pub struct Args {
+    /// Name of the game.
+    pub(super) game: String,
+    /// Mode of the game, such as hard; the game's last one unless the levels name one.
+    #[arg(long)]
+    pub(super) mode: Option<String>,
+    /// Level to begin with; the first of the levels if none is named.
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
+    /// Levels, as first..last or mode:first..last, both included; all if none are named.
+    #[arg(long)]
+    pub(super) levels: Option<String>,
+    /// Recording to write.
+    #[arg(long, value_name = "FILE")]
+    pub(super) record: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) existing: Existing,
+    /// Who plays, for the recording.
+    #[arg(long, default_value = "human")]
+    pub(super) name: String,
+    /// Who takes over with Tab.
+    #[command(flatten)]
+    pub(super) partner: PlayerArgs,
+}

@@ -1,0 +1,15 @@
+//! Playing in a program that was built without a window.
+
+use playbot_lab::games::Games;
+
+use super::Args;
+use crate::error::{CliError, Outcome};
+
+/// Says how to build one with a window.
+pub fn run(_: Args, _: &Games) -> Result<Outcome, CliError> {
+    Err(CliError::Usage(
+        "this program was built without a window: build with `cargo build --release --features window`, which needs no \
+         system packages"
+            .to_owned(),
+    ))
+}

@@ -1,0 +1,234 @@
+//! What is shown, of whom, and where it is written.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::{
+    demo::file::DemoReader,
+    vision::{ObservationConfig, ObservationKind},
+};
+use playbot_lab::games::Games;
+use playbot_lab::sensors::GameSensors;
+use playbot_lab::{eval::Player, game::Game};
+use serde_json::json;
+
+use super::{
+    film::Film,
+    numbers::Numbers,
+    options,
+    stage::{self, Shot, Stage},
+};
+use crate::{
+    error::{CliError, Outcome, print_line},
+    interrupt, output,
+    player::{Chosen, PlayerArgs},
+    progress,
+};
+
+/// Writes what a bot sees as a PNG: one observation, or with --episode a whole episode as an animated PNG with tick,
+/// action, value and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it. Of a
+/// game that has a camera of its own it is what that sees; of one that cannot be drawn, the numbers, with a bar for each.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot view coinrun --seed 5
+  playbot view coinrun --seed 5 --tick 40 --bot right-jump --image stack=4
+  playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
+  playbot view coinrun --demo demos/coinrun/easy.demo --episode-number 3 --episode --scale 4
+  playbot view coinrun --image width=84 --image height=84 --image grayscale --image paint_velocity
+
+Animated PNGs play in browsers and in most viewers of pictures.")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Mode of the game; its last one, or that of the recording.
+    #[arg(long, conflicts_with = "demo")]
+    mode: Option<String>,
+    /// Seed of the level.
+    #[arg(long, default_value_t = 0, conflicts_with = "demo")]
+    seed: u32,
+    /// Tick of the episode, from 0, whose observation is written.
+    #[arg(long, default_value_t = 0, conflicts_with = "episode")]
+    tick: u32,
+    /// Write the whole episode.
+    #[arg(long)]
+    episode: bool,
+    #[command(flatten)]
+    player: PlayerArgs,
+    /// Recording to show; without it and without a player, the game's demonstrator plays.
+    #[arg(long, value_name = "FILE", conflicts_with = "player")]
+    demo: Option<PathBuf>,
+    /// Episode of the recording, counted from 0.
+    #[arg(long, default_value_t = 0, requires = "demo")]
+    episode_number: usize,
+    /// File to write, a .png.
+    #[arg(long, default_value = "view.png", value_parser = output::png)]
+    out: PathBuf,
+    /// How many times as large as the bot sees it.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
+    scale: u32,
+    /// Form of the pictures, instead of the policy's own: width=84, height=84, stack=4, grayscale, paint_velocity; may
+    /// be given several times.
+    #[arg(long = "image", value_name = "KEY=VALUE")]
+    image: Vec<String>,
+    /// Look through a Bevy camera instead of the raster.
+    #[arg(long)]
+    camera: bool,
+    /// Print what was written as a line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Most memory for the observations of an episode.
+const MOST_BYTES: usize = 1 << 30;
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let (mut stage, sight, name) = open_stage(game, &args)?;
+    let pictures = sight.is_image().then(|| Film::new(sight.image, args.scale, game.tick_hz())).transpose()?;
+    let shots = take(&mut stage, &args)?;
+    let numbers = || Numbers::new(game.observation().names, args.scale, &shots);
+    let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
+    let (bytes, size) = if args.episode {
+        let bar = progress::bar("draw", shots.len() as u64, "frames");
+        let drawn = film.animated(&shots, || bar.inc(1));
+        bar.finish_and_clear();
+        drawn?
+    } else if sight.is_image() {
+        film.still(&shots[0].image)?
+    } else {
+        film.captioned(&shots[0])?
+    };
+    output::write(&args.out, &bytes)?;
+    let written = Written { player: &name, frames: shots.len(), bytes: bytes.len(), size };
+    report(&stage, &args, &written)
+}
+
+/// A World with the player, or with the recording.
+fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig, String), CliError> {
+    if let Some(path) = &args.demo {
+        let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
+        let mode = reader.header().mode.clone();
+        game.check_mode(&mode)?;
+        let sight = sight(game, args, None)?;
+        let episode = episode(reader, path, args.episode_number)?;
+        let stage = Stage::replaying(game, &mode, &sight, episode)?;
+        return Ok((stage, sight, "recording".to_owned()));
+    }
+    let mode = args.mode.as_deref().or(game.modes().last().copied()).unwrap_or_default();
+    game.check_mode(mode)?;
+    let chosen = match args.player.load(game)? {
+        Some(chosen) => chosen,
+        None => Chosen::usual(game)?,
+    };
+    let sight = sight(game, args, Some(&chosen))?;
+    Ok((Stage::playing(game, mode, &sight, args.seed.into(), &chosen.player)?, sight, chosen.name))
+}
+
+/// The pictures that are shown: those that the policy reads, or those that were asked for, or else those that the game
+/// has. Numbers for a game without any.
+fn sight(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
+    let own = chosen.map(|chosen| chosen.sight).filter(ObservationConfig::is_image);
+    let is_asked_for = !args.image.is_empty();
+    let kind = if game.picture().is_some() || is_asked_for && !game.has_camera() {
+        ObservationKind::Raster
+    } else if game.has_camera() {
+        ObservationKind::Camera
+    } else {
+        ObservationKind::Vector
+    };
+    let mut sight = own.unwrap_or(ObservationConfig { kind, ..ObservationConfig::default() });
+    if args.camera {
+        sight.kind = ObservationKind::Camera;
+    }
+    options::set(&mut sight.image, &args.image)?;
+    sight.check(game)?;
+    if let (Some(own), Some(Player::Policy { policy, .. })) = (own, chosen.map(|chosen| &chosen.player))
+        && sight.image != own.image
+    {
+        return Err(CliError::Usage(format!(
+            "the policy reads {own} ({}); it cannot play with {sight}: leave out --image",
+            policy.observation().describe()
+        )));
+    }
+    Ok(sight)
+}
+
+fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<bevy_playbot::demo::file::DemoEpisode, CliError> {
+    for (index, episode) in reader.enumerate() {
+        let episode = episode?;
+        if index == number {
+            return Ok(episode);
+        }
+    }
+    Err(CliError::Usage(format!(
+        "{} has no episode {number}; `playbot demo show {0}` lists those it has",
+        path.display()
+    )))
+}
+
+/// Plays until the tick that is asked for, or to the end.
+fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
+    interrupt::listen();
+    let bar = progress::bar("play", 0, "ticks");
+    let (mut shots, mut kept) = (Vec::new(), 0);
+    while let Some(shot) = stage.next()? {
+        bar.set_length(u64::from(shot.tick) + 1);
+        bar.set_position(u64::from(shot.tick) + 1);
+        if args.episode {
+            kept += shot.image.len() + size_of_val(shot.vector.as_slice());
+            if kept > MOST_BYTES {
+                return Err(CliError::Usage(format!(
+                    "the pictures of {} ticks take more than {} MiB of memory: try smaller pictures, or a shorter stack",
+                    shot.tick,
+                    MOST_BYTES >> 20
+                )));
+            }
+            shots.push(shot);
+        } else if shot.tick == args.tick {
+            shots.push(shot);
+            break;
+        }
+        if interrupt::asked() {
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    if shots.is_empty() {
+        let ticks = stage.ticks();
+        return Err(CliError::Usage(format!("there is no tick {}: the episode has {ticks} ticks, from 0", args.tick)));
+    }
+    Ok(shots)
+}
+
+struct Written<'a> {
+    player: &'a str,
+    frames: usize,
+    bytes: usize,
+    size: [usize; 2],
+}
+
+fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliError> {
+    let ([width, height], path) = (written.size, args.out.display());
+    if args.json {
+        print_line(json!({
+            "path": path.to_string(), "bytes": written.bytes, "width": width, "height": height,
+            "frames": written.frames, "ticks": stage.ticks(), "end": stage.end().map(|ended| ended.end), "player": written.player,
+            "level": stage.level(), "divergence": stage.divergence().map(ToString::to_string),
+        }))?;
+    } else {
+        let how = stage.end().map_or("still running", stage::end_in_words);
+        tell!(
+            "{path}: {width} × {height}, {} frames of level {} played by {}; after {} ticks: {how}",
+            written.frames,
+            stage.level(),
+            written.player,
+            stage.ticks()
+        );
+    }
+    match stage.divergence() {
+        None => Ok(Outcome::Pass),
+        Some(divergence) => {
+            tell!("from there on it is not the game that was recorded: {divergence}");
+            Ok(Outcome::Findings)
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! How far a training is, and how its last episodes went.
+
+use std::collections::VecDeque;
+
+use bevy_playbot::episode::EpisodeEnded;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    checkpoint::CheckpointSummary,
+    learner::LearnerMetrics,
+    update_report::{Timing, UpdateReport},
+};
+
+/// Episodes over which the current return, length and success rate are averaged.
+pub(crate) const RECENT: usize = 100;
+
+/// A finished episode as the moving averages keep it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RecentEpisode {
+    total_reward: f64,
+    ticks: u32,
+    success: bool,
+    /// Ticks whose action was clipped; missing in checkpoints from before it was counted.
+    #[serde(default)]
+    clipped: u32,
+}
+
+/// How far the training is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Progress {
+    pub(crate) updates: u64,
+    pub(crate) steps: u64,
+    pub(crate) episodes: u64,
+    pub(crate) recent: VecDeque<RecentEpisode>,
+}
+
+impl Progress {
+    pub(super) fn note(&mut self, finished: &[EpisodeEnded]) {
+        self.episodes += finished.len() as u64;
+        self.recent.extend(finished.iter().map(|episode| RecentEpisode {
+            total_reward: episode.total_reward,
+            ticks: episode.ticks,
+            success: episode.success,
+            clipped: episode.clipped,
+        }));
+        let surplus = self.recent.len().saturating_sub(RECENT);
+        self.recent.drain(..surplus);
+    }
+
+    /// Mean over the last episodes; `None` before the first has ended.
+    fn mean(&self, value: fn(&RecentEpisode) -> f64) -> Option<f64> {
+        let n = self.recent.len();
+        (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
+    }
+
+    fn episodic_return(&self) -> Option<f64> {
+        self.mean(|episode| episode.total_reward)
+    }
+
+    fn success_rate(&self) -> Option<f64> {
+        self.mean(|episode| f64::from(u8::from(episode.success)))
+    }
+
+    /// Share of the clipped ticks among those of the last episodes.
+    fn clipped_share(&self) -> Option<f64> {
+        let ticks = self.mean(|episode| f64::from(episode.ticks)).filter(|ticks| *ticks > 0.0)?;
+        Some(self.mean(|episode| f64::from(episode.clipped))? / ticks)
+    }
+
+    /// How good the policy is, where enough episodes have ended to say so.
+    pub(crate) fn summary(&self) -> CheckpointSummary {
+        let settled = |mean: Option<f64>| mean.filter(|_| self.recent.len() == RECENT);
+        CheckpointSummary {
+            step: self.steps,
+            episodic_return: settled(self.episodic_return()),
+            success_rate: settled(self.success_rate()),
+        }
+    }
+
+    pub(super) fn report(&self, learner: LearnerMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
+        UpdateReport {
+            update: self.updates,
+            step: self.steps,
+            episodes: self.episodes,
+            episodic_return: self.episodic_return(),
+            episodic_length: self.mean(|episode| f64::from(episode.ticks)),
+            success_rate: self.success_rate(),
+            clipped_share: self.clipped_share(),
+            initial_kl,
+            learner,
+            timing,
+        }
+    }
+}

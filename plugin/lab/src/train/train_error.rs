@@ -1,0 +1,70 @@
+//! Why training cannot go on.
+
+use bevy_playbot::{
+    fault::Fault,
+    vision::{ObservationConfig, UnknownObservation, VisionError},
+};
+use playbot_learner::LearnError;
+use thiserror::Error;
+
+use super::{
+    arena_state::RestoreError,
+    config::{Algorithm, ExperimentError},
+};
+
+/// Training cannot go on.
+#[derive(Debug, Error)]
+pub enum TrainError {
+    /// The experiment makes no sense.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// The game cannot be seen this way.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The algorithm needs a skill model.
+    #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
+    NoSkills(Algorithm),
+    /// The algorithm does not learn from play.
+    #[error("{0} is not trained: measure its skill model with `playbot eval --skills`")]
+    NotTrained(Algorithm),
+    /// The skill model was learned for another game.
+    #[error(
+        "the skill model was learned for {} and {model_actions:?}, but `{game}` has {} and {game_actions:?}: learn one \
+         from demonstrations of this game", .model_obs.describe(), .game_obs.describe()
+    )]
+    ForeignSkills {
+        /// The game.
+        game: String,
+        /// Observation of the model.
+        model_obs: playbot_learner::ObsKind,
+        /// Actions of the model.
+        model_actions: playbot_learner::ActionSpace,
+        /// Observation of the game.
+        game_obs: playbot_learner::ObsKind,
+        /// Actions of the game.
+        game_actions: playbot_learner::ActionSpace,
+    },
+    /// The skill model was learned from other pictures, or from vectors.
+    #[error(
+        "the skill model was learned from {model}, but `observation` and `image` of the experiment say {experiment}: \
+         learn skills with this experiment, `playbot learn-skills`, or change it to what the model has seen"
+    )]
+    SkillObservation {
+        /// What the model has seen.
+        model: ObservationConfig,
+        /// What agents see in the experiment.
+        experiment: ObservationConfig,
+    },
+    /// The file of the skill model says of its pictures what this version does not know.
+    #[error(transparent)]
+    UnknownObservation(#[from] UnknownObservation),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The learner cannot go on, for instance because a loss is not a number.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A checkpoint could not be brought back.
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
+}

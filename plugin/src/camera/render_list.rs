@@ -1,0 +1,36 @@
+//! Bevy's list of what a renderer has yet to hear of, in apps that have none.
+
+use bevy::{
+    app::SubApp,
+    platform::cell::SyncCell,
+    prelude::*,
+    render::{RenderApp, extract_plugin::ExtractPlugin},
+};
+
+/// Who would draw, and takes what is on the list.
+#[derive(Resource)]
+struct NoRenderer(SyncCell<SubApp>);
+
+/// Sprites, meshes and cameras are noted for the renderer as they come and go, and Bevy fails where nobody keeps the list.
+/// Keeps it and empties it.
+pub(crate) struct RenderListPlugin;
+
+impl Plugin for RenderListPlugin {
+    fn build(&self, app: &mut App) {
+        if app.get_sub_app(RenderApp).is_some() || app.is_plugin_added::<ExtractPlugin>() {
+            return;
+        }
+        app.add_plugins(ExtractPlugin::default());
+        // Taken out at once, before anybody takes it for a renderer.
+        if let Some(renderer) = app.remove_sub_app(RenderApp) {
+            app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list);
+        }
+    }
+}
+
+fn empty_list(world: &mut World) {
+    world.resource_scope(|world, mut renderer: Mut<NoRenderer>| {
+        // Each frame, as a renderer does: what is on the list changes entities, which must not depend on how old the World is.
+        renderer.0.get().extract(world);
+    });
+}

@@ -1,0 +1,14 @@
+//! The order of what agents that see pictures need.
+
+use bevy::ecs::schedule::SystemSet;
+
+/// Parts of [`ObserveSchedule`](crate::systems::ObserveSchedule) for agents that see pictures, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum VisionSystems {
+    /// The game brings what is drawn up to date: transforms, sprites, tiles.
+    Dress,
+    /// Sensors fill each agent's [`Frame`](super::Frame).
+    Look,
+    /// The frame's tick is checked, and the observation made of it.
+    Compose,
+}

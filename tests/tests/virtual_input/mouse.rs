@@ -1,0 +1,70 @@
+//! The mouse.
+
+use bevy::{
+    input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseMotion},
+    prelude::*,
+};
+use bevy_playbot::{
+    prelude::*,
+    virtual_input::{ActionAxis, InputRoute, VirtualInput},
+};
+
+use crate::scripted::{STEP, Script, app_with, frames_of};
+
+#[derive(Resource, Default)]
+struct Motions {
+    ticks: Vec<Vec2>,
+    frames: Vec<Vec2>,
+    messages: Vec2,
+}
+
+fn mouse() -> VirtualInput {
+    VirtualInput::axes([ActionAxis::mouse_x(10.0), ActionAxis::wheel(2.0)])
+}
+
+fn note_motions(app: &mut App) {
+    let in_ticks =
+        |motion: Res<AccumulatedMouseMotion>, wheel: Res<AccumulatedMouseScroll>, mut seen: ResMut<Motions>| {
+            seen.ticks.push(Vec2::new(motion.delta.x, wheel.delta.y));
+        };
+    let in_frames = |motion: Res<AccumulatedMouseMotion>,
+                     wheel: Res<AccumulatedMouseScroll>,
+                     mut read: MessageReader<MouseMotion>,
+                     mut seen: ResMut<Motions>| {
+        seen.frames.push(Vec2::new(motion.delta.x, wheel.delta.y));
+        seen.messages += read.read().map(|message| message.delta).sum::<Vec2>();
+    };
+    app.init_resource::<Motions>()
+        .add_systems(FixedUpdate, in_ticks.ambiguous_with_all())
+        .add_systems(Update, in_frames);
+}
+
+#[test]
+fn each_tick_sees_its_own_motion_and_the_frame_their_sum() {
+    let values = |x: f32| ActionValue::Continuous(vec![x, -x]);
+    let script = vec![values(1.0), values(2.0), values(0.0), values(0.5), values(0.0)];
+    let (mut app, _) = app_with(InputRoute::Direct, mouse(), script);
+    note_motions(&mut app);
+    frames_of(&mut app, STEP * 3);
+    app.update();
+    frames_of(&mut app, STEP);
+    (0..3).for_each(|_| app.update());
+    let seen = app.world().resource::<Motions>();
+    let at = |x: f32| Vec2::new(10.0 * x, -2.0 * x);
+    assert_eq!(seen.ticks, [at(1.0), at(2.0), at(0.0), at(0.5), at(0.0), at(0.0)]);
+    assert_eq!(seen.frames, [at(3.0), at(0.5), at(0.0), at(0.0)]);
+    assert_eq!(seen.messages, Vec2::new(35.0, 0.0));
+}
+
+#[test]
+fn a_motion_by_messages_lasts_one_frame() {
+    let (mut app, agent) = app_with(InputRoute::Messages, mouse(), vec![ActionValue::Continuous(vec![0.0, 0.0])]);
+    app.update();
+    note_motions(&mut app);
+    for x in [1.0, 0.0] {
+        app.world_mut().resource_mut::<Script>().0 = vec![ActionValue::Continuous(vec![x, 0.0])];
+        app.world_mut().entity_mut(agent).insert(Action(ActionValue::Continuous(vec![x, 0.0])));
+        app.update();
+    }
+    assert_eq!(app.world().resource::<Motions>().frames, [Vec2::new(10.0, 0.0), Vec2::ZERO]);
+}
