@@ -5,7 +5,7 @@
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
-//! - [`sighted`]: the mazes for agents that see walls and goal.
+//! - [`with_rays`]: the mazes for agents that see walls and goal.
 //! - [`registry`]: all of them, for the program `playbot`.
 
 pub mod ant;
@@ -15,4 +15,4 @@ pub mod coinrun;
 pub mod maze;
 pub mod maze2d;
 pub mod registry;
-pub mod sighted;
+pub mod with_rays;

@@ -3,16 +3,16 @@
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_lab::{game::Game, games::Games};
 
-use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d, sighted::Sighted};
+use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d, with_rays::WithRays};
 
 /// All games, CoinRun first.
 pub const GAMES: [&dyn Game; 6] = [
     &CoinRun { physics: false },
     &Maze2d { physics: false },
-    &Sighted(Maze2d { physics: false }),
+    &WithRays(Maze2d { physics: false }),
     &Ant,
     &AntMaze,
-    &Sighted(AntMaze),
+    &WithRays(AntMaze),
 ];
 
 /// The game with this name.

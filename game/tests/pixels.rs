@@ -98,7 +98,7 @@ fn the_experiments_of_the_repository_are_sound() {
     for entry in std::fs::read_dir(folder).expect("there").flatten() {
         let experiment = read_experiment(&entry.path()).unwrap_or_else(|error| panic!("{error}"));
         experiment.check().unwrap_or_else(|error| panic!("{}: {error}", entry.path().display()));
-        names.push((entry.file_name().to_string_lossy().into_owned(), experiment.sight().is_image()));
+        names.push((entry.file_name().to_string_lossy().into_owned(), experiment.observation_config().is_image()));
     }
     names.sort();
     assert!(names.contains(&("coinrun-pixels.ron".to_owned(), true)) && names.len() >= 4, "{names:?}");

@@ -64,10 +64,10 @@ pub enum PolicyMisfit {
     #[error(transparent)]
     ObservationConfig(#[from] UnknownObservation),
     /// The policy reads pictures, and the game cannot be drawn.
-    #[error("the policy reads {sight}, but {error}")]
+    #[error("the policy reads {observation_config}, but {error}")]
     Vision {
         /// What the policy reads.
-        sight: ObservationConfig,
+        observation_config: ObservationConfig,
         /// Why the game cannot show it.
         error: VisionError,
     },
@@ -137,11 +137,11 @@ pub fn check_policy(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisf
     if card.game_version != game.version {
         return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version });
     }
-    let sight = policy_observation(file)?;
-    if !sight.is_image() {
+    let observation_config = policy_observation(file)?;
+    if !observation_config.is_image() {
         check_names(game, file)?;
     } else if !game.has_picture {
-        return Err(PolicyMisfit::Vision { sight, error: VisionError::NoPicture { game: game.name } });
+        return Err(PolicyMisfit::Vision { observation_config, error: VisionError::NoPicture { game: game.name } });
     }
     if file.policy.action_space() != game.actions {
         return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions });

@@ -52,13 +52,13 @@ fn keep(error: BevyError, context: ErrorContext) {
 
 /// The first failure on this thread since the last call, in words.
 pub fn take(world: &World) -> Option<String> {
-    FIRST.with_borrow_mut(Option::take).map(|failure| failure.in_words(world))
+    FIRST.with_borrow_mut(Option::take).map(|failure| failure.describe(world))
 }
 
 /// Why a system (or whatever `context` names) could not run, with the name of what is missing and of the plugin that
 /// brings it.
 pub fn explain(world: &World, context: &str, error: &BevyError) -> String {
-    Failure::new(context.to_owned(), error).in_words(world)
+    Failure::new(context.to_owned(), error).describe(world)
 }
 
 impl Failure {
@@ -73,10 +73,10 @@ impl Failure {
         }
     }
 
-    fn in_words(self, world: &World) -> String {
+    fn describe(self, world: &World) -> String {
         match self {
             Self::Missing { context, param, message } if !param.contains(NAMELESS) => {
-                in_words(&context, &param, &message)
+                describe(&context, &param, &message)
             }
             Self::Missing { context, message, .. } => nameless(world, &context, &message),
             Self::Other(words) => words,
@@ -85,7 +85,7 @@ impl Failure {
 }
 
 /// A resource is missing, and Bevy knows the names.
-fn in_words(context: &str, param: &str, message: &str) -> String {
+fn describe(context: &str, param: &str, message: &str) -> String {
     let inner = ["Res<", "ResMut<", "NonSend<", "NonSendMut<"].iter().find_map(|kind| param.strip_prefix(kind));
     let resource = inner.and_then(|inner| inner.strip_suffix('>'));
     if let Some(resource) = resource {
@@ -127,17 +127,17 @@ mod tests {
 
     #[test]
     fn a_missing_resource_is_named_with_the_plugin_that_brings_it() {
-        let text = in_words("system `setup`", "ResMut<Assets<ColorMaterial>>", "Resource does not exist");
+        let text = describe("system `setup`", "ResMut<Assets<ColorMaterial>>", "Resource does not exist");
         assert_eq!(
             text,
             "system `setup` needs the resource `Assets<ColorMaterial>`, which does not exist: `SpriteRenderPlugin` \
              (Bevy's feature `bevy_sprite_render`) brings it"
         );
-        let text = in_words("system `score`", "Res<Score>", "Resource does not exist");
+        let text = describe("system `score`", "Res<Score>", "Resource does not exist");
         assert!(text.contains("`Score`") && text.ends_with("insert it, or add the plugin that brings it"), "{text}");
-        let text = in_words("system `hear`", "MessageReader<Bang>::messages", "Message not initialized");
+        let text = describe("system `hear`", "MessageReader<Bang>::messages", "Message not initialized");
         assert!(text.contains("`Bang`") && text.contains("`add_message`"), "{text}");
-        let text = in_words("system `x`", "Odd", "it is odd");
+        let text = describe("system `x`", "Odd", "it is odd");
         assert_eq!(text, "system `x` has a parameter `Odd` that does not work: it is odd");
     }
 

@@ -12,9 +12,10 @@ use playbot_tests::soak::soak;
 fn main() {
     let mut arguments = std::env::args().skip(1).map(|word| word.parse::<u64>().expect("a number"));
     let (ticks, agents) = (arguments.next().unwrap_or(20_000), arguments.next().unwrap_or(64));
-    let sight = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
-    let (mut world, agents) = build_observing_world(&CoinRun::default(), "hard", &sight, 0, 0, agents as u32)
-        .expect("a raster needs nothing");
+    let observation_config = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
+    let (mut world, agents) =
+        build_observing_world(&CoinRun::default(), "hard", &observation_config, 0, 0, agents as u32)
+            .expect("a raster needs nothing");
     for &agent in &agents {
         let levels = LevelQueue::Uniform { first: 0, last: 9999 };
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, levels));

@@ -87,7 +87,7 @@ impl Game for PaintedCorridor {
 
     fn build_picture(&self, app: &mut App) {
         app.init_resource::<Paints>()
-            .add_systems(ObserveSchedule, (spawn_pictures, follow).chain().in_set(VisionSystems::Dress));
+            .add_systems(ObserveSchedule, (spawn_pictures, follow).chain().in_set(VisionSystems::Sync));
     }
 
     fn build(&self, app: &mut App, mode: &str) {

@@ -20,7 +20,7 @@ struct Walk {
 fn walking_world() -> (World, Entity) {
     let mut world = camera_world(|app| {
         app.add_systems(FixedUpdate, walk)
-            .add_systems(ObserveSchedule, note.in_set(VisionSystems::Dress).run_if(resource_exists::<Walk>));
+            .add_systems(ObserveSchedule, note.in_set(VisionSystems::Sync).run_if(resource_exists::<Walk>));
     });
     let map: Vec<[u8; 4]> = (0..64 * 64).map(|i| [(i % 64 * 4) as u8, (i / 64 * 4) as u8, 99, 255]).collect();
     let map = world.resource_mut::<Assets<Image>>().add(image(64, &map));

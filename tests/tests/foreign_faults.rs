@@ -25,7 +25,7 @@ fn plan() -> EvalPlan {
     let split = "default:0..3".parse().expect("a split");
     EvalPlan {
         split,
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 2,

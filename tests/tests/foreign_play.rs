@@ -35,7 +35,7 @@ fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>, noise: f64) {
     let header = DemoHeader::new(game.name(), 1, "default", game.tick_hz(), demo_actions(&game.actions()));
     let (mut world, agents) = build_world(game, "default", 5, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
-    game.arm_demonstrator(&mut world, agents[0], noise);
+    game.attach_demonstrator(&mut world, agents[0], noise);
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list(levels)));
     while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
         world.tick().expect("sound");
@@ -46,7 +46,7 @@ fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32,
     let split: LevelSplit = "default:0..7".parse().expect("a split");
     let plan = EvalPlan {
         split,
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 4,

@@ -85,7 +85,7 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
     }
     assert_eq!((ticks, seen.len()), (61, 3), "20 ticks in each World; the last tick has nobody to play");
     assert_eq!(world.resource::<Ends>().0, 3);
-    assert_eq!(world.resource::<bevy_playbot::headless::Tick>().0, 61);
+    assert_eq!(world.resource::<bevy_playbot::tick::Tick>().0, 61);
     assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 3);
 }
 
@@ -93,7 +93,7 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
 fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>) {
     let (mut world, agents) = build_world(game, "default", 5, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(path, game.demo_header("default")).expect("a fresh file")));
-    game.arm_demonstrator(&mut world, agents[0], 0.4);
+    game.attach_demonstrator(&mut world, agents[0], 0.4);
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list(levels)));
     while is_active(&world, agents[0]) {
         world.tick().expect("sound");
@@ -132,8 +132,8 @@ fn recordings_replay_in_any_order() {
 fn what_is_measured_does_not_depend_on_what_was_played_before() {
     let measure = |arenas, threads| -> Vec<EpisodeResult> {
         let split = "default:0..5".parse().expect("a split");
-        let sight = ObservationConfig::default();
-        let plan = EvalPlan { split, sight, episodes_per_level: 2, seed: 1, arenas, worlds: 1, threads };
+        let observation_config = ObservationConfig::default();
+        let plan = EvalPlan { split, observation_config, episodes_per_level: 2, seed: 1, arenas, worlds: 1, threads };
         evaluate(&stubborn_game(Restart::Rebuild), &Player::Demonstrator, &plan, |_| {}).expect("can be played")
     };
     let alone = measure(1, 1);

@@ -115,7 +115,7 @@ fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<playbot_lab::eval:
     let split = LevelSplit { mode: text.to_owned(), first: 0, last: levels - 1 };
     let plan = EvalPlan {
         split,
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 8,
@@ -194,7 +194,7 @@ fn record(path: &Path, text: &str, levels: u64) {
     let header = GAME.demo_header(text);
     let (mut world, agents) = build_world(&GAME, text, 5, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
-    GAME.arm_demonstrator(&mut world, agents[0], 0.5);
+    GAME.attach_demonstrator(&mut world, agents[0], 0.5);
     let queue = LevelQueue::list((0..levels).collect::<Vec<_>>());
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
     while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {

@@ -18,8 +18,8 @@ const GOAL: [u8; 3] = [0xf5, 0xb7, 0x00];
 
 /// A World whose agent sees pictures and pushes as the test says.
 fn seeing(mode: &str, level: u64) -> (World, Entity) {
-    let sight = ObservationConfig { kind: ObservationKind::Raster, image: ImageOptions::default() };
-    let (mut world, agents) = build_observing_world(&GAME, mode, &sight, 0, 0, 2).expect("can be drawn");
+    let observation_config = ObservationConfig { kind: ObservationKind::Raster, image: ImageOptions::default() };
+    let (mut world, agents) = build_observing_world(&GAME, mode, &observation_config, 0, 0, 2).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0, 0.0]));
     for (agent, level) in agents.iter().zip([level, level + 1]) {
         world.entity_mut(*agent).insert((Control::Human, LevelQueue::Always(level), still.clone()));

@@ -48,7 +48,7 @@ fn skills() -> SkillModel {
     world.insert_resource(
         Recorder::new(DemoWriter::create(&path, header).expect("a fresh file")).with_step_limit(20_000),
     );
-    GAME.arm_demonstrator(&mut world, agents[0], 0.5);
+    GAME.attach_demonstrator(&mut world, agents[0], 0.5);
     let queue = LevelQueue::Uniform { first: 1000, last: 1999 };
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
     while world.resource::<Recorder>().steps() < 20_000 {
@@ -70,7 +70,7 @@ fn measure(player: &Player) -> (f64, f64) {
     let split: LevelSplit = experiment(Algorithm::Ppo).test;
     let plan = EvalPlan {
         split: split.clone(),
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 32,

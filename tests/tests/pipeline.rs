@@ -54,7 +54,7 @@ impl Game for Shown {
     fn demonstrator(&self) -> Option<&'static str> {
         Some("right")
     }
-    fn arm_demonstrator(&self, world: &mut World, agent: Entity, _noise: f64) {
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, _noise: f64) {
         world.entity_mut(agent).insert(BlindBot::Constant(ActionValue::Discrete(1)));
     }
 }

@@ -79,10 +79,11 @@ fn policy() -> Policy {
 fn rollouts_hold_the_skill_of_each_tick_however_they_are_cut() {
     const AGENTS: usize = 3;
     let split: LevelSplit = "plain:0..7".parse().expect("a split");
-    let sight = ObservationConfig::default();
+    let observation_config = ObservationConfig::default();
     let collect = |lengths: &[usize]| {
         let mut collector =
-            Collector::new(&Corridor, &split, &sight, SEED, 0, AGENTS as u32, Some(prior(5))).expect("can be seen");
+            Collector::new(&Corridor, &split, &observation_config, SEED, 0, AGENTS as u32, Some(prior(5)))
+                .expect("can be seen");
         let (policy, mut z, mut ends) = (policy(), Vec::new(), Vec::new());
         for &steps in lengths {
             let (rollout, _) = collector.collect(&policy, 2, steps).expect("sound");

@@ -21,7 +21,7 @@ fn game(name: &str) -> &'static dyn Game {
 fn plan(levels: &str, threads: usize) -> EvalPlan {
     EvalPlan {
         split: levels.parse().expect("a split"),
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 4,

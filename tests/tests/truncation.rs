@@ -29,9 +29,9 @@ fn policy() -> Policy {
 fn rollout(policy: &Policy, horizon: u32) -> Rollout {
     let split: LevelSplit = "plain:0..7".parse().expect("a split");
     let prior = SkillPrior { prior: Prior::standard_normal(2, false), horizon, draw: SkillDraw::Sample };
-    let sight = ObservationConfig::default();
+    let observation_config = ObservationConfig::default();
     let mut collector =
-        Collector::new(&Corridor, &split, &sight, 3, 0, AGENTS as u32, Some(prior)).expect("can be seen");
+        Collector::new(&Corridor, &split, &observation_config, 3, 0, AGENTS as u32, Some(prior)).expect("can be seen");
     collector.collect(policy, 2, TICKS).expect("sound").0
 }
 

@@ -55,7 +55,7 @@ fn seeing(options: ImageOptions, action: u32, wrong: Wrong) -> (World, Entity) {
     corridor_plugin(&mut app);
     app.add_plugins(VisionPlugin)
         .insert_resource(wrong)
-        .add_systems(ObserveSchedule, sense.in_set(VisionSystems::Look));
+        .add_systems(ObserveSchedule, sense.in_set(VisionSystems::Render));
     let agent = spawn_walker(app.world_mut(), 0);
     let bot = (Control::Bot, BlindBot::Constant(ActionValue::Discrete(action)), LevelQueue::Always(7));
     app.world_mut().entity_mut(agent).insert((bot, ImageSensor(ImageOptions { width: 2, height: 1, ..options })));

@@ -114,7 +114,7 @@ impl Plugin for AntPlugin {
     fn build(&self, app: &mut App) {
         app.insert_resource(self.task)
             .add_observer(start_episode)
-            .add_systems(ObserveSchedule, observe.before(VisionSystems::Dress))
+            .add_systems(ObserveSchedule, observe.before(VisionSystems::Sync))
             .add_systems(
                 FixedPreUpdate,
                 steer::<Walker>

@@ -128,7 +128,7 @@ impl Game for AntMaze {
         Some("waypoints")
     }
 
-    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
 

@@ -28,7 +28,7 @@ impl Plugin for AntMazePlugin {
     fn build(&self, app: &mut App) {
         app.insert_resource(AntMazeRules(self.mode.clone()))
             .add_observer(arena::start_episode)
-            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Dress))
+            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Sync))
             .add_systems(
                 FixedPreUpdate,
                 (demonstrator_bot::decide, steering::steer::<MazeAnt>.run_if(resource_exists::<ButtonInput<KeyCode>>))

@@ -125,7 +125,7 @@ impl Game for CoinRun {
         Some("search")
     }
 
-    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
 

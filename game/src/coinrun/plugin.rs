@@ -29,7 +29,7 @@ impl Plugin for CoinRunPlugin {
         app.insert_resource(CoinRunMode(self.mode))
             .add_observer(arena::start_episode)
             .add_observer(demonstrator_bot::start_episode)
-            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Dress))
+            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Sync))
             .add_systems(
                 FixedPreUpdate,
                 (

@@ -28,7 +28,7 @@ use crate::{
         Map, Maze, MazeModeError,
         show_level::{self, MazeSource, unfit},
     },
-    sighted::Sighted,
+    with_rays::WithRays,
 };
 
 /// Maze2D under its name `maze2d`.
@@ -137,7 +137,7 @@ impl Game for Maze2d {
         Some("waypoints")
     }
 
-    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
 
@@ -156,7 +156,7 @@ impl Game for Maze2d {
     fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
         match benchmark.case {
             "physics" => Some(&Maze2d { physics: true }),
-            "sighted" => Some(&Sighted(Maze2d { physics: false })),
+            "sighted" => Some(&WithRays(Maze2d { physics: false })),
             _ => None,
         }
     }

@@ -3,7 +3,7 @@
 //! [`ball`], [`soft_contact`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
 //! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
-//! makes of a seed. [`SightedMaze2d`] is the same game for agents that see walls and goal.
+//! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal.
 
 pub mod arena;
 pub mod ball;
@@ -20,11 +20,11 @@ pub mod picture;
 mod play;
 pub mod plugin;
 mod ray;
-pub mod sighted;
 pub mod sim;
 pub mod soft_contact;
 mod trace;
 pub mod walls;
+pub mod with_rays;
 
 pub use crate::maze::MazeModeError as Maze2dModeError;
 pub use ball::Ball;
@@ -34,4 +34,4 @@ pub use game::Maze2d;
 pub use level::Maze2dLevel;
 pub use mode::{Contact, Maze2dMode};
 pub use plugin::{Maze2dPlugin, Maze2dSystems};
-pub use sighted::SightedMaze2d;
+pub use with_rays::Maze2dWithRays;

@@ -38,7 +38,7 @@ impl Plugin for Maze2dPlugin {
         app.insert_resource(Maze2dRules(self.mode.clone()))
             .insert_resource(WithPhysics(self.physics))
             .add_observer(arena::start_episode)
-            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Dress))
+            .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Sync))
             // An agent is decided for by one alone, so it does not matter who decides for which agent first.
             .add_systems(FixedPreUpdate, demonstrator_bot::decide.in_set(PlaybotSystems::Decide).ambiguous_with_all())
             .add_systems(FixedUpdate, play::play.in_set(Maze2dSystems));

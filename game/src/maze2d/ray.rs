@@ -47,7 +47,7 @@ mod tests {
             level::{any_cell, centre},
             physics::MazePhysics,
         },
-        sighted::WAYS,
+        with_rays::WAYS,
     };
 
     fn walls(rows: &[&str], offset: f64) -> Walls {

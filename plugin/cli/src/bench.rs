@@ -112,18 +112,18 @@ impl Measure {
 
 /// Random actions on 64 levels, observations filled every tick.
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
-    let sight = ObservationConfig { kind, ..ObservationConfig::default() };
+    let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
     let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
     let mut worlds = Vec::new();
     for first in arrangement.first_agents() {
-        let (mut world, agents) = build_observing_world(game, mode, &sight, 1, first, arrangement.arenas)?;
+        let (mut world, agents) = build_observing_world(game, mode, &observation_config, 1, first, arrangement.arenas)?;
         for agent in agents {
             let queue = LevelQueue::Uniform { first: 0, last: 63 };
             world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
         }
         worlds.push(world);
     }
-    if sight.is_image() {
+    if observation_config.is_image() {
         // The first pictures are late: shaders and textures are prepared.
         worlds.iter_mut().try_for_each(|world| world.ticks(10))?;
     }
@@ -151,7 +151,7 @@ fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games:
     experiment.arenas = args.arenas;
     experiment.worlds = args.threads as u32;
     experiment.algorithm = Algorithm::Ppo;
-    experiment.ppo.num_steps = if experiment.sight().is_image() { 32 } else { 256 };
+    experiment.ppo.num_steps = if experiment.observation_config().is_image() { 32 } else { 256 };
     experiment.ppo.cnn = CnnKind::Nature { feature: 256 };
     experiment.ppo.epochs = 3;
     experiment.ppo.minibatches = 8;

@@ -106,7 +106,7 @@ where
 /// Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration, 130 stopped by Ctrl-C.
 pub fn main(games: &[&dyn Game]) -> ExitCode {
     #[cfg(all(target_os = "linux", feature = "camera"))]
-    crate::mesa::hush();
+    crate::mesa::silence_warnings();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

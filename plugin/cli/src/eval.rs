@@ -106,8 +106,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
-        for Chosen { name, player, sight } in &players {
-            let plan = EvalPlan { sight: *sight, ..methods::plan(&experiment, split, episodes, args.threads) };
+        for Chosen { name, player, observation_config } in &players {
+            let plan = EvalPlan {
+                observation_config: *observation_config,
+                ..methods::plan(&experiment, split, episodes, args.threads)
+            };
             let measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = methods::follow(game, name, player, &plan)?;
@@ -174,8 +177,8 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
     }
     for path in &args.skills {
         let model = SkillModel::load(path, args.device)?;
-        let sight = check_skills(path, &model, game, &args.from, games)?;
-        let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), sight };
+        let observation_config = check_skills(path, &model, game, &args.from, games)?;
+        let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
         players.push(named(chosen, path, args.skills.len()));
     }
     for path in &args.policy {
@@ -187,7 +190,7 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
     }
     for chosen in &mut players {
         if matches!(chosen.player, Player::Policy { .. }) {
-            look_through(&mut chosen.sight, args.observation, &chosen.name)?;
+            look_through(&mut chosen.observation_config, args.observation, &chosen.name)?;
         }
         chosen.check_fit(game)?;
     }
@@ -195,17 +198,21 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
 }
 
 /// Puts other eyes in place of those that a policy was trained with, as far as they see the same.
-fn look_through(sight: &mut ObservationConfig, eyes: Option<ObservationKind>, name: &str) -> Result<(), CliError> {
+fn look_through(
+    observation_config: &mut ObservationConfig,
+    eyes: Option<ObservationKind>,
+    name: &str,
+) -> Result<(), CliError> {
     let Some(kind) = eyes else { return Ok(()) };
-    let other = ObservationConfig { kind, ..*sight };
-    if other.is_image() != sight.is_image() {
-        let offered = if sight.is_image() { "vectors" } else { "pictures" };
+    let other = ObservationConfig { kind, ..*observation_config };
+    if other.is_image() != observation_config.is_image() {
+        let offered = if observation_config.is_image() { "vectors" } else { "pictures" };
         return Err(CliError::Usage(format!(
-            "the policy {name} reads {sight}, and --observation {kind} gives {offered}: leave --observation out, or \
+            "the policy {name} reads {observation_config}, and --observation {kind} gives {offered}: leave --observation out, or \
              measure it by itself"
         )));
     }
-    *sight = other;
+    *observation_config = other;
     Ok(())
 }
 
@@ -251,13 +258,13 @@ pub fn check_skills(
     from: &ExperimentArgs,
     games: &Games,
 ) -> Result<ObservationConfig, CliError> {
-    let sight = ObservationConfig::from_card(model.picture(), &model.observation())?;
+    let observation_config = ObservationConfig::from_card(model.picture(), &model.observation())?;
     let fits = |game: &dyn Game| {
-        let can_see = sight.check(game).is_ok();
-        can_see && (model.observation(), model.action_space()) == (sight.obs_kind(game), game.actions())
+        let can_see = observation_config.check(game).is_ok();
+        can_see && (model.observation(), model.action_space()) == (observation_config.obs_kind(game), game.actions())
     };
     if fits(game) {
-        return Ok(sight);
+        return Ok(observation_config);
     }
     let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
     let whose = if others.is_empty() { "no game".to_owned() } else { others.join(" or ") };

@@ -155,9 +155,9 @@ struct Looker {
 
 impl Looker {
     fn new(game: &dyn Game, args: &Args, kind: ObservationKind) -> Result<Self, CliError> {
-        let sight =
+        let observation_config =
             ObservationConfig { kind, image: ImageOptions { width: args.size, height: args.size, ..default() } };
-        let (mut world, agents) = build_observing_world(game, &args.levels.mode, &sight, 1, 0, 1)?;
+        let (mut world, agents) = build_observing_world(game, &args.levels.mode, &observation_config, 1, 0, 1)?;
         let agent = agents[0];
         let control = Chosen::usual(game)?.player.seat(game, &mut world, agent);
         world.entity_mut(agent).insert((control, LevelQueue::list(args.levels.levels().collect::<Vec<_>>())));

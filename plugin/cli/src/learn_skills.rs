@@ -148,8 +148,8 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 /// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_actions(game.actions())?;
-    let sight = experiment.sight();
-    let mut demos = Demonstrations::read(game, &sight, path, Some(&experiment.test))?;
+    let observation_config = experiment.observation_config();
+    let mut demos = Demonstrations::read(game, &observation_config, path, Some(&experiment.test))?;
     if let Some(steps) = experiment.demo_steps {
         demos = demos.at_most(steps);
     }
@@ -165,7 +165,7 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
     }
     match demos.picture_bytes() {
         0 => tell!(),
-        bytes => tell!(": {sight} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+        bytes => tell!(": {observation_config} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
     }
     let bar = progress::bar("replay recordings", steps, "steps");
     let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
@@ -207,7 +207,7 @@ pub fn learn(
         after_epoch(trainer.epochs_done(), &metrics)?;
     }
     bar.finish_and_clear();
-    Ok(Some(trainer.into_model().with_picture(experiment.sight().card())))
+    Ok(Some(trainer.into_model().with_picture(experiment.observation_config().card())))
 }
 
 /// A trainer at its start, or where the checkpoint left it.

@@ -40,7 +40,7 @@ pub fn bot_names(game: &dyn Game) -> Vec<&'static str> {
 pub fn plan(experiment: &Experiment, split: &LevelSplit, episodes_per_level: u32, threads: usize) -> EvalPlan {
     EvalPlan {
         split: split.clone(),
-        sight: experiment.sight(),
+        observation_config: experiment.observation_config(),
         episodes_per_level,
         seed: experiment.seed,
         arenas: experiment.arenas,

@@ -46,7 +46,7 @@ pub struct Chosen {
     /// The player.
     pub player: Player,
     /// What it was trained to see; vectors for bots.
-    pub sight: ObservationConfig,
+    pub observation_config: ObservationConfig,
 }
 
 impl Chosen {
@@ -56,7 +56,11 @@ impl Chosen {
     ///
     /// The game has no such bot.
     pub fn bot(game: &dyn Game, name: &str) -> Result<Self, CliError> {
-        Ok(Self { name: name.to_owned(), player: methods::bot(game, name)?, sight: ObservationConfig::default() })
+        Ok(Self {
+            name: name.to_owned(),
+            player: methods::bot(game, name)?,
+            observation_config: ObservationConfig::default(),
+        })
     }
 
     /// The demonstrator, or else the first of the game's bots.
@@ -78,8 +82,12 @@ impl Chosen {
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
         let file = PolicyFile::load(path, device)?;
         check_policy(&game.card(), &file)?;
-        let (prior, sight) = (file.skills.as_ref().map(SkillPrior::from), policy_observation(&file)?);
-        Ok(Self { name: file.card.algorithm, player: Player::Policy { policy: file.policy, prior, draw }, sight })
+        let (prior, observation_config) = (file.skills.as_ref().map(SkillPrior::from), policy_observation(&file)?);
+        Ok(Self {
+            name: file.card.algorithm,
+            player: Player::Policy { policy: file.policy, prior, draw },
+            observation_config,
+        })
     }
 
     /// What a run has learned, under the name of its algorithm.
@@ -98,7 +106,7 @@ impl Chosen {
         let learner = Learner::load(algorithm, &run.checkpoint(checkpoint)?.learner_file(), device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         let player = Player::Policy { policy: learner.policy(), prior, draw };
-        Ok(Self { name: algorithm.name().to_owned(), player, sight: experiment.sight() })
+        Ok(Self { name: algorithm.name().to_owned(), player, observation_config: experiment.observation_config() })
     }
 
     /// Checks that a policy reads what the game shows it, and acts as the game does; bots always fit.
@@ -108,8 +116,8 @@ impl Chosen {
     /// What differs, in words.
     pub fn check_fit(&self, game: &dyn Game) -> Result<(), CliError> {
         let Player::Policy { policy, .. } = &self.player else { return Ok(()) };
-        self.sight.check(game)?;
-        let (seen, acts) = (self.sight.obs_kind(game), game.actions());
+        self.observation_config.check(game)?;
+        let (seen, acts) = (self.observation_config.obs_kind(game), game.actions());
         if (policy.observation(), policy.action_space()) == (seen, acts) {
             return Ok(());
         }

@@ -110,7 +110,7 @@ fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed
     );
     let about = (info.algorithm.name().to_owned(), training, code(&info.version, &info.revision));
-    let mut file = policy_file(game, &experiment.sight(), learner.policy(), learner.skills(), about);
+    let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
     file.card.game_version = info.game_version;
     Ok((game, experiment, file))
@@ -126,9 +126,9 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
         None => "demonstrations".to_owned(),
     };
     let about = ("bc".to_owned(), training, code);
-    let sight = check_skills(path, &model, game, from, games)?;
+    let observation_config = check_skills(path, &model, game, from, games)?;
     experiment.check_train(game)?;
-    let file = policy_file(game, &sight, model.policy(), Some(cloning_skills(&model, &experiment)), about);
+    let file = policy_file(game, &observation_config, model.policy(), Some(cloning_skills(&model, &experiment)), about);
     Ok((game, experiment, file))
 }
 
@@ -152,7 +152,7 @@ fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliEr
     print_line(format!("trained on    {}", card.training))?;
     print_line(format!("code          {}", card.code))?;
     print_line(match policy_observation(&file)? {
-        sight if sight.is_image() => format!("observation   {sight}"),
+        observation_config if observation_config.is_image() => format!("observation   {observation_config}"),
         _ => format!(
             "observation   {} values{}: {}",
             policy.obs_dim(),

@@ -37,11 +37,11 @@ pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
 /// The time that is left, if anything has been done from which it can be told.
 fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
     // What cannot be written is not drawn.
-    let _ = out.write_str(&left_in_words(state.eta()));
+    let _ = out.write_str(&describe_left(state.eta()));
 }
 
 /// indicatif estimates no time at all as long as nothing is done.
-fn left_in_words(left: Duration) -> String {
+fn describe_left(left: Duration) -> String {
     if left.is_zero() { String::new() } else { format!("{:#} left", HumanDuration(left)) }
 }
 
@@ -115,7 +115,7 @@ mod tests {
     fn no_time_is_left_before_anything_is_done() {
         let bar = ProgressBar::hidden();
         bar.set_length(100);
-        assert_eq!(left_in_words(bar.eta()), "");
-        assert_eq!(left_in_words(Duration::from_secs(5)), "5s left");
+        assert_eq!(describe_left(bar.eta()), "");
+        assert_eq!(describe_left(Duration::from_secs(5)), "5s left");
     }
 }

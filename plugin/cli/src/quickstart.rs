@@ -16,7 +16,7 @@ use playbot_lab::{
     report::to_text_table,
     train::{
         Algorithm, Experiment, Trainer,
-        run_dir::{check_replaceable, is_unborn, write_atomically},
+        run_dir::{check_replaceable, is_unstarted, write_atomically},
         run_lock::RunLock,
     },
 };
@@ -153,7 +153,7 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
 fn take_folder(path: &Path) -> Result<RunLock, CliError> {
     let is_run = path.join("run.json").exists();
     let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
-    if path.exists() && !is_unborn(path) && (is_run || !was_ours) {
+    if path.exists() && !is_unstarted(path) && (is_run || !was_ours) {
         return Err(CliError::Usage(format!(
             "{} holds something else than an earlier quickstart, so it is left alone: choose another --run",
             path.display()

@@ -67,7 +67,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let writer = open_writer(game, &levels.mode, &args)?;
     let (mut world, agents) = build_world(game, &levels.mode, args.seed, 0, 1);
     let agent = agents[0];
-    game.arm_demonstrator(&mut world, agent, args.noise);
+    game.attach_demonstrator(&mut world, agent, args.noise);
     let mut recorder = Recorder::new(writer);
     if let Some(steps) = args.steps {
         recorder = recorder.with_step_limit(steps);

@@ -10,7 +10,7 @@ use playbot_lab::{
     report::StudyReport,
     train::{
         Experiment,
-        run_dir::{is_unborn, write_atomically},
+        run_dir::{is_unstarted, write_atomically},
         study::{StudyRun, study_runs},
     },
 };
@@ -161,7 +161,7 @@ fn runs_folder(args: &Args) -> PathBuf {
 /// Runs that are there are neither overwritten nor mixed with new ones unless somebody says so.
 fn check_folder(folder: &Path, args: &Args) -> Result<(), CliError> {
     let is_used =
-        std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| !is_unborn(&entry.path())));
+        std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| !is_unstarted(&entry.path())));
     if !is_used || args.resume || args.force {
         return Ok(());
     }

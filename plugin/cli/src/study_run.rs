@@ -18,7 +18,7 @@ use playbot_lab::{
         Experiment, Trainer,
         checkpoint::Which,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
-        run_dir::{RunDir, RunInfo, check_replaceable, is_unborn, write_atomically},
+        run_dir::{RunDir, RunInfo, check_replaceable, is_unstarted, write_atomically},
         run_lock::RunLock,
         study::StudyRun,
     },
@@ -136,7 +136,7 @@ impl<'a> Runner<'a> {
 
     /// Whether there is a folder with this run that is gone on with.
     fn is_saved(&self, run: &StudyRun, folder: &Path) -> Result<bool, CliError> {
-        if self.force || !folder.exists() || is_unborn(folder) {
+        if self.force || !folder.exists() || is_unstarted(folder) {
             return Ok(false);
         }
         let (_, saved, info) = RunDir::open(folder)?;
@@ -237,7 +237,7 @@ impl<'a> Runner<'a> {
     fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
         let Experiment { game: name, test, demo_steps, .. } = experiment;
         let path = experiment::resolve(experiment.recordings()?);
-        let key = (name.clone(), path, test.clone(), experiment.sight(), *demo_steps);
+        let key = (name.clone(), path, test.clone(), experiment.observation_config(), *demo_steps);
         match &self.demos {
             Some((known, dataset)) if *known == key => Ok(dataset.clone()),
             _ => {

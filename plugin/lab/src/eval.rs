@@ -81,7 +81,7 @@ impl Player {
                 Control::Bot
             }
             Self::Demonstrator => {
-                game.arm_demonstrator(world, agent, 0.0);
+                game.attach_demonstrator(world, agent, 0.0);
                 Control::Bot
             }
         }
@@ -94,7 +94,7 @@ pub struct EvalPlan {
     /// Levels.
     pub split: LevelSplit,
     /// What a learned policy sees. Bots are left with vectors, which are cheaper.
-    pub sight: ObservationConfig,
+    pub observation_config: ObservationConfig,
     /// Episodes on each level.
     pub episodes_per_level: u32,
     /// Seed of the players' random streams.
@@ -208,8 +208,10 @@ fn stage(
     first: u32,
 ) -> Result<World, VisionError> {
     let (per_world, total) = (arrangement.arenas, arrangement.total() as usize);
-    let sight = if matches!(player, Player::Policy { .. }) { plan.sight } else { ObservationConfig::default() };
-    let (mut world, agents) = build_observing_world(game, &plan.split.mode, &sight, plan.seed, first, per_world)?;
+    let observation_config =
+        if matches!(player, Player::Policy { .. }) { plan.observation_config } else { ObservationConfig::default() };
+    let (mut world, agents) =
+        build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
     Renewal::set_up(&mut world, |world| {
         world.init_resource::<Results>();
         world.add_observer(note_result);

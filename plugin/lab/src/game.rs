@@ -120,7 +120,7 @@ pub trait Game: Send + Sync {
     }
 
     /// Adds what is drawn to an app, after [`build`](Self::build): sprites, tiles and transforms for everything that the
-    /// game spawns, brought up to date in [`VisionSystems::Dress`](bevy_playbot::vision::VisionSystems::Dress). Needs a
+    /// game spawns, brought up to date in [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync). Needs a
     /// [`picture`](Self::picture).
     fn build_picture(&self, _app: &mut App) {}
 
@@ -153,7 +153,7 @@ pub trait Game: Send + Sync {
 
     /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by a
     /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
-    fn arm_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
+    fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 
     /// The experiment of the game that serves where none is named: the path it has below the game's sources, and its text.
     /// `None` for the plainest one, see [`default_experiment`](crate::train::default_experiment::default_experiment).

@@ -87,7 +87,7 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
     header.demonstrator = name.to_owned();
     header.action_noise = noise;
     let (mut world, agents) = build_world(game, &levels.mode, 0, 0, 1);
-    game.arm_demonstrator(&mut world, agents[0], noise);
+    game.attach_demonstrator(&mut world, agents[0], noise);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header)?));
     let queue = LevelQueue::list(levels.levels().collect::<Vec<_>>());
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
@@ -109,8 +109,8 @@ pub fn learn_skills(
     threads: usize,
 ) -> Result<SkillModel, PipelineError> {
     experiment.check_actions(game.actions())?;
-    let sight = experiment.sight();
-    let mut demos = Demonstrations::read(game, &sight, experiment.recordings()?, Some(&experiment.test))?;
+    let observation_config = experiment.observation_config();
+    let mut demos = Demonstrations::read(game, &observation_config, experiment.recordings()?, Some(&experiment.test))?;
     if let Some(steps) = experiment.demo_steps {
         demos = demos.at_most(steps);
     }
@@ -119,7 +119,7 @@ pub fn learn_skills(
     while trainer.epochs_done() < experiment.skills.epochs as u64 {
         trainer.train_epoch(&mut |_| ControlFlow::Continue(()))?;
     }
-    Ok(trainer.into_model().with_picture(sight.card()))
+    Ok(trainer.into_model().with_picture(observation_config.card()))
 }
 
 /// Trains to the end of the experiment; `after_update` hears of each update. Nothing is written: a training that is to be
@@ -158,7 +158,7 @@ pub fn evaluate(
     experiment.check_test(game)?;
     let plan = EvalPlan {
         split: experiment.test.clone(),
-        sight: experiment.sight(),
+        observation_config: experiment.observation_config(),
         episodes_per_level: experiment.eval.episodes_per_level,
         seed: experiment.seed,
         arenas: experiment.arenas,
@@ -175,5 +175,5 @@ pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
     let experiment = trainer.experiment();
     let training = format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed);
     let about = (experiment.algorithm.name().to_owned(), training, env!("CARGO_PKG_VERSION").to_owned());
-    policy_file(game, &experiment.sight(), trainer.policy(), trainer.skill_source(), about)
+    policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), about)
 }

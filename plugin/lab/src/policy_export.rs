@@ -39,7 +39,7 @@ pub enum ExportError {
 /// A policy for this game that sees it so, with the card filled in from both.
 pub fn policy_file(
     game: &dyn Game,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     policy: Policy,
     skills: Option<SkillSource>,
     (algorithm, training, code): (String, String, String),
@@ -47,8 +47,8 @@ pub fn policy_file(
     let card = PolicyCard {
         game: game.name().to_owned(),
         game_version: game.version(),
-        observations: if sight.is_image() { Vec::new() } else { game.observation().names },
-        picture: sight.card(),
+        observations: if observation_config.is_image() { Vec::new() } else { game.observation().names },
+        picture: observation_config.card(),
         actions: game.action_names(),
         algorithm,
         training,

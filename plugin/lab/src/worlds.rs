@@ -35,16 +35,16 @@ pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u3
 pub fn build_observing_world(
     game: &dyn Game,
     mode: &str,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     seed: u64,
     first: u32,
     count: u32,
 ) -> Result<(World, Vec<Entity>), VisionError> {
-    let (mut world, agents) = build_once(game, mode, sight, seed, first, count)?;
+    let (mut world, agents) = build_once(game, mode, observation_config, seed, first, count)?;
     if let Some(game) = game.built_anew() {
-        let (mode, sight) = (mode.to_owned(), *sight);
+        let (mode, observation_config) = (mode.to_owned(), *observation_config);
         world.insert_resource(Renewal::new(move || {
-            let built = build_once(&*game, &mode, &sight, seed, first, count);
+            let built = build_once(&*game, &mode, &observation_config, seed, first, count);
             built.map(|(world, _)| world).map_err(|error| Fault(error.to_string()))
         }));
         Renewal::carry_resource::<StageClock>(&mut world);
@@ -55,26 +55,28 @@ pub fn build_observing_world(
 fn build_once(
     game: &dyn Game,
     mode: &str,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     seed: u64,
     first: u32,
     count: u32,
 ) -> Result<(World, Vec<Entity>), VisionError> {
-    sight.check(game)?;
+    observation_config.check(game)?;
     let mut app = match game.placement() {
         TickPlacement::Fixed => {
             let mut app = headless_app();
             set_tick_rate(&mut app, game.tick_hz());
             app
         }
-        TickPlacement::Frame => headless_frame_app(game.headless_plugins(sight.headless_plugins()), game.tick_hz()),
+        TickPlacement::Frame => {
+            headless_frame_app(game.headless_plugins(observation_config.headless_plugins()), game.tick_hz())
+        }
     };
-    add_game(game, &mut app, mode, sight, seed)?;
+    add_game(game, &mut app, mode, observation_config, seed)?;
     let actions = demo_actions(&game.actions());
     let header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), actions);
     PanicReports::new(header, std::env::temp_dir()).add_to(&mut app);
     let mut world = into_world(app);
-    let agents = spawn_agents(game, &mut world, sight, first, count);
+    let agents = spawn_agents(game, &mut world, observation_config, first, count);
     for &agent in &agents {
         world.entity_mut(agent).insert(EpisodeTrace::default());
     }
@@ -91,7 +93,7 @@ pub fn add_game(
     game: &dyn Game,
     app: &mut App,
     mode: &str,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     seed: u64,
 ) -> Result<(), VisionError> {
     app.insert_resource(PlaybotSeed(seed));
@@ -103,20 +105,20 @@ pub fn add_game(
     }
     stage_clock::add_readings(app);
     game.build(app, mode);
-    sight.build(game, app)
+    observation_config.build(game, app)
 }
 
 /// Adds agents `first..first + count` with their sensors, all idle, and returns them in the order of their numbers.
 pub fn spawn_agents(
     game: &dyn Game,
     world: &mut World,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     first: u32,
     count: u32,
 ) -> Vec<Entity> {
     let agents: Vec<_> = (first..first + count).map(|index| game.spawn_agent(world, index)).collect();
     for &agent in &agents {
-        sight.equip(game, world, agent);
+        observation_config.equip(game, world, agent);
     }
     agents
 }

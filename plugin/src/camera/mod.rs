@@ -2,12 +2,12 @@
 //!
 //! Give an agent a [`CameraSensor`] and add the [`CameraSensorPlugin`]; each tick its
 //! [`Frame`](crate::vision::Frame) holds what the World looks like in that tick, after
-//! [`VisionSystems::Dress`](crate::vision::VisionSystems::Dress).
+//! [`VisionSystems::Sync`](crate::vision::VisionSystems::Sync).
 //!
 //! # How it is drawn
 //!
 //! The renderer is taken out of Bevy's loop and run by hand, in
-//! [`VisionSystems::Look`](crate::vision::VisionSystems::Look): the scene is extracted, drawn, read back and handed out
+//! [`VisionSystems::Render`](crate::vision::VisionSystems::Render): the scene is extracted, drawn, read back and handed out
 //! before anybody decides, so that no frame is ever late.
 //!
 //! A Bevy camera costs about half a millisecond, however little it sees. Sensors that follow a target therefore share

@@ -77,8 +77,8 @@ impl Plugin for CameraSensorPlugin {
             .init_resource::<Stamp>()
             .init_resource::<Readback>()
             .init_resource::<images::MissingImages>()
-            // It reads whatever can be drawn; what a game changes in `Dress` or before is seen.
-            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Look).ambiguous_with_all());
+            // It reads whatever can be drawn; what a game changes in `Sync` or before is seen.
+            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Render).ambiguous_with_all());
     }
 
     fn cleanup(&self, app: &mut App) {

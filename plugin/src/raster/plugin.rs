@@ -17,6 +17,6 @@ impl Plugin for RasterPlugin {
         VisionPlugin::add_to(app);
         app.init_resource::<Assets<Image>>()
             .init_resource::<Assets<TextureAtlasLayout>>()
-            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Look));
+            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Render));
     }
 }

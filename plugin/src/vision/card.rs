@@ -44,11 +44,11 @@ impl ObservationConfig {
             grayscale: card.grayscale,
             paint_velocity: card.paint_velocity,
         };
-        let sight = Self { kind, image };
-        if !sight.is_image() || image.check().is_err() || image.obs_kind() != *observation {
-            return unknown(format!("it reads {observation}, its card tells of {sight}"));
+        let observation_config = Self { kind, image };
+        if !observation_config.is_image() || image.check().is_err() || image.obs_kind() != *observation {
+            return unknown(format!("it reads {observation}, its card tells of {observation_config}"));
         }
-        Ok(sight)
+        Ok(observation_config)
     }
 }
 
@@ -59,9 +59,9 @@ mod tests {
     #[test]
     fn cards_are_read_as_written_and_only_beside_what_they_describe() {
         let image = ImageOptions { stack: 4, grayscale: true, width: 48, ..ImageOptions::default() };
-        let sight = ObservationConfig { kind: ObservationKind::Camera, image };
-        let card = sight.card();
-        assert_eq!(ObservationConfig::from_card(card.as_ref(), &image.obs_kind()), Ok(sight));
+        let observation_config = ObservationConfig { kind: ObservationKind::Camera, image };
+        let card = observation_config.card();
+        assert_eq!(ObservationConfig::from_card(card.as_ref(), &image.obs_kind()), Ok(observation_config));
         assert_eq!(
             ObservationConfig::from_card(ObservationConfig::default().card().as_ref(), &ObsKind::Vector(3)),
             Ok(ObservationConfig::default())

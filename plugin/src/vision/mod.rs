@@ -7,7 +7,7 @@
 //! | [`Stage`] | the root of an arena that is drawn by itself |
 //! | [`TileLayer`] | a grid of tiles, drawn at once |
 //!
-//! A sensor fills [`Frame`] in [`VisionSystems::Look`]; [`VisionSystems::Compose`] checks its tick and makes
+//! A sensor fills [`Frame`] in [`VisionSystems::Render`]; [`VisionSystems::Compose`] checks its tick and makes
 //! [`Observation::image`](crate::observation::Observation::image) of it. Agents that nobody decides for, and agents between
 //! two episodes, are not looked after.
 

@@ -28,7 +28,7 @@ impl Plugin for VisionPlugin {
             .register_type::<PaintedVelocity>();
         app.configure_sets(
             ObserveSchedule,
-            (VisionSystems::Dress, VisionSystems::Look, VisionSystems::Compose).chain(),
+            (VisionSystems::Sync, VisionSystems::Render, VisionSystems::Compose).chain(),
         )
         // Games fill the vector of an observation and this the image, so their order does not matter.
         .add_systems(ObserveSchedule, compose::compose.in_set(VisionSystems::Compose).ambiguous_with_all())

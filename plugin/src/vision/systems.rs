@@ -6,9 +6,9 @@ use bevy::ecs::schedule::SystemSet;
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VisionSystems {
     /// The game brings what is drawn up to date: transforms, sprites, tiles.
-    Dress,
+    Sync,
     /// Sensors fill each agent's [`Frame`](super::Frame).
-    Look,
+    Render,
     /// The frame's tick is checked, and the observation made of it.
     Compose,
 }

@@ -96,7 +96,7 @@ fn systems_are_in_no_ambiguous_order() {
     AntMaze.build_picture(&mut app);
     app.init_resource::<ButtonInput<KeyCode>>();
     let agent = AntMaze.spawn_agent(app.world_mut(), 0);
-    AntMaze.arm_demonstrator(app.world_mut(), agent, 0.2);
+    AntMaze.attach_demonstrator(app.world_mut(), agent, 0.2);
     app.world_mut().entity_mut(agent).insert(Control::Bot);
     app.play_episodes(2, 40).expect("sound");
 }

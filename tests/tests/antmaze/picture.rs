@@ -11,8 +11,9 @@ use crate::arena::put;
 
 #[test]
 fn pictures_show_floor_walls_ant_and_goal() {
-    let sight = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
-    let (mut world, agents) = build_observing_world(&AntMaze, "umaze", &sight, 0, 0, 1).expect("can be drawn");
+    let observation_config = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
+    let (mut world, agents) =
+        build_observing_world(&AntMaze, "umaze", &observation_config, 0, 0, 1).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0; 8]));
     world.entity_mut(agents[0]).insert((Control::Human, still, LevelQueue::Always(0)));
     world.tick().expect("sound");
@@ -35,8 +36,8 @@ fn pictures_show_floor_walls_ant_and_goal() {
 
 #[test]
 fn the_open_floor_is_drawn_around_its_ant() {
-    let sight = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
-    let (mut world, agents) = build_observing_world(&Ant, "goal", &sight, 0, 0, 2).expect("can be drawn");
+    let observation_config = ObservationConfig { kind: ObservationKind::Raster, ..ObservationConfig::default() };
+    let (mut world, agents) = build_observing_world(&Ant, "goal", &observation_config, 0, 0, 2).expect("can be drawn");
     let still = Action(ActionValue::Continuous(vec![0.0; 8]));
     for &agent in &agents {
         world.entity_mut(agent).insert((Control::Human, still.clone(), LevelQueue::Always(0)));

@@ -68,7 +68,7 @@ fn the_demonstrator_walks_to_the_goal() {
     for (levels, least) in [("umaze:0..31", 0.9), ("medium:0..31", 0.8), ("random+goals=random:0..31", 0.8)] {
         let plan = EvalPlan {
             split: levels.parse().expect("a split"),
-            sight: ObservationConfig::default(),
+            observation_config: ObservationConfig::default(),
             episodes_per_level: 1,
             seed: 1,
             arenas: 32,
@@ -87,7 +87,7 @@ fn the_shipped_walker_reaches_goals_in_all_directions() {
     let policy = PolicyFile::load(&file, DeviceKind::default()).expect("shipped").policy;
     let plan = EvalPlan {
         split: "goal:0..127".parse().expect("a split"),
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 64,

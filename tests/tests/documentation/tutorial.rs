@@ -13,7 +13,7 @@ fn measure(player: &Player) -> EvalSummary {
     let split: LevelSplit = "default:64..83".parse().expect("a split");
     let plan = EvalPlan {
         split: split.clone(),
-        sight: ObservationConfig::default(),
+        observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 1,
         arenas: 4,

@@ -41,28 +41,29 @@ pub fn record(folder: &Path) {
     }
 }
 
-pub fn demonstrations(folder: &Path, sight: &ObservationConfig) -> Demonstrations {
+pub fn demonstrations(folder: &Path, observation_config: &ObservationConfig) -> Demonstrations {
     let test = experiment().test;
-    Demonstrations::read(&PaintedCorridor, sight, folder, Some(&test)).expect("readable")
+    Demonstrations::read(&PaintedCorridor, observation_config, folder, Some(&test)).expect("readable")
 }
 
 /// A skill model that has seen the recordings of `folder`.
 pub fn skills(folder: &Path) -> SkillModel {
-    let (config, sight) = (experiment().skills, experiment().sight());
-    let dataset = demonstrations(folder, &sight).dataset(&PaintedCorridor, 2, |_| {}).expect("replays");
+    let (config, observation_config) = (experiment().skills, experiment().observation_config());
+    let dataset = demonstrations(folder, &observation_config).dataset(&PaintedCorridor, 2, |_| {}).expect("replays");
     let epochs = config.epochs;
     let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");
     for _ in 0..epochs {
         trainer.train_epoch(&mut |_| std::ops::ControlFlow::Continue(())).expect("learns");
     }
     let path = folder.join("skills.safetensors");
-    trainer.into_model().with_picture(sight.card()).save(&path).expect("writable");
+    trainer.into_model().with_picture(observation_config.card()).save(&path).expect("writable");
     SkillModel::load(&path, DeviceKind::Flex).expect("as written")
 }
 
 /// An untrained policy of pictures.
-pub fn untrained(sight: &ObservationConfig) -> Policy {
+pub fn untrained(observation_config: &ObservationConfig) -> Policy {
     let config = experiment().ppo;
-    let spec = PolicySpec { obs: sight.image.obs_kind(), latent: 0, action_space: PaintedCorridor.actions() };
+    let spec =
+        PolicySpec { obs: observation_config.image.obs_kind(), latent: 0, action_space: PaintedCorridor.actions() };
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid").policy()
 }

@@ -13,10 +13,11 @@ use crate::corridor::{experiment, record, skills, untrained};
 
 #[test]
 fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {
-    let (sight, levels) = (experiment().sight(), experiment().train);
-    let policy = untrained(&sight);
+    let (observation_config, levels) = (experiment().observation_config(), experiment().train);
+    let policy = untrained(&observation_config);
     let play = |first, count| {
-        let mut collector = Collector::new(&PaintedCorridor, &levels, &sight, 1, first, count, None).expect("fits");
+        let mut collector =
+            Collector::new(&PaintedCorridor, &levels, &observation_config, 1, first, count, None).expect("fits");
         // The state after the first rollout is looked at twice.
         let parts = [19, 45].map(|steps| collector.collect(&policy, 0, steps).expect("sound").0);
         let rows = parts.map(|part| {
@@ -70,20 +71,32 @@ fn eyes_that_do_not_fit_are_refused_with_a_way_out() {
 
 #[test]
 fn a_policy_says_which_eyes_it_needs() {
-    let sight = experiment().sight();
+    let observation_config = experiment().observation_config();
     let vectors = PolicySpec { obs: ObsKind::Vector(2), latent: 0, action_space: PaintedCorridor.actions() };
     let vectors = PpoLearner::new(experiment().ppo, vectors, 1, DeviceKind::Flex).expect("valid").policy();
-    let colour = ObservationConfig { image: ImageOptions { grayscale: false, ..sight.image }, ..sight };
-    for (policy, sight, words) in [
+    let colour = ObservationConfig {
+        image: ImageOptions { grayscale: false, ..observation_config.image },
+        ..observation_config
+    };
+    for (policy, observation_config, words) in [
         (
-            untrained(&sight),
+            untrained(&observation_config),
             ObservationConfig::default(),
             ["images of 4 channels", "gives 2 observation values", "a sensor that makes"],
         ),
-        (vectors, sight, ["made for 2 observation values", "gives images of 4 channels", "`VectorSensor`"]),
-        (untrained(&colour), sight, ["images of 12 channels", "gives images of 4 channels", "`ImageOptions`"]),
+        (
+            vectors,
+            observation_config,
+            ["made for 2 observation values", "gives images of 4 channels", "`VectorSensor`"],
+        ),
+        (
+            untrained(&colour),
+            observation_config,
+            ["images of 12 channels", "gives images of 4 channels", "`ImageOptions`"],
+        ),
     ] {
-        let (mut world, agents) = build_observing_world(&PaintedCorridor, "plain", &sight, 0, 0, 1).expect("drawable");
+        let (mut world, agents) =
+            build_observing_world(&PaintedCorridor, "plain", &observation_config, 0, 0, 1).expect("drawable");
         world.insert_resource(ActivePolicy { policy, draw: ActionDraw::Sample });
         world.entity_mut(agents[0]).insert(Control::Policy);
         let fault = world.tick().expect_err("does not fit").to_string();

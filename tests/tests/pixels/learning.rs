@@ -55,8 +55,8 @@ fn bytes(folder: &Path) -> Vec<Vec<u8>> {
 }
 
 fn measure(policy: &Policy, prior: Option<SkillPrior>, threads: usize) -> Vec<EpisodeResult> {
-    let (split, sight) = ("plain:8..15".parse().expect("a split"), experiment().sight());
-    let plan = EvalPlan { split, sight, episodes_per_level: 3, seed: 7, arenas: 4, worlds: 2, threads };
+    let (split, observation_config) = ("plain:8..15".parse().expect("a split"), experiment().observation_config());
+    let plan = EvalPlan { split, observation_config, episodes_per_level: 3, seed: 7, arenas: 4, worlds: 2, threads };
     let player = Player::Policy { policy: policy.clone(), prior, draw: ActionDraw::Sample };
     evaluate(&PaintedCorridor, &player, &plan, |_| {}).expect("fits")
 }
@@ -78,11 +78,12 @@ fn what_is_learned_from_pictures_survives_its_files() {
     let saved = run.checkpoint(Which::Last).expect("saved").learner_file();
     let learner = Learner::load(info.algorithm, &saved, DeviceKind::Flex).expect("as written");
     let (path, about) = (folder.path().join("eyes.policy"), [(); 3].map(|()| "test".to_owned()).into());
-    let file = policy_file(&PaintedCorridor, &experiment.sight(), learner.policy(), learner.skills(), about);
+    let file =
+        policy_file(&PaintedCorridor, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");
     let read = PolicyFile::load(&path, DeviceKind::Flex).expect("as written");
     check_policy(&PaintedCorridor.card(), &read).expect("fits");
-    assert_eq!(policy_observation(&read), Ok(experiment.sight()));
+    assert_eq!(policy_observation(&read), Ok(experiment.observation_config()));
     let prior = read.skills.as_ref().map(SkillPrior::from);
     assert_eq!(measure(&read.policy, prior, 2), results, "the file plays another game");
 

@@ -9,20 +9,20 @@ use crate::corridor::{demonstrations, experiment, record};
 fn recordings_show_the_same_pictures_whoever_replays_them() {
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path());
-    let sight = experiment().sight();
-    let read = || demonstrations(folder.path(), &sight);
+    let observation_config = experiment().observation_config();
+    let read = || demonstrations(folder.path(), &observation_config);
     assert_eq!((read().episodes(), read().picture_bytes()), (72, read().steps() * 16 * 16 * 4));
     let steps = std::sync::atomic::AtomicU64::new(0);
     let count = |n| {
         steps.fetch_add(n, std::sync::atomic::Ordering::Relaxed);
     };
     let one = read().dataset(&PaintedCorridor, 1, count).expect("replays");
-    assert_eq!(one.observation(), sight.image.obs_kind());
+    assert_eq!(one.observation(), observation_config.image.obs_kind());
     assert_eq!(steps.load(std::sync::atomic::Ordering::Relaxed), one.steps() as u64, "progress ends at the end");
     assert!(one == read().dataset(&PaintedCorridor, 3, |_| {}).expect("replays"), "threads");
     // The recordings b and c are the same game.
     let part = |name: &str| {
-        let demos = demonstrations(&folder.path().join(name), &sight);
+        let demos = demonstrations(&folder.path().join(name), &observation_config);
         demos.dataset(&PaintedCorridor, 1, |_| {}).expect("replays")
     };
     assert!(part("b.demo") == part("c.demo") && part("a.demo") != part("b.demo"));
@@ -32,7 +32,7 @@ fn recordings_show_the_same_pictures_whoever_replays_them() {
 fn a_part_of_the_recordings_is_spread_over_all_of_them() {
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path());
-    let read = || demonstrations(folder.path(), &experiment().sight());
+    let read = || demonstrations(folder.path(), &experiment().observation_config());
     let all = read().steps();
     let half = read().at_most(all / 2);
     assert!(half.steps() <= all / 2 && half.steps() > all / 3, "{} of {all}", half.steps());
@@ -45,8 +45,8 @@ fn pictures_without_end_are_refused_before_anything_is_replayed() {
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path());
     let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
-    let sight = ObservationConfig { kind: ObservationKind::Raster, image };
-    let demos = demonstrations(folder.path(), &sight);
+    let observation_config = ObservationConfig { kind: ObservationKind::Raster, image };
+    let demos = demonstrations(folder.path(), &observation_config);
     let error = demos.dataset(&PaintedCorridor, 1, |_| {}).expect_err("too large").to_string();
     for words in ["GiB", "`demo_steps`", "1024×1024 colour pictures of the raster, 16 in a stack"] {
         assert!(error.contains(words), "{error}");

@@ -14,7 +14,7 @@ impl Plugin for AntViewPlugin {
     fn build(&self, app: &mut App) {
         app.configure_sets(
             ObserveSchedule,
-            (AntViewSystems::Show, AntViewSystems::Draw).chain().in_set(VisionSystems::Dress),
+            (AntViewSystems::Show, AntViewSystems::Draw).chain().in_set(VisionSystems::Sync),
         )
         .add_plugins(FlatViewPlugin);
     }

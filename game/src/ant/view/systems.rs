@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-/// Parts of [`VisionSystems::Dress`](bevy_playbot::vision::VisionSystems::Dress) for games with ants, in this order.
+/// Parts of [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync) for games with ants, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AntViewSystems {
     /// The game brings poses, goals and grounds up to date.

@@ -29,7 +29,7 @@ impl Plugin for CoinRunPicturePlugin {
                 trail::trails,
             )
                 .chain()
-                .in_set(VisionSystems::Dress),
+                .in_set(VisionSystems::Sync),
         );
     }
 }

@@ -18,7 +18,7 @@ impl Plugin for Maze2dPicturePlugin {
         let art = Art::add_to(&mut images);
         app.insert_resource(art).init_resource::<ArenaGrid>().add_systems(
             ObserveSchedule,
-            (board::players, board::levels, board::balls).chain().in_set(VisionSystems::Dress),
+            (board::players, board::levels, board::balls).chain().in_set(VisionSystems::Sync),
         );
     }
 }

@@ -25,10 +25,11 @@ const LAST_LEVEL: u64 = u32::MAX as u64;
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let playlist = playlist(game, &args)?;
-    let (partner, sight) = partner(game, &args)?;
+    let (partner, observation_config) = partner(game, &args)?;
     let header = header(game, playlist.mode(), &args);
     let seed = args.seed.unwrap_or(0);
-    let mut window = GameWindow::open(WindowSetup { game, playlist, partner, sight, seed, stop: interrupt::asked })?;
+    let mut window =
+        GameWindow::open(WindowSetup { game, playlist, partner, observation_config, seed, stop: interrupt::asked })?;
     // Not before there is a window: a recording without one would only be in the way.
     if let Some(path) = &args.record {
         window.check_recording()?;
@@ -64,7 +65,7 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
 /// Whoever takes over with Tab, and what it sees.
 fn partner(game: &dyn Game, args: &Args) -> Result<(Option<Partner>, ObservationConfig), CliError> {
     Ok(match args.partner.load(game)? {
-        Some(Chosen { name, player, sight }) => (Some(Partner { name, player }), sight),
+        Some(Chosen { name, player, observation_config }) => (Some(Partner { name, player }), observation_config),
         None => (None, ObservationConfig::default()),
     })
 }

@@ -61,7 +61,7 @@ impl Numbers {
         for (row, ((name, value), reach)) in self.names.iter().zip(values).zip(&self.reach).enumerate() {
             let y = MARGIN + row * self.line();
             font::write(screen, name, letter, (MARGIN, y), FAINT);
-            font::write(screen, &in_words(*value), letter, (column, y), WORDS);
+            font::write(screen, &describe(*value), letter, (column, y), WORDS);
             screen.block(middle, y, letter, font::HEIGHT * letter, FAINT);
             let share = if *reach > 0.0 { (value.abs() / reach).min(1.0) } else { 0.0 };
             let length = (share * (BAR * letter) as f32).round() as usize;
@@ -72,7 +72,7 @@ impl Numbers {
 }
 
 /// Short enough for its column.
-fn in_words(value: f32) -> String {
+fn describe(value: f32) -> String {
     if value.abs() < 99_999.5 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
 
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn values_fit_their_column() {
         for value in [0.0, -1.5, 99_999.0, -99_999.0, 1e9, -3.4e38] {
-            assert!(font::width(&in_words(value)) <= font::width("-00000.000  "), "{value}");
+            assert!(font::width(&describe(value)) <= font::width("-00000.000  "), "{value}");
         }
     }
 }

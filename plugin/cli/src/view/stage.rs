@@ -54,11 +54,11 @@ impl Stage {
     pub fn playing(
         game: &dyn Game,
         mode: &str,
-        sight: &ObservationConfig,
+        observation_config: &ObservationConfig,
         level: u64,
         player: &Player,
     ) -> Result<Self, CliError> {
-        let mut stage = Self::new(game, mode, sight, level)?;
+        let mut stage = Self::new(game, mode, observation_config, level)?;
         let control = player.seat(game, &mut stage.world, stage.agent);
         player.install(&mut stage.world);
         stage.world.entity_mut(stage.agent).insert(control);
@@ -73,17 +73,17 @@ impl Stage {
     pub fn replaying(
         game: &dyn Game,
         mode: &str,
-        sight: &ObservationConfig,
+        observation_config: &ObservationConfig,
         episode: DemoEpisode,
     ) -> Result<Self, CliError> {
-        let mut stage = Self::new(game, mode, sight, episode.level_seed)?;
+        let mut stage = Self::new(game, mode, observation_config, episode.level_seed)?;
         stage.over = episode.is_empty();
         stage.world.entity_mut(stage.agent).insert((Control::Replay, Replay::new(Arc::new(episode))));
         Ok(stage)
     }
 
-    fn new(game: &dyn Game, mode: &str, sight: &ObservationConfig, level: u64) -> Result<Self, CliError> {
-        let (mut world, agents) = build_observing_world(game, mode, sight, 0, 0, 1)?;
+    fn new(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, level: u64) -> Result<Self, CliError> {
+        let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
         let agent = agents[0];
         Renewal::set_up(&mut world, |world| {
             world.init_resource::<End>();
@@ -122,7 +122,7 @@ impl Stage {
             tick: self.ticks,
             image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
             vector: agent.get::<Observation>().map(|seen| seen.vector.clone()).unwrap_or_default(),
-            action: agent.get::<Action>().map(|action| self.in_words(&action.0)).unwrap_or_default(),
+            action: agent.get::<Action>().map(|action| self.describe(&action.0)).unwrap_or_default(),
             // A policy without a critic says 0 to everything.
             value: decided.map(|decision| decision.value).filter(|value| *value != 0.0),
             skill: agent.get::<ActiveSkill>().map(|skill| skill.z.clone()).unwrap_or_default(),
@@ -130,7 +130,7 @@ impl Stage {
         }
     }
 
-    fn in_words(&self, action: &ActionValue) -> String {
+    fn describe(&self, action: &ActionValue) -> String {
         match action {
             ActionValue::Discrete(index) => match self.action_names.get(*index as usize) {
                 Some(name) => name.clone(),
@@ -164,7 +164,7 @@ impl Stage {
 }
 
 /// How an episode ended.
-pub fn end_in_words(ended: EpisodeEnded) -> &'static str {
+pub fn describe_end(ended: EpisodeEnded) -> &'static str {
     match ended.end {
         EpisodeEnd::Terminated { success: true } => "won",
         EpisodeEnd::Terminated { success: false } => "lost",

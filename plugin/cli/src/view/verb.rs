@@ -82,8 +82,11 @@ const MOST_BYTES: usize = 1 << 30;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let (mut stage, sight, name) = open_stage(game, &args)?;
-    let pictures = sight.is_image().then(|| Film::new(sight.image, args.scale, game.tick_hz())).transpose()?;
+    let (mut stage, observation_config, name) = open_stage(game, &args)?;
+    let pictures = observation_config
+        .is_image()
+        .then(|| Film::new(observation_config.image, args.scale, game.tick_hz()))
+        .transpose()?;
     let shots = take(&mut stage, &args)?;
     let numbers = || Numbers::new(game.observation().names, args.scale, &shots);
     let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
@@ -92,7 +95,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         let drawn = film.animated(&shots, || bar.inc(1));
         bar.finish_and_clear();
         drawn?
-    } else if sight.is_image() {
+    } else if observation_config.is_image() {
         film.still(&shots[0].image)?
     } else {
         film.captioned(&shots[0])?
@@ -108,10 +111,10 @@ fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig,
         let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
         let mode = reader.header().mode.clone();
         game.check_mode(&mode)?;
-        let sight = sight(game, args, None)?;
+        let observation_config = observation_config(game, args, None)?;
         let episode = episode(reader, path, args.episode_number)?;
-        let stage = Stage::replaying(game, &mode, &sight, episode)?;
-        return Ok((stage, sight, "recording".to_owned()));
+        let stage = Stage::replaying(game, &mode, &observation_config, episode)?;
+        return Ok((stage, observation_config, "recording".to_owned()));
     }
     let mode = args.mode.as_deref().or(game.modes().last().copied()).unwrap_or_default();
     game.check_mode(mode)?;
@@ -119,14 +122,18 @@ fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig,
         Some(chosen) => chosen,
         None => Chosen::usual(game)?,
     };
-    let sight = sight(game, args, Some(&chosen))?;
-    Ok((Stage::playing(game, mode, &sight, args.seed.into(), &chosen.player)?, sight, chosen.name))
+    let observation_config = observation_config(game, args, Some(&chosen))?;
+    Ok((
+        Stage::playing(game, mode, &observation_config, args.seed.into(), &chosen.player)?,
+        observation_config,
+        chosen.name,
+    ))
 }
 
 /// The pictures that are shown: those that the policy reads, or those that were asked for, or else those that the game
 /// has. Numbers for a game without any.
-fn sight(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
-    let own = chosen.map(|chosen| chosen.sight).filter(ObservationConfig::is_image);
+fn observation_config(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
+    let own = chosen.map(|chosen| chosen.observation_config).filter(ObservationConfig::is_image);
     let is_asked_for = !args.image.is_empty();
     let kind = if game.picture().is_some() || is_asked_for && !game.has_camera() {
         ObservationKind::Raster
@@ -135,21 +142,21 @@ fn sight(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<Observ
     } else {
         ObservationKind::Vector
     };
-    let mut sight = own.unwrap_or(ObservationConfig { kind, ..ObservationConfig::default() });
+    let mut observation_config = own.unwrap_or(ObservationConfig { kind, ..ObservationConfig::default() });
     if args.camera {
-        sight.kind = ObservationKind::Camera;
+        observation_config.kind = ObservationKind::Camera;
     }
-    options::set(&mut sight.image, &args.image)?;
-    sight.check(game)?;
+    options::set(&mut observation_config.image, &args.image)?;
+    observation_config.check(game)?;
     if let (Some(own), Some(Player::Policy { policy, .. })) = (own, chosen.map(|chosen| &chosen.player))
-        && sight.image != own.image
+        && observation_config.image != own.image
     {
         return Err(CliError::Usage(format!(
-            "the policy reads {own} ({}); it cannot play with {sight}: leave out --image",
+            "the policy reads {own} ({}); it cannot play with {observation_config}: leave out --image",
             policy.observation().describe()
         )));
     }
-    Ok(sight)
+    Ok(observation_config)
 }
 
 fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<bevy_playbot::demo::file::DemoEpisode, CliError> {
@@ -215,7 +222,7 @@ fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliE
             "level": stage.level(), "divergence": stage.divergence().map(ToString::to_string),
         }))?;
     } else {
-        let how = stage.end().map_or("still running", stage::end_in_words);
+        let how = stage.end().map_or("still running", stage::describe_end);
         tell!(
             "{path}: {width} × {height}, {} frames of level {} played by {}; after {} ticks: {how}",
             written.frames,

@@ -43,7 +43,7 @@ pub struct WindowSetup<'a> {
     /// Who takes over when the person presses Tab.
     pub partner: Option<Partner>,
     /// What the partner sees.
-    pub sight: ObservationConfig,
+    pub observation_config: ObservationConfig,
     /// Seed of the partner's draws.
     pub seed: u64,
     /// Whether somebody outside the window wants it closed; asked every frame.
@@ -65,7 +65,7 @@ impl GameWindow {
     ///
     /// No display, nothing that can draw, or a game whose ticks are no frames, without keys or a picture.
     pub fn open(setup: WindowSetup) -> Result<Self, WindowError> {
-        setup.sight.check(setup.game)?;
+        setup.observation_config.check(setup.game)?;
         match setup.game.placement() {
             TickPlacement::Fixed => Self::with_our_camera(setup),
             TickPlacement::Frame => Self::as_it_is(setup),
@@ -74,7 +74,7 @@ impl GameWindow {
 
     /// A game that is drawn for us.
     fn with_our_camera(setup: WindowSetup) -> Result<Self, WindowError> {
-        let WindowSetup { game, playlist, partner, sight, seed, stop } = setup;
+        let WindowSetup { game, playlist, partner, observation_config, seed, stop } = setup;
         let keys = game.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         let resolution = WindowResolution::new(SIDE, SIDE);
@@ -83,12 +83,12 @@ impl GameWindow {
         set_pace(&mut app, UpdateMode::reactive(FRAME), UpdateMode::reactive_low_power(FRAME));
         app.add_plugins((PlaybotPlugin::default(), KeyboardPlugin, TileLayerPlugin));
         set_fixed_step(&mut app, game.tick_hz());
-        add_game(game, &mut app, playlist.mode(), &sight, seed)?;
-        if !sight.is_image() {
+        add_game(game, &mut app, playlist.mode(), &observation_config, seed)?;
+        if !observation_config.is_image() {
             // Those who see pictures have brought it already.
             game.build_picture(&mut app);
         }
-        let agent = seat(&mut app, game, &sight, partner, playlist);
+        let agent = seat(&mut app, game, &observation_config, partner, playlist);
         app.world_mut().entity_mut(agent).insert(keys);
         camera::build(&mut app, picture.width);
         let has_space_view = game.has_space_view();
@@ -110,7 +110,7 @@ impl GameWindow {
 
     /// A game that draws itself, and whose ticks are frames: in a window like the one that it has headless.
     fn as_it_is(setup: WindowSetup) -> Result<Self, WindowError> {
-        let WindowSetup { game, playlist, partner, sight, seed, stop } = setup;
+        let WindowSetup { game, playlist, partner, observation_config, seed, stop } = setup;
         let window = Window {
             title: game.name().to_owned(),
             resolution: WindowResolution::new(1280, 720),
@@ -122,7 +122,7 @@ impl GameWindow {
         };
         let mut app = bevy_app(window, ImagePlugin::default())?;
         app.add_plugins(PlaybotPlugin { placement: TickPlacement::Frame });
-        add_game(game, &mut app, playlist.mode(), &sight, seed)?;
+        add_game(game, &mut app, playlist.mode(), &observation_config, seed)?;
         let hz = game.tick_hz();
         set_frame_rate(&mut app, hz);
         // Nothing but the clock starts a frame.
@@ -134,7 +134,7 @@ impl GameWindow {
             react_to_window_events: false,
         };
         set_pace(&mut app, by_the_clock, by_the_clock);
-        let agent = seat(&mut app, game, &sight, partner, playlist);
+        let agent = seat(&mut app, game, &observation_config, partner, playlist);
         let unrecorded = match game.key_bindings() {
             Some(keys) => {
                 app.world_mut().entity_mut(agent).insert((keys, PressesForPeople));
@@ -181,11 +181,11 @@ impl GameWindow {
 fn seat(
     app: &mut App,
     game: &dyn Game,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     partner: Option<Partner>,
     playlist: Playlist,
 ) -> Entity {
-    let agent = spawn_agents(game, app.world_mut(), sight, 0, 1)[0];
+    let agent = spawn_agents(game, app.world_mut(), observation_config, 0, 1)[0];
     let seats = Seats::new(game, app.world_mut(), agent, partner);
     app.world_mut().entity_mut(agent).insert((Control::Human, playlist.queue()));
     app.insert_resource(seats).insert_resource(playlist);

@@ -15,11 +15,11 @@ const REST: Duration = Duration::from_millis(700);
 
 pub(super) fn build(app: &mut App) {
     app.init_resource::<Pace>()
-        .init_resource::<OnlyDress>()
+        .init_resource::<OnlySync>()
         .add_observer(rest)
         .add_systems(First, keep_pace.before(TimeSystems))
         .add_systems(RunFixedMainLoop, show_tick.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop))
-        .configure_sets(ObserveSchedule, (VisionSystems::Look, VisionSystems::Compose).run_if(not(only_dressing)));
+        .configure_sets(ObserveSchedule, (VisionSystems::Render, VisionSystems::Compose).run_if(not(only_syncing)));
 }
 
 /// Whether game time stands still.
@@ -88,9 +88,9 @@ fn keep_pace(
 
 /// Set while the picture is brought up to date for people only.
 #[derive(Resource, Default)]
-struct OnlyDress(bool);
+struct OnlySync(bool);
 
-fn only_dressing(only: Res<OnlyDress>) -> bool {
+fn only_syncing(only: Res<OnlySync>) -> bool {
     only.0
 }
 
@@ -99,8 +99,8 @@ fn show_tick(world: &mut World, mut shown: Local<Tick>) {
     let tick = *world.resource::<Tick>();
     if tick != *shown {
         *shown = tick;
-        world.resource_mut::<OnlyDress>().0 = true;
+        world.resource_mut::<OnlySync>().0 = true;
         world.run_schedule(ObserveSchedule);
-        world.resource_mut::<OnlyDress>().0 = false;
+        world.resource_mut::<OnlySync>().0 = false;
     }
 }

@@ -22,7 +22,7 @@ pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
 /// sensor. Vectors that a recording keeps are used as they are.
 #[derive(Debug)]
 pub struct Demonstrations {
-    sight: ObservationConfig,
+    observation_config: ObservationConfig,
     episodes: Vec<Demonstration>,
 }
 
@@ -49,11 +49,11 @@ impl Demonstrations {
     /// for a game that cannot be seen this way.
     pub fn read(
         game: &dyn Game,
-        sight: &ObservationConfig,
+        observation_config: &ObservationConfig,
         path: &Path,
         held_out: Option<&LevelSplit>,
     ) -> Result<Self, VerifyError> {
-        sight.check(game)?;
+        observation_config.check(game)?;
         let names = game.observation().names;
         let mut episodes = Vec::new();
         let held_out = held_out.map(|split| HeldOut::new(game, split));
@@ -61,7 +61,7 @@ impl Demonstrations {
             let reader = DemoReader::open_for_game(&file, game.name(), game.version(), None)?;
             let header = reader.header().clone();
             game.check_mode(&header.mode).map_err(|source| VerifyError::Mode { path: file.clone(), source })?;
-            let is_seen = !sight.is_image() && header.observation_names == names;
+            let is_seen = !observation_config.is_image() && header.observation_names == names;
             let (shared, mode) = (Arc::<Path>::from(file.as_path()), Arc::<str>::from(header.mode.as_str()));
             for (index, episode) in reader.enumerate() {
                 let mut episode = episode?;
@@ -77,7 +77,7 @@ impl Demonstrations {
                 episodes.push(Demonstration { file, index, mode, episode, is_seen });
             }
         }
-        Ok(Self { sight: *sight, episodes })
+        Ok(Self { observation_config: *observation_config, episodes })
     }
 
     /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
@@ -112,7 +112,11 @@ impl Demonstrations {
 
     /// Memory that their pictures will take; 0 for vectors.
     pub fn picture_bytes(&self) -> u64 {
-        if self.sight.is_image() { self.steps() * self.sight.image.shape().numbers() as u64 } else { 0 }
+        if self.observation_config.is_image() {
+            self.steps() * self.observation_config.image.shape().numbers() as u64
+        } else {
+            0
+        }
     }
 
     /// Pairs each action with the observation that preceded it, in the order of the recordings, replaying what has to be
@@ -130,7 +134,7 @@ impl Demonstrations {
     ) -> Result<Dataset, VerifyError> {
         let (steps, bytes) = (self.steps(), self.picture_bytes());
         if bytes > MAX_PICTURE_BYTES {
-            return Err(VerifyError::TooLarge { steps, sight: self.sight, bytes });
+            return Err(VerifyError::TooLarge { steps, observation_config: self.observation_config, bytes });
         }
         let originals = self.originals();
         let mut watched = self.watch(game, threads, &originals, &progress)?;
@@ -149,7 +153,7 @@ impl Demonstrations {
             };
             episodes.push(LearnerEpisode { observations, actions: learner_actions(&demo.episode) });
         }
-        Ok(Dataset::new(self.sight.obs_kind(game), game.actions(), episodes)?)
+        Ok(Dataset::new(self.observation_config.obs_kind(game), game.actions(), episodes)?)
     }
 
     /// For each episode the index of the first one that is the same game from beginning to end.
@@ -178,10 +182,12 @@ impl Demonstrations {
                 by_mode.entry(&demo.mode).or_default().push((i, demo.episode.clone()));
             }
         }
-        let (mut all, kind) = (BTreeMap::new(), self.sight.obs_kind(game));
+        let (mut all, kind) = (BTreeMap::new(), self.observation_config.obs_kind(game));
         all.extend(self.nothing_to_see().map(|i| (i, Observations::empty(&kind))));
         for (mode, jobs) in by_mode {
-            for Watched { id, observations, divergence } in watch(game, &self.sight, mode, jobs, threads, progress)? {
+            for Watched { id, observations, divergence } in
+                watch(game, &self.observation_config, mode, jobs, threads, progress)?
+            {
                 if let Some(divergence) = divergence {
                     let Demonstration { file, index, .. } = &self.episodes[id];
                     return Err(VerifyError::Diverged { path: file.to_path_buf(), episode: *index, divergence });
@@ -221,7 +227,7 @@ mod tests {
             episode
         };
         let all = || Demonstrations {
-            sight: ObservationConfig::default(),
+            observation_config: ObservationConfig::default(),
             episodes: (0..80)
                 .map(|index| Demonstration {
                     file: Path::new("a.demo").into(),

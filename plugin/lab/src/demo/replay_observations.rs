@@ -37,7 +37,7 @@ pub(super) struct Watched {
 /// [`VerifyError`] if the game breaks its contract or cannot be seen this way.
 pub(super) fn watch(
     game: &dyn Game,
-    sight: &ObservationConfig,
+    observation_config: &ObservationConfig,
     mode: &str,
     jobs: Vec<Job>,
     threads: usize,
@@ -51,7 +51,7 @@ pub(super) fn watch(
     }
     let parts = on_threads(&mut shares, threads, |share| {
         let jobs = std::mem::take(share);
-        Onlookers::new(game, sight, mode, jobs.len().min(side_by_side))?.watch(jobs, progress)
+        Onlookers::new(game, observation_config, mode, jobs.len().min(side_by_side))?.watch(jobs, progress)
     });
     let mut all = Vec::new();
     for part in parts {
@@ -70,10 +70,15 @@ struct Onlookers {
 }
 
 impl Onlookers {
-    fn new(game: &dyn Game, sight: &ObservationConfig, mode: &str, count: usize) -> Result<Self, VerifyError> {
-        let (world, agents) = build_observing_world(game, mode, sight, 0, 0, count as u32)?;
+    fn new(
+        game: &dyn Game,
+        observation_config: &ObservationConfig,
+        mode: &str,
+        count: usize,
+    ) -> Result<Self, VerifyError> {
+        let (world, agents) = build_observing_world(game, mode, observation_config, 0, 0, count as u32)?;
         let watching = agents.iter().map(|_| None).collect();
-        Ok(Self { world, agents, watching, kind: sight.obs_kind(game) })
+        Ok(Self { world, agents, watching, kind: observation_config.obs_kind(game) })
     }
 
     fn watch(mut self, jobs: Vec<Job>, progress: &impl Fn(u64)) -> Result<Vec<Watched>, VerifyError> {

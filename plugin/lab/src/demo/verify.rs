@@ -78,7 +78,7 @@ pub enum VerifyError {
     Vision(#[from] VisionError),
     /// The pictures need more memory than anybody would expect.
     #[error(
-        "{steps} steps of {sight} need {:.1} GiB of memory, more than the {:.0} GiB that are allowed: learn from fewer \
+        "{steps} steps of {observation_config} need {:.1} GiB of memory, more than the {:.0} GiB that are allowed: learn from fewer \
          steps with `demo_steps`, or take smaller pictures, grey ones or a smaller stack (`image`)",
         gib(*.bytes), gib(MAX_PICTURE_BYTES)
     )]
@@ -86,7 +86,7 @@ pub enum VerifyError {
         /// Steps of the recordings.
         steps: u64,
         /// What is seen.
-        sight: ObservationConfig,
+        observation_config: ObservationConfig,
         /// Memory of the pictures.
         bytes: u64,
     },

@@ -178,7 +178,7 @@ impl Game for ForeignGame {
         self.description.demonstrator.as_ref().map(|(name, _)| *name)
     }
 
-    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         Renewal::carry_component::<ForeignBot>(world);
         world.entity_mut(agent).insert(ForeignBot { noise });
     }

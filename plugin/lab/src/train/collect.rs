@@ -57,14 +57,14 @@ impl Collector {
     pub fn new(
         game: &dyn Game,
         split: &LevelSplit,
-        sight: &ObservationConfig,
+        observation_config: &ObservationConfig,
         seed: u64,
         first: u32,
         count: u32,
         prior: Option<SkillPrior>,
     ) -> Result<Self, VisionError> {
-        let (mut world, agents) = build_observing_world(game, &split.mode, sight, seed, first, count)?;
-        let kind = sight.obs_kind(game);
+        let (mut world, agents) = build_observing_world(game, &split.mode, observation_config, seed, first, count)?;
+        let kind = observation_config.obs_kind(game);
         Renewal::set_up(&mut world, |world| {
             world.init_resource::<Finished>();
             world.add_observer(note_finished);
@@ -113,7 +113,7 @@ impl Collector {
             tick_world(world)?;
         }
         let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
-        peek(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
+        bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
         world.resource_mut::<Faults>().take()?;
         Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
     }
@@ -131,7 +131,7 @@ impl Collector {
 
 /// Adds the states in which the rollout stopped, with the skills that will be active there, and their values. Agents
 /// between two episodes have no such state; theirs is 0 and is never used, since their last row ended an episode.
-fn peek(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
+fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
     world.run_schedule(ObserveSchedule);
     if world.contains_resource::<SkillPrior>()
         && let Err(error) = world.run_system_cached(draw_skills)

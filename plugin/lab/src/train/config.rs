@@ -150,7 +150,7 @@ pub struct Variant {
 
 impl Experiment {
     /// What agents see.
-    pub fn sight(&self) -> ObservationConfig {
+    pub fn observation_config(&self) -> ObservationConfig {
         ObservationConfig { kind: self.observation, image: self.image }
     }
 

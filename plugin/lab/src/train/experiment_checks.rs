@@ -123,7 +123,7 @@ impl Experiment {
 
     /// Found out here, since the learner only says so once its skills are learned.
     fn check_normalisers(&self) -> Result<(), ExperimentError> {
-        if self.skills.norm_obs && self.sight().is_image() {
+        if self.skills.norm_obs && self.observation_config().is_image() {
             return refuse("skills.norm_obs", true, "is for vectors; the pixels of images are divided by 255 instead");
         }
         let (key, running) = match self.algorithm.is_sac() {

@@ -48,7 +48,8 @@ impl Learner {
             return Err(TrainError::NotTrained(algorithm));
         }
         let (seed, score) = (experiment.seed, experiment.score.clone());
-        let spec = PolicySpec { obs: experiment.sight().obs_kind(game), latent: 0, action_space: game.actions() };
+        let spec =
+            PolicySpec { obs: experiment.observation_config().obs_kind(game), latent: 0, action_space: game.actions() };
         let skills = if algorithm.needs_skills() { Some(fitting(game, experiment, skills)?) } else { None };
         let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
         if algorithm.is_sac() {
@@ -106,11 +107,14 @@ fn fitting<'a>(
     skills: Option<&'a SkillModel>,
 ) -> Result<&'a SkillModel, TrainError> {
     let skills = skills.ok_or(TrainError::NoSkills(experiment.algorithm))?;
-    let (model, sight) = (ObservationConfig::from_card(skills.picture(), &skills.observation())?, experiment.sight());
-    if model.is_image() != sight.is_image() || (sight.is_image() && model != sight) {
-        return Err(TrainError::SkillObservation { model, experiment: sight });
+    let (model, observation_config) =
+        (ObservationConfig::from_card(skills.picture(), &skills.observation())?, experiment.observation_config());
+    if model.is_image() != observation_config.is_image()
+        || (observation_config.is_image() && model != observation_config)
+    {
+        return Err(TrainError::SkillObservation { model, experiment: observation_config });
     }
-    let (observation, action_space) = (sight.obs_kind(game), game.actions());
+    let (observation, action_space) = (observation_config.obs_kind(game), game.actions());
     if (skills.observation(), skills.action_space()) != (observation, action_space) {
         return Err(TrainError::ForeignSkills {
             game: game.name().to_owned(),

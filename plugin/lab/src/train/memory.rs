@@ -21,8 +21,8 @@ impl Experiment {
     }
 
     fn check_memory_within(&self, game: &dyn Game, free: u64) -> Result<(), ExperimentError> {
-        let kind = self.sight().obs_kind(game);
-        let is_image = self.sight().is_image();
+        let kind = self.observation_config().obs_kind(game);
+        let is_image = self.observation_config().is_image();
         let observation = kind.numbers() as u64 * if is_image { 1 } else { 4 };
         let (arenas, steps) = (u64::from(self.arenas), self.rollout_steps() as u64);
         // The rollouts of several Worlds are joined into another one.

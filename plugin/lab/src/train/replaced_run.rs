@@ -75,14 +75,14 @@ fn names_in(folder: &Path) -> Result<Vec<OsString>, RunError> {
 /// [`RunError::NotARun`].
 pub fn check_replaceable(path: &Path) -> Result<(), RunError> {
     let is_known = path.join("run.json").is_file() || RunLock::is_known(path);
-    if (is_known && path.join("experiment.ron").is_file()) || is_unborn(path) {
+    if (is_known && path.join("experiment.ron").is_file()) || is_unstarted(path) {
         return Ok(());
     }
     Err(RunError::NotARun(path.into()))
 }
 
 /// Whether a folder holds at most what is written before `run.json`.
-pub fn is_unborn(path: &Path) -> bool {
+pub fn is_unstarted(path: &Path) -> bool {
     let first = |name: &str| {
         name == LOCK_FILE || ["experiment.ron", "run.json.tmp"].iter().any(|known| name.starts_with(known))
     };

@@ -37,7 +37,7 @@ use crate::game::Game;
 
 pub(super) use super::run_error::{damaged, io_error};
 pub use super::{
-    replaced_run::{check_replaceable, is_unborn},
+    replaced_run::{check_replaceable, is_unstarted},
     run_error::RunError,
 };
 

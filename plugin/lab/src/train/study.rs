@@ -78,7 +78,7 @@ impl StudyRun {
             // As it was before there was the key, so that studies find the files they have.
             settings = settings.replace(",norm_obs:false", "");
         }
-        if run.sight().is_image() {
+        if run.observation_config().is_image() {
             settings += &ron::to_string(&run.image)?;
         }
         if let Some(steps) = run.demo_steps {

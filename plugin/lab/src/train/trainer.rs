@@ -57,10 +57,10 @@ impl Trainer {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         let arrangement = Arrangement::new(game, experiment.arenas, experiment.worlds);
         let share = arrangement.arenas;
-        let (levels, sight, seed) = (&experiment.train, experiment.sight(), experiment.seed);
+        let (levels, observation_config, seed) = (&experiment.train, experiment.observation_config(), experiment.seed);
         let collectors: Result<_, _> = arrangement
             .first_agents()
-            .map(|first| Collector::new(game, levels, &sight, seed, first, share, prior.clone()))
+            .map(|first| Collector::new(game, levels, &observation_config, seed, first, share, prior.clone()))
             .collect();
         let (experiment, collectors) = (experiment.clone(), collectors?);
         Ok(Self { experiment, threads, learner, collectors, progress: Progress::default() })
@@ -164,6 +164,6 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     }
     experiment.check()?;
     experiment.check_levels(game)?;
-    experiment.sight().check(game)?;
+    experiment.observation_config().check(game)?;
     Ok(experiment.check_memory(game)?)
 }

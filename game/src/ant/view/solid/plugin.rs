@@ -21,7 +21,7 @@ impl Plugin for SolidViewPlugin {
                 (scenery::grounds, ants::build, ants::goals, ants::note_poses)
                     .chain()
                     .after(AntViewSystems::Draw)
-                    .in_set(VisionSystems::Dress),
+                    .in_set(VisionSystems::Sync),
             )
             .add_systems(Update, ants::glide);
     }

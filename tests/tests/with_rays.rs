@@ -8,8 +8,8 @@ use bevy_playbot::{
     vision::{ObservationConfig, ObservationKind},
 };
 use playbot_games::{
-    antmaze::{AntMaze, SightedAntMaze},
-    maze2d::{Maze2d, SightedMaze2d},
+    antmaze::{AntMaze, AntMazeWithRays},
+    maze2d::{Maze2d, Maze2dWithRays},
 };
 use playbot_lab::prelude::*;
 use playbot_lab::{
@@ -20,14 +20,14 @@ use playbot_lab::{
 /// Every game with eyes, the same without, a mode, and how long an episode may take there.
 fn games() -> [(Arc<dyn Game>, Arc<dyn Game>, &'static str, u64); 2] {
     [
-        (Arc::new(SightedMaze2d::default()), Arc::new(Maze2d::default()), "random+goal=random+limit=60", 60),
-        (Arc::new(SightedAntMaze::default()), Arc::new(AntMaze), "random+goals=random+random-start+limit=60", 60),
+        (Arc::new(Maze2dWithRays::default()), Arc::new(Maze2d::default()), "random+goal=random+limit=60", 60),
+        (Arc::new(AntMazeWithRays::default()), Arc::new(AntMaze), "random+goals=random+random-start+limit=60", 60),
     ]
 }
 
 /// Two agents that push at random.
-fn build(game: &dyn Game, mode: &str, sight: &ObservationConfig, first: u32) -> (World, Vec<Entity>) {
-    let (mut world, agents) = build_observing_world(game, mode, sight, 3, first, 2).expect("can be drawn");
+fn build(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, first: u32) -> (World, Vec<Entity>) {
+    let (mut world, agents) = build_observing_world(game, mode, observation_config, 3, first, 2).expect("can be drawn");
     for &agent in &agents {
         let levels = LevelQueue::Uniform { first: 0, last: 63 };
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, levels));
@@ -84,10 +84,10 @@ fn systems_are_in_one_order_with_pictures_and_without() {
     for (game, _, mode, limit) in games() {
         for kind in [ObservationKind::Vector, ObservationKind::Raster] {
             let mut app = test_app();
-            let sight = ObservationConfig { kind, ..ObservationConfig::default() };
-            add_game(&*game, &mut app, mode, &sight, 1).expect("can be drawn");
-            let agent = spawn_agents(&*game, app.world_mut(), &sight, 0, 1)[0];
-            game.arm_demonstrator(app.world_mut(), agent, 0.2);
+            let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
+            add_game(&*game, &mut app, mode, &observation_config, 1).expect("can be drawn");
+            let agent = spawn_agents(&*game, app.world_mut(), &observation_config, 0, 1)[0];
+            game.attach_demonstrator(app.world_mut(), agent, 0.2);
             app.world_mut().entity_mut(agent).insert(Control::Bot);
             app.play_episodes(2, 2 * limit + 10).expect("sound");
             let vector = &app.world().get::<Observation>(agent).expect("an agent").vector;
@@ -101,7 +101,7 @@ fn who_stands_at_the_goal_sees_no_way_left() {
     // Nobody but the demonstrator gets there: the way is the same that episodes are judged by.
     for (game, _, _, _) in games() {
         let (mut world, agents) = build_world(&*game, "umaze", 0, 0, 1);
-        game.arm_demonstrator(&mut world, agents[0], 0.0);
+        game.attach_demonstrator(&mut world, agents[0], 0.0);
         world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
         let at = game.observation().names.iter().position(|name| name == "goal x").expect("named");
         let mut left = f32::INFINITY;

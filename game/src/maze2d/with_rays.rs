@@ -10,20 +10,20 @@ use super::{
     game::Maze2d,
     play,
 };
-use crate::sighted::{GiveEyes, Sighted, add_sights};
+use crate::with_rays::{GiveEyes, WithRays, add_sights};
 
 /// How far a ball sees from its centre, in metres: four cells.
 pub const SIGHT: f64 = 4.0;
 
 /// Maze2D with eyes, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up the
 /// rows, against x.
-pub type SightedMaze2d = Sighted<Maze2d>;
+pub type Maze2dWithRays = WithRays<Maze2d>;
 
 impl GiveEyes for Maze2d {
     const SIGHTED: &'static str = "maze2d-sighted";
 
     fn build_eyes(&self, app: &mut App) {
-        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Dress));
+        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -55,7 +55,7 @@ mod tests {
 
     /// What a ball at rest in this place observes.
     fn seen(mode: &str, place: [f64; 2]) -> Vec<f32> {
-        let game = SightedMaze2d::default();
+        let game = Maze2dWithRays::default();
         let (mut world, agents) = build_world(&game, mode, 0, 0, 1);
         let still = Action(ActionValue::Continuous(vec![0.0; 2]));
         world.entity_mut(agents[0]).insert((Control::Human, still, LevelQueue::Always(0)));

@@ -48,9 +48,9 @@ pub trait GiveEyes: Game {
 
 /// A game with eyes: the inner one in everything but its name and what its agents observe.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sighted<G>(pub G);
+pub struct WithRays<G>(pub G);
 
-impl<G: GiveEyes> Game for Sighted<G> {
+impl<G: GiveEyes> Game for WithRays<G> {
     fn name(&self) -> &'static str {
         G::SIGHTED
     }
@@ -132,8 +132,8 @@ impl<G: GiveEyes> Game for Sighted<G> {
         self.0.demonstrator()
     }
 
-    fn arm_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
-        self.0.arm_demonstrator(world, agent, noise);
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        self.0.attach_demonstrator(world, agent, noise);
     }
 
     fn benchmarks(&self) -> Vec<Benchmark> {
@@ -157,7 +157,7 @@ impl<G: GiveEyes> Game for Sighted<G> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{antmaze::SightedAntMaze, maze2d::SightedMaze2d};
+    use crate::{antmaze::AntMazeWithRays, maze2d::Maze2dWithRays};
 
     #[test]
     fn ways_go_round_by_eighths_of_a_turn() {
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn names_are_told_apart_and_go_on_from_those_of_the_blind() {
-        let games: [(&dyn Game, usize); 2] = [(&SightedAntMaze::default(), 29), (&SightedMaze2d::default(), 4)];
+        let games: [(&dyn Game, usize); 2] = [(&AntMazeWithRays::default(), 29), (&Maze2dWithRays::default(), 4)];
         for (game, own) in games {
             let names = game.observation().names;
             assert_eq!((names.len(), names[own].as_str(), names[own + 2].as_str()), (own + 10, "goal x", "wall east"));

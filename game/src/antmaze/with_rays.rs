@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     ant::walls::Walls,
-    sighted::{GiveEyes, Sighted, add_sights},
+    with_rays::{GiveEyes, WithRays, add_sights},
 };
 
 /// How far an ant sees, in metres: two cells.
@@ -21,13 +21,13 @@ pub const SIGHT: f32 = 8.0;
 const EYES: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 
 /// AntMaze with eyes, under its name `antmaze-sighted`. East is x and north is y.
-pub type SightedAntMaze = Sighted<AntMaze>;
+pub type AntMazeWithRays = WithRays<AntMaze>;
 
 impl GiveEyes for AntMaze {
     const SIGHTED: &'static str = "antmaze-sighted";
 
     fn build_eyes(&self, app: &mut App) {
-        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Dress));
+        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn an_ant_at_the_start_of_medium_sees_its_room_and_the_way_to_the_goal() {
-        let game = SightedAntMaze::default();
+        let game = AntMazeWithRays::default();
         let (mut world, agents) = build_world(&game, "medium", 0, 0, 1);
         world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
         world.tick().expect("sound");
