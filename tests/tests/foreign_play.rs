@@ -103,13 +103,13 @@ fn states_and_loading_screens_pass_before_the_first_tick() {
             count = 0;
         }
     }
-    // Three fixed steps of 50 ms to lose, in frames of 16.7 ms. The fixed clock begins with the restart, eight frames before
-    // the first tick, so that the steps fall into ticks 1, 4 and 7, whatever the episode before has left in it.
-    assert_eq!(lengths, [7, 7, 7], "no ghosts, and no loading in an episode");
-    assert_eq!(world.resource::<Tick>().0, 22, "loading frames are no ticks; the last one has nobody to play");
+    // Three fixed steps of 50 ms to lose, in frames of 16.7 ms. The fixed clock begins with the frame in which the level is
+    // entered, one before the first tick, so that the steps fall into ticks 2, 5 and 8, whatever the episode before has left.
+    assert_eq!(lengths, [8, 8, 8], "no ghosts, and no loading in an episode");
+    assert_eq!(world.resource::<Tick>().0, 25, "loading frames are no ticks; the last one has nobody to play");
     assert_eq!(*world.resource::<State<Stage>>(), Stage::Over);
     let played = world.resource::<PlayedFrames>().0;
-    assert_eq!(played, 24, "seven ticks, and the frame in which the level is entered");
+    assert_eq!(played, 27, "eight ticks, and the frame in which the level is entered");
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn main() -> ExitCode {
         .hz(20.0)
         .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
         .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
-            [g.player.i, g.player.j, g.bonus.i, g.bonus.j, usize::from(g.bonus.entity.is_some())].map(|n| n as f32)
+            [g.player.i, g.player.j, g.bonus.i, g.bonus.j, g.bonus.entity.iter().len()].map(|n| n as f32 / 10.0)
         })
         .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
         .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
@@ -34,6 +34,7 @@ fn main() -> ExitCode {
 
 /// What the game's own setup leaves as it is: the timer, an old cake, and where the camera looks.
 fn refresh(level: Res<LevelSeed>, mut rng: ResMut<Random>, mut timer: ResMut<BonusSpawnTimer>, mut game: ResMut<Game>) {
-    (rng.0, game.bonus.entity, game.camera_is_focus) = (ChaCha8Rng::seed_from_u64(level.0), None, RESET_FOCUS.into());
+    rng.0 = ChaCha8Rng::seed_from_u64(level.0);
+    (game.bonus.i, game.bonus.j, game.bonus.entity, game.camera_is_focus) = (0, 0, None, RESET_FOCUS.into());
     timer.0.reset();
 }
