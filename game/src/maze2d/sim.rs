@@ -37,7 +37,7 @@ pub fn is_at_goal(position: Vec2d, goal: Vec2d) -> bool {
     length(sub(position, goal)) <= GOAL_RADIUS
 }
 
-/// A ball among walls: what [`trace`](crate::cli) and tests step, with the arithmetic of the game.
+/// A ball among walls: what `playbot trace` and tests step, with the arithmetic of the game.
 pub struct BallSim {
     /// The ball now.
     pub ball: Ball,

@@ -95,7 +95,7 @@ impl ForeignGame {
         self.with_input(|_| input)
     }
 
-    /// Actions that a system hands to the game: it finds the agent's [`Action`](crate::action::Action) and runs in every
+    /// Actions that a system hands to the game: it finds the agent's [`Action`](bevy_playbot::action::Action) and runs in every
     /// tick before the game, unless a person plays.
     pub fn actions<M: 'static>(
         self,
