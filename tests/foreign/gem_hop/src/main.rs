@@ -14,7 +14,7 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    let gem_hop = ForeignGame::new("gem_hop", 1, |app: &mut App| game::game(app.add_systems(PreStartup, choose)))
+    playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, start)
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe((0..29).map(|index| index.to_string()), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
@@ -26,13 +26,13 @@ fn main() -> ExitCode {
         .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
             let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
             2 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
-        });
-    playbot_cli::main(&[&gem_hop])
+        })])
 }
 
-/// Before the game loads its level: each episode has a World of its own, since rapier's order depends on what was before.
-fn choose(seed: Res<LevelSeed>, mut level: ResMut<Level>) {
-    level.0 = seed.0;
+/// The game loads the level of its episode. Each episode has a World of its own, since rapier's order depends on what was
+/// before.
+fn start(app: &mut App) {
+    game::game(app.add_systems(PreStartup, |seed: Res<LevelSeed>, mut level: ResMut<Level>| level.0 = seed.0));
 }
 
 /// The hero's place and motion, and the ground, spikes and gems of the next eight columns.
