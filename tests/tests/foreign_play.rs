@@ -3,14 +3,7 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    demo::{
-        file::{DemoHeader, DemoWriter},
-        recorder::demo_actions,
-    },
-    tick::Tick,
-    vision::ObservationConfig,
-};
+use bevy_playbot::{demo::file::DemoWriter, tick::Tick, vision::ObservationConfig};
 use playbot_lab::{
     demo::{dataset::Demonstrations, verify::verify_file},
     eval::{EvalPlan, Player, evaluate, summarize},
@@ -32,7 +25,7 @@ use playbot_tests::foreign::{
 
 /// Records the demonstrator for these levels.
 fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>, noise: f64) {
-    let header = DemoHeader::new(game.name(), 1, "default", game.tick_hz(), demo_actions(&game.actions()));
+    let header = game.demo_header("default");
     let (mut world, agents) = build_world(game, "default", 5, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
     game.attach_demonstrator(&mut world, agents[0], noise);

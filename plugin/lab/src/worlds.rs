@@ -3,7 +3,6 @@
 use bevy::prelude::*;
 use bevy_playbot::{
     agent::AgentLimit,
-    demo::{file::DemoHeader, recorder::demo_actions},
     fault::{Fault, Faults},
     headless::{headless_app, headless_frame_app, into_world, set_tick_rate},
     panics::{EpisodeTrace, PanicReports},
@@ -72,9 +71,7 @@ fn build_once(
         }
     };
     add_game(game, &mut app, mode, observation_config, seed)?;
-    let actions = demo_actions(&game.actions());
-    let header = DemoHeader::new(game.name(), game.version(), mode, game.tick_hz(), actions);
-    PanicReports::new(header, std::env::temp_dir()).add_to(&mut app);
+    PanicReports::new(game.demo_header(mode), std::env::temp_dir()).add_to(&mut app);
     let mut world = into_world(app);
     let agents = spawn_agents(game, &mut world, observation_config, first, count);
     for &agent in &agents {
