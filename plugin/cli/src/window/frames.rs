@@ -16,7 +16,7 @@ use playbot_lab::prelude::*;
 
 use super::{
     devices::{self, Devices},
-    ending, keys,
+    ending, gamepads, keys,
     own_keys::OwnKeys,
     pace::Pace,
     seats::Seats,
@@ -46,6 +46,7 @@ struct FrameRate(f64);
 /// Runs the game of an app, with `hz` frames a second, one in each frame of the window.
 pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
     devices::build(app);
+    gamepads::build(app);
     app.insert_resource(FrameRate(hz))
         .insert_resource(Devices::Open)
         .init_resource::<Pace>()

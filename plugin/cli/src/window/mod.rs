@@ -13,6 +13,7 @@ mod devices;
 mod ending;
 mod error;
 mod frames;
+mod gamepads;
 mod keys;
 mod own_keys;
 mod pace;

@@ -14,14 +14,15 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, start)
+    playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, game::game)
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe((0..29).map(|index| index.to_string()), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
         .end(|screen: Res<State<Screen>>| {
             matches!(**screen, Screen::Won | Screen::Lost).then(|| Terminated { success: *screen == Screen::Won })
         })
-        .restart(Restart::Rebuild)
+        .restart(Restart::Startup)
+        .level(choose)
         .ready(in_state(Screen::Playing))
         .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
             let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
@@ -29,10 +30,11 @@ fn main() -> ExitCode {
         })])
 }
 
-/// The game loads the level of its episode. Each episode has a World of its own, since rapier's order depends on what was
-/// before.
-fn start(app: &mut App) {
-    game::game(app.add_systems(PreStartup, |seed: Res<LevelSeed>, mut level: ResMut<Level>| level.0 = seed.0));
+/// The game loads the level of its episode. Its own start has made a new world for rapier, whose order would otherwise
+/// depend on what was before.
+fn choose(seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>) {
+    level.0 = seed.0;
+    next.set(Screen::Loading);
 }
 
 /// The hero's place and motion, and the ground, spikes and gems of the next eight columns.

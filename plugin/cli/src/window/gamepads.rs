@@ -1,0 +1,127 @@
+//! A person's gamepads, kept from the game while somebody else plays it.
+//!
+//! What they do arrives within a frame, after the window's messages, and each message names its gamepad: those of virtual
+//! input are let through.
+
+use bevy::{
+    input::{
+        InputSystems,
+        gamepad::{
+            Gamepad, GamepadInput, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
+            gamepad_connection_system, gamepad_event_processing_system,
+        },
+    },
+    prelude::*,
+};
+use bevy_playbot::virtual_input::VirtualGamepad;
+
+use super::devices::Devices;
+
+pub(super) fn build(app: &mut App) {
+    app.add_message::<RawGamepadEvent>()
+        .add_message::<RawGamepadButtonChangedEvent>()
+        .add_message::<RawGamepadAxisChangedEvent>()
+        .add_systems(
+            PreUpdate,
+            (let_go.run_if(resource_changed::<Devices>), keep_events, keep_buttons, keep_axes)
+                .in_set(InputSystems)
+                .before(gamepad_connection_system)
+                .before(gamepad_event_processing_system)
+                .run_if(resource_equals(Devices::Kept)),
+        );
+}
+
+/// Gamepads that have just been taken away lie at rest, whoever holds them.
+fn let_go(mut gamepads: Query<&mut Gamepad, Without<VirtualGamepad>>) {
+    for mut gamepad in &mut gamepads {
+        gamepad.digital_mut().release_all();
+        let moved: Vec<GamepadInput> = gamepad.get_analog_axes().copied().collect();
+        moved.into_iter().for_each(|input| gamepad.analog_mut().set(input, 0.0));
+    }
+}
+
+type Own<'w, 's> = Query<'w, 's, (), With<VirtualGamepad>>;
+
+fn keep_events(events: ResMut<Messages<RawGamepadEvent>>, own: Own) {
+    keep(events, |event| match event {
+        // That there is a gamepad is no secret.
+        RawGamepadEvent::Connection(_) => true,
+        RawGamepadEvent::Button(change) => own.contains(change.gamepad),
+        RawGamepadEvent::Axis(change) => own.contains(change.gamepad),
+    });
+}
+
+fn keep_buttons(events: ResMut<Messages<RawGamepadButtonChangedEvent>>, own: Own) {
+    keep(events, |change| own.contains(change.gamepad));
+}
+
+fn keep_axes(events: ResMut<Messages<RawGamepadAxisChangedEvent>>, own: Own) {
+    keep(events, |change| own.contains(change.gamepad));
+}
+
+/// Drops what is not let through. What came before this frame has been read.
+fn keep<M: Message + Clone>(mut events: ResMut<Messages<M>>, is_let_through: impl Fn(&M) -> bool) {
+    if events.iter_current_update_messages().all(&is_let_through) {
+        return;
+    }
+    let rest: Vec<M> = events.iter_current_update_messages().filter(|event| is_let_through(event)).cloned().collect();
+    events.clear();
+    events.write_batch(rest);
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::input::{
+        InputPlugin,
+        gamepad::{GamepadConnection, GamepadConnectionEvent},
+    };
+
+    use super::*;
+
+    fn press(world: &mut World, gamepad: Entity, value: f32) {
+        let south = RawGamepadButtonChangedEvent { gamepad, button: GamepadButton::South, value };
+        let stick = RawGamepadAxisChangedEvent { gamepad, axis: GamepadAxis::LeftStickX, value };
+        world.write_message(RawGamepadEvent::Button(south));
+        world.write_message(RawGamepadEvent::Axis(stick));
+        world.write_message(south);
+        world.write_message(stick);
+    }
+
+    fn plug_in(world: &mut World, pad: Entity) {
+        let connection = GamepadConnection::Connected { name: "pad".into(), vendor_id: None, product_id: None };
+        let event = GamepadConnectionEvent { gamepad: pad, connection };
+        world.write_message(event.clone());
+        world.write_message(RawGamepadEvent::Connection(event));
+    }
+
+    #[test]
+    fn a_persons_gamepad_rests_while_it_is_kept_and_virtual_ones_play() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Open);
+        build(&mut app);
+        let world = app.world_mut();
+        let real = world.spawn_empty().id();
+        let agent = world.spawn_empty().id();
+        let own = world.spawn(VirtualGamepad { agent }).id();
+        let held = |app: &App, pad: Entity| {
+            let pad = app.world().get::<Gamepad>(pad).expect("plugged in");
+            (pad.pressed(GamepadButton::South), pad.get(GamepadAxis::LeftStickX).unwrap_or(0.0))
+        };
+        [real, own].map(|pad| plug_in(app.world_mut(), pad));
+        app.update();
+
+        [real, own].map(|pad| press(app.world_mut(), pad, 1.0));
+        app.update();
+        assert_eq!((held(&app, real), held(&app, own)), ((true, 1.0), (true, 1.0)));
+
+        app.insert_resource(Devices::Kept);
+        [(real, 1.0), (own, 0.0)].map(|(pad, value)| press(app.world_mut(), pad, value));
+        app.update();
+        assert_eq!((held(&app, real), held(&app, own)), ((false, 0.0), (false, 0.0)), "let go of, and kept");
+
+        app.insert_resource(Devices::Open);
+        press(app.world_mut(), real, 1.0);
+        app.update();
+        assert_eq!(held(&app, real), (true, 1.0));
+    }
+}

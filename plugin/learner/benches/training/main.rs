@@ -1,0 +1,20 @@
+//! How long learning takes, at the sizes of the paper and of the experiments: one training step, and whole updates.
+//!
+//! `cargo bench -p playbot_learner`; a word after it runs only the cases whose names have it (`-- impala`). That the
+//! numbers are the same on any number of threads is for tests.
+
+mod data;
+mod steps;
+mod updates;
+
+criterion::criterion_group! {
+    name = steps;
+    config = data::measured(20);
+    targets = steps::skill, steps::mlp, steps::ppo, steps::images
+}
+criterion::criterion_group! {
+    name = updates;
+    config = data::measured(10);
+    targets = updates::skill_epoch, updates::vectors, updates::images
+}
+criterion::criterion_main!(steps, updates);

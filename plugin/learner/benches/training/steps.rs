@@ -1,0 +1,96 @@
+//! One training step: forward, backward and Adam.
+
+use burn::tensor::{Tensor, TensorData};
+use criterion::Criterion;
+use playbot_learner::{
+    ActionSpace, Actions, Dataset, DemoEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind,
+    nn::{ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, tracked},
+    policy::{Actor, Critic, NetShape},
+    ppo::{Minibatch, PpoBatch, PpoNets, gradient_step},
+};
+
+use crate::data::{CHOICES, DEVICE, IMAGE, choices, images as image_tensor, matrix, normals, pixels, rng, tiles};
+
+/// The paper's skill model on vectors of AntMaze's size: 4 layers of a bidirectional GRU 200, windows of 10, batches of 50.
+pub fn skill(criterion: &mut Criterion) {
+    let (obs_dim, action_dim, steps) = (29, 8, 2000);
+    let config = SkillConfig { encoder_hidden: 200, gru_hidden: 200, gru_layers: 4, ..SkillConfig::default() };
+    let mut rng = rng("skill");
+    let episodes = (0..20).map(|_| DemoEpisode {
+        observations: normals(steps * obs_dim, &mut rng).into(),
+        actions: Actions::Continuous { dim: action_dim, values: normals(steps * action_dim, &mut rng) },
+    });
+    let dataset = Dataset::new(obs_dim, ActionSpace::Continuous(action_dim), episodes.collect()).expect("fits");
+    let mut trainer = SkillTrainer::new(config, dataset, 1, DEVICE).expect("fits");
+    criterion.bench_function("step/skill", |bencher| bencher.iter(|| trainer.train_batch().expect("learns").loss));
+}
+
+/// A regression on 8 numbers through two hidden layers of 200.
+pub fn mlp(criterion: &mut Criterion) {
+    for batch in [64, 512] {
+        let mut rng = rng("mlp");
+        let mut net = tracked(&Mlp::new(37, &[200, 200], 8, Activation::Tanh, 1.0, &mut rng, &DEVICE.plain()));
+        let mut adam = Adam::new(AdamConfig::default());
+        let (x, target) = (matrix(batch, 37, &mut rng), matrix(batch, 8, &mut rng));
+        criterion.bench_function(&format!("step/mlp-37-200-200-8/{batch}"), |bencher| {
+            bencher.iter(|| {
+                let loss = (net.forward(x.clone()) - target.clone()).square().mean();
+                let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");
+                adam.step(&mut net, "", &grads, 3e-4, 1.0).expect("fits");
+            });
+        });
+    }
+}
+
+/// A minibatch of PPO with the actor and critic of CoinRun's experiments.
+pub fn ppo(criterion: &mut Criterion) {
+    let (obs_dim, rows) = (563, 2048);
+    let mut rng = rng("ppo");
+    let device = DEVICE.plain();
+    let shape = NetShape { obs_dim, latent: 0, hidden: vec![200, 200], activation: Activation::Relu };
+    let mut nets = tracked(&PpoNets {
+        actor: Actor::new(&shape, ActionSpace::Discrete(CHOICES), StdKind::Vector, &mut rng, &device),
+        critic: Critic::new(&shape, &mut rng, &device),
+    });
+    let inputs = TensorData::new(tiles(rows * obs_dim, &mut rng), [rows, obs_dim]);
+    let actions = Actions::Discrete(choices(rows, &mut rng));
+    let mut column = || Tensor::<1>::from_data(TensorData::new(normals(rows, &mut rng), [rows]), &device);
+    let batch = Minibatch {
+        inputs: Tensor::<2>::from_data(inputs, &device).into(),
+        ppo: PpoBatch {
+            actions: ActionBatch::new(&actions, &device),
+            old_log_probs: column() * 0.01 - (CHOICES as f32).ln(),
+            advantages: column(),
+            old_values: column(),
+            returns: column(),
+        },
+        teacher: None,
+    };
+    let (config, mut adam) = (PpoConfig::default(), Adam::new(AdamConfig::default()));
+    criterion.bench_function("step/ppo-563-200-200-15/2048", |bencher| {
+        bencher.iter(|| gradient_step(&mut nets, &mut adam, &batch, &config, None, 3e-4).expect("finite"));
+    });
+}
+
+/// Both image encoders, from bytes to features alone and as a step towards others.
+pub fn images(criterion: &mut Criterion) {
+    for (name, kind) in [("nature", CnnKind::Nature { feature: 512 }), ("impala", CnnKind::default())] {
+        for batch in [64, 256] {
+            let mut rng = rng("images");
+            let frozen = ImageNet::new(&kind, IMAGE, &mut rng, &DEVICE.plain()).expect("fits");
+            let bytes = pixels(batch, &mut rng);
+            criterion.bench_function(&format!("features/{name}/{batch}"), |bencher| {
+                bencher.iter(|| frozen.forward(image_tensor(bytes.clone())).sum().into_scalar::<f32>());
+            });
+            let (mut net, target) = (tracked(&frozen), matrix(batch, kind.features(), &mut rng));
+            let mut adam = Adam::new(AdamConfig::default());
+            criterion.bench_function(&format!("step/{name}/{batch}"), |bencher| {
+                bencher.iter(|| {
+                    let loss = (net.forward(image_tensor(bytes.clone())) - target.clone()).square().mean();
+                    let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");
+                    adam.step(&mut net, "", &grads, 3e-4, 1.0).expect("fits");
+                });
+            });
+        }
+    }
+}
