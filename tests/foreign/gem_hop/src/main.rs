@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use EpisodeEnd::Terminated;
 use KeyCode::{ArrowLeft, ArrowRight, Space};
+use Screen::{Loading, Lost, Playing, Won};
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Run, Screen};
 use playbot_lab::{
@@ -18,23 +19,18 @@ fn main() -> ExitCode {
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe((0..29).map(|index| index.to_string()), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
-        .end(|screen: Res<State<Screen>>| {
-            matches!(**screen, Screen::Won | Screen::Lost).then(|| Terminated { success: *screen == Screen::Won })
-        })
+        .end(|on: Res<State<Screen>>| matches!(**on, Won | Lost).then(|| Terminated { success: **on == Won }))
+        // With a new context for rapier, whose order would otherwise depend on what was before.
         .restart(Restart::Startup)
-        .level(choose)
-        .ready(in_state(Screen::Playing))
+        .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
+            level.0 = seed.0;
+            next.set(Loading);
+        })
+        .ready(in_state(Playing))
         .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
             let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
             2 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
         })])
-}
-
-/// The game loads the level of its episode. Its own start has made a new world for rapier, whose order would otherwise
-/// depend on what was before.
-fn choose(seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>) {
-    level.0 = seed.0;
-    next.set(Screen::Loading);
 }
 
 /// The hero's place and motion, and the ground, spikes and gems of the next eight columns.
