@@ -114,6 +114,8 @@ pub mod state_hash;
 pub mod streams;
 #[doc(hidden)]
 pub mod system_errors;
+#[doc(hidden)]
+pub mod system_order;
 pub mod systems;
 pub mod takeover;
 pub mod test_app;
