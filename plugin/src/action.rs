@@ -70,7 +70,7 @@ pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)
             continue;
         }
         if let Some(why) = misfit(&action.0, &agent.actions) {
-            faults.report(format!("agent {}, level {}, tick {}: {why}", agent.index, episode.level, episode.tick));
+            faults.report(format!("{}: {why}", episode.moment(agent)));
             *control = Control::Idle;
         }
     }

@@ -106,16 +106,15 @@ pub(crate) fn check_observations(
             continue;
         }
         let (expected, got) = (sensor.space.len(), observation.vector.len());
-        let at = || format!("agent {}, level {}, tick {}", agent.index, episode.level, episode.tick);
         if got != expected {
             faults.report(format!(
                 "{}: the observation has {got} values, its sensor names {expected}; fill every value each tick",
-                at()
+                episode.moment(agent)
             ));
         } else if let Some(bad) = first_non_finite(&observation.vector) {
             faults.report(format!(
                 "{}: observation `{}` is {}; the game must not produce it",
-                at(),
+                episode.moment(agent),
                 sensor.space.names[bad],
                 observation.vector[bad]
             ));

@@ -237,7 +237,7 @@ fn play_out(
     let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
     let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
     let mut trails = Vec::new();
-    while everybody.iter().any(|agent| world.get::<Control>(*agent).is_some_and(|control| control.is_active())) {
+    while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) {
         tick_world(world)?;
         let ended = std::mem::take(&mut world.resource_mut::<Results>().0);
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {

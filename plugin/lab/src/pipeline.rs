@@ -91,7 +91,7 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
     world.insert_resource(Recorder::new(DemoWriter::create(path, header)?));
     let queue = LevelQueue::list(levels.levels().collect::<Vec<_>>());
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+    while Control::of(&world, agents[0]).is_active() {
         world.tick()?;
     }
     Ok(world.resource::<Recorder>().episodes())
