@@ -38,7 +38,7 @@ impl Action {
 
 /// Gives every agent an action.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Action>().register_type::<Action>();
+    app.register_required_components::<Agent, Action>();
 }
 
 /// Why an action does not belong to its space, or `None` if it does.

@@ -188,12 +188,7 @@ pub struct EpisodeCount {
 
 /// Gives every agent an episode.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Episode>()
-        .register_required_components::<Agent, EpisodeCount>()
-        .register_type::<Episode>()
-        .register_type::<EpisodeCount>()
-        .register_type::<EpisodeEnd>()
-        .register_type::<EpisodeResult>();
+    app.register_required_components::<Agent, Episode>().register_required_components::<Agent, EpisodeCount>();
 }
 
 /// Starts an episode for every agent that waits for one and is not idle.

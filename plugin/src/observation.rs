@@ -83,9 +83,7 @@ impl Observation {
 
 /// Gives every agent an observation.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Observation>()
-        .register_type::<Observation>()
-        .register_type::<VectorSensor>();
+    app.register_required_components::<Agent, Observation>();
 }
 
 /// Empties a batch for observations of a kind, and keeps its memory where it can.
