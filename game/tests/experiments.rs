@@ -1,9 +1,9 @@
 //! The experiments that come with the program can be run: names, modes, levels and values fit.
 
-use std::{
-    path::{Path, PathBuf},
-    process::Command,
-};
+#[path = "shared/program.rs"]
+mod program;
+
+use std::path::{Path, PathBuf};
 
 use playbot_games::registry::GAMES;
 use playbot_lab::{
@@ -13,6 +13,7 @@ use playbot_lab::{
     split::LevelSplit,
     train::{Experiment, config_file::read_experiment, study::study_runs},
 };
+use program::done;
 use serde_json::Value;
 
 fn game(name: &str) -> &'static dyn Game {
@@ -158,18 +159,11 @@ fn demonstrations_are_made_of_the_game_that_is_learned_and_not_of_held_out_level
     }
 }
 
-/// Runs the program in a folder.
-fn playbot(folder: &Path, args: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("starts");
-    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
 #[test]
 fn those_who_see_are_recorded_imitated_trained_and_measured() {
     for (name, sees) in [("maze2d-random-hour", 14), ("antmaze-random-hour", 39)] {
         let folder = tempfile::tempdir().expect("a folder");
-        let run = |args: &[&str]| playbot(folder.path(), args);
+        let run = |args: &[&str]| done(folder.path(), args).0;
         let [game, levels, noise] = {
             let args = recorded(name).expect("says how");
             [args[0].clone(), value(&args, "--levels").to_owned(), value(&args, "--noise").to_owned()]
