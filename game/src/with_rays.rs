@@ -50,59 +50,46 @@ pub trait GiveEyes: Game {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithRays<G>(pub G);
 
+/// Methods of the inner game that are this game's too.
+macro_rules! as_without_rays {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
+        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
+            self.0.$name($($argument),*)
+        })*
+    };
+}
+
 impl<G: GiveEyes> Game for WithRays<G> {
+    as_without_rays! {
+        fn version() -> u32;
+        fn modes() -> &'static [&'static str];
+        fn check_mode(mode: &str) -> Result<(), ModeError>;
+        fn family(mode: &str) -> String;
+        fn fingerprint(mode: &str, level: u64) -> Option<u64>;
+        fn tick_hz() -> f64;
+        fn actions() -> ActionSpace;
+        fn action_names() -> Vec<String>;
+        fn key_bindings() -> Option<KeyBindings>;
+        fn picture() -> Option<Picture>;
+        fn build_picture(app: &mut App);
+        fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
+        fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
+        fn blind_bots() -> Vec<(&'static str, BlindBot)>;
+        fn demonstrator() -> Option<&'static str>;
+        fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);
+        fn show_level(request: &LevelRequest) -> Result<LevelView, InspectError>;
+        fn has_space_view() -> bool;
+        fn build_space_view(app: &mut App);
+    }
+
     fn name(&self) -> &'static str {
         G::SIGHTED
-    }
-
-    fn version(&self) -> u32 {
-        self.0.version()
-    }
-
-    fn modes(&self) -> &'static [&'static str] {
-        self.0.modes()
-    }
-
-    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
-        self.0.check_mode(mode)
-    }
-
-    fn family(&self, mode: &str) -> String {
-        self.0.family(mode)
-    }
-
-    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
-        self.0.fingerprint(mode, level)
-    }
-
-    fn tick_hz(&self) -> f64 {
-        self.0.tick_hz()
-    }
-
-    fn actions(&self) -> ActionSpace {
-        self.0.actions()
-    }
-
-    fn action_names(&self) -> Vec<String> {
-        self.0.action_names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        self.0.key_bindings()
     }
 
     fn observation(&self) -> ObservationSpace {
         let goal = ["goal x", "goal y"].map(str::to_owned);
         let walls = WAYS.map(|(way, _)| format!("wall {way}"));
         ObservationSpace { names: self.0.observation().names.into_iter().chain(goal).chain(walls).collect() }
-    }
-
-    fn picture(&self) -> Option<Picture> {
-        self.0.picture()
-    }
-
-    fn build_picture(&self, app: &mut App) {
-        self.0.build_picture(app);
     }
 
     fn build(&self, app: &mut App, mode: &str) {
@@ -116,41 +103,9 @@ impl<G: GiveEyes> Game for WithRays<G> {
         agent
     }
 
-    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        self.0.floor_plan(mode, level)
-    }
-
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        self.0.whereabouts(world, agent)
-    }
-
-    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
-        self.0.blind_bots()
-    }
-
-    fn demonstrator(&self) -> Option<&'static str> {
-        self.0.demonstrator()
-    }
-
-    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
-        self.0.attach_demonstrator(world, agent, noise);
-    }
-
     fn benchmarks(&self) -> Vec<Benchmark> {
         // Measured beside the game that sees less.
         Vec::new()
-    }
-
-    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        self.0.show_level(request)
-    }
-
-    fn has_space_view(&self) -> bool {
-        self.0.has_space_view()
-    }
-
-    fn build_space_view(&self, app: &mut App) {
-        self.0.build_space_view(app);
     }
 }
 

@@ -106,7 +106,6 @@ pub mod policy;
 pub mod policy_file;
 pub mod prelude;
 pub mod raster;
-mod reflect;
 pub mod renewal;
 pub mod reward;
 pub mod skill_prior;

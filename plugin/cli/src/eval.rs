@@ -96,7 +96,6 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let experiment = read_experiment(&args, games)?;
     let game = games.get(&experiment.game)?;
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
-    let episodes = experiment.eval.episodes_per_level;
     if args.levels.is_empty() {
         let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
         experiment.check_test(game).map_err(or_levels)?;
@@ -107,10 +106,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut rows = Vec::new();
     for split in &splits {
         for Chosen { name, player, observation_config } in &players {
-            let plan = EvalPlan {
-                observation_config: *observation_config,
-                ..methods::plan(&experiment, split, episodes, args.threads)
-            };
+            let plan =
+                EvalPlan { observation_config: *observation_config, ..EvalPlan::of(&experiment, split, args.threads) };
             let measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = methods::follow(game, name, player, &plan)?;

@@ -167,7 +167,7 @@ impl Looker {
     /// Plays a tick and returns the picture that it began with; `None` when all levels have been played.
     fn tick(&mut self) -> Result<Option<Seen>, CliError> {
         tick_world(&mut self.world)?;
-        if !self.world.get::<Control>(self.agent).is_some_and(|control| control.is_active()) {
+        if !Control::of(&self.world, self.agent).is_active() {
             return Ok(None);
         }
         let episode = self.world.get::<Episode>(self.agent).expect("required by Agent");

@@ -148,11 +148,8 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 /// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_actions(game.actions())?;
+    let demos = Demonstrations::of(game, experiment, path)?;
     let observation_config = experiment.observation_config();
-    let mut demos = Demonstrations::read(game, &observation_config, path, Some(&experiment.test))?;
-    if let Some(steps) = experiment.demo_steps {
-        demos = demos.at_most(steps);
-    }
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
     begin_to_tell!(
         "{} in {} from {}",

@@ -82,12 +82,8 @@ impl Chosen {
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
         let file = PolicyFile::load(path, device)?;
         check_policy(&game.card(), &file)?;
-        let (prior, observation_config) = (file.skills.as_ref().map(SkillPrior::from), policy_observation(&file)?);
-        Ok(Self {
-            name: file.card.algorithm,
-            player: Player::Policy { policy: file.policy, prior, draw },
-            observation_config,
-        })
+        let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
+        Ok(Self { name: file.card.algorithm, player, observation_config })
     }
 
     /// What a run has learned, under the name of its algorithm.

@@ -10,7 +10,7 @@ use std::{
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::games::Games;
 use playbot_lab::{
-    eval::Player,
+    eval::{EvalPlan, Player},
     game::Game,
     parallel::default_threads,
     report::to_text_table,
@@ -120,7 +120,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let mut rows = Vec::new();
     for (name, player) in &players {
-        let plan = methods::plan(&experiment, &experiment.test, experiment.eval.episodes_per_level, args.threads);
+        let plan = EvalPlan::of(&experiment, &experiment.test, args.threads);
         let measured = methods::measure(game, name, player, &plan)?;
         if args.json {
             methods::print_json(&measured.summary)?;

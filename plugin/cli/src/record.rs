@@ -181,7 +181,7 @@ fn play(
         let recorder = world.resource::<Recorder>();
         let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
         bar.set_position(done);
-        let idle = !world.get::<Control>(agent).is_some_and(|control| control.is_active());
+        let idle = !Control::of(world, agent).is_active();
         if idle || steps.is_some_and(|steps| done >= steps) {
             break true;
         }

@@ -51,7 +51,6 @@ impl Plugin for TakeoverPlugin {
         };
         app.insert_resource(self.game.clone())
             .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
-            .register_type::<GameIdentity>()
             .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems))
             .add_systems(Last, finish.after(PlaybotSystems::Reset).run_if(on_message::<AppExit>));
     }

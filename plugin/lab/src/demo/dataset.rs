@@ -9,7 +9,7 @@ use super::{
     verify::VerifyError,
 };
 use crate::sensors::GameSensors;
-use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
+use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment};
 use bevy_playbot::demo::file::{DemoEpisode, DemoReader, EpisodeActions, find_demos};
 use bevy_playbot::vision::ObservationConfig;
 
@@ -78,6 +78,20 @@ impl Demonstrations {
             }
         }
         Ok(Self { observation_config: *observation_config, episodes })
+    }
+
+    /// What an experiment learns skills from, of all recordings below a path: none of its held-out levels, and no more
+    /// steps than it asks for.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read).
+    pub fn of(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Self, VerifyError> {
+        let demos = Self::read(game, &experiment.observation_config(), path, Some(&experiment.test))?;
+        Ok(match experiment.demo_steps {
+            Some(steps) => demos.at_most(steps),
+            None => demos,
+        })
     }
 
     /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
