@@ -1,4 +1,25 @@
 //! What an agent does in this tick.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! /// The game's own system: choice 1 is to jump.
+//! fn jump(mut agents: Query<(&Action, &mut Transform)>) {
+//!     for (action, mut body) in &mut agents {
+//!         if action.discrete() == Some(1) {
+//!             body.translation.y += 2.0;
+//!         }
+//!     }
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_systems(FixedUpdate, jump);
+//! let agent = (Agent::new(0, ActionSpace::Discrete(2)), Control::Human, Action(ActionValue::Discrete(1)));
+//! let agent = app.world_mut().spawn((agent, Transform::default())).id();
+//! app.tick().expect("there is a choice 1");
+//! assert_eq!(app.world().get::<Transform>(agent).expect("spawned with it").translation.y, 2.0);
+//! ```
 
 use bevy::prelude::*;
 pub use playbot_learner::{Action as ActionValue, ActionSpace};

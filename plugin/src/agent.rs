@@ -1,4 +1,17 @@
 //! The agent: whoever acts in the game, be it a person, a script or a policy.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{agent::AgentOrder, prelude::*};
+//!
+//! let mut app = headless_app();
+//! let second = app.world_mut().spawn(Agent::new(1, ActionSpace::Continuous(2))).id();
+//! let first = app.world_mut().spawn(Agent::new(0, ActionSpace::Continuous(2))).id();
+//! app.tick().expect("each has a number of its own");
+//! assert_eq!(app.world().resource::<AgentOrder>().entities(), [first, second]);
+//! // What is kept of every agent came along, and nobody plays yet.
+//! assert_eq!(app.world().get::<Control>(first), Some(&Control::Idle));
+//! ```
 
 use bevy::prelude::*;
 use playbot_learner::ActionSpace;

@@ -1,4 +1,21 @@
 //! Bots that do not look: the baselines that any learner has to beat.
+//!
+//! ```
+//! use std::collections::BTreeSet;
+//!
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! let mut app = headless_app();
+//! let agent = (Agent::new(0, ActionSpace::Discrete(4)), Control::Bot, BlindBot::Uniform);
+//! let agent = app.world_mut().spawn(agent).id();
+//! let mut seen = BTreeSet::new();
+//! for _ in 0..100 {
+//!     app.tick().expect("no agent broke its contract");
+//!     seen.extend(app.world().get::<Action>(agent).and_then(Action::discrete));
+//! }
+//! assert_eq!(seen, BTreeSet::from([0, 1, 2, 3]));
+//! ```
 
 use bevy::prelude::*;
 use playbot_learner::{Action as ActionValue, ActionSpace};

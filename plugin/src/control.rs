@@ -1,4 +1,18 @@
 //! Who decides for an agent.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! let mut app = headless_app();
+//! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human)).id();
+//! app.ticks(3).expect("no agent broke its contract");
+//! // A script goes on in the middle of the episode.
+//! app.world_mut().entity_mut(agent).insert((Control::Bot, BlindBot::Constant(ActionValue::Discrete(1))));
+//! app.ticks(2).expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Action>(agent), Some(&Action(ActionValue::Discrete(1))));
+//! assert_eq!(app.world().get::<Episode>(agent).expect("every agent has one").tick, 5);
+//! ```
 
 use bevy::prelude::*;
 

@@ -1,4 +1,26 @@
 //! Episodes: their start, their end and what they brought.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{episode::EpisodeResult, prelude::*};
+//!
+//! #[derive(Resource, Default)]
+//! struct Results(Vec<EpisodeResult>);
+//!
+//! let mut app = headless_app();
+//! app.init_resource::<Results>()
+//!     // The game: time is up after three ticks.
+//!     .add_systems(FixedUpdate, |mut episodes: Query<&mut Episode>| {
+//!         episodes.iter_mut().filter(|episode| episode.tick == 2).for_each(|mut episode| episode.truncate());
+//!     })
+//!     .add_observer(|event: On<EpisodeEnded>, mut results: ResMut<Results>| results.0.push(event.result));
+//! let levels = LevelQueue::list([7, 8]);
+//! app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, levels));
+//! app.ticks(6).expect("no agent broke its contract");
+//! let results = &app.world().resource::<Results>().0;
+//! assert!(results.iter().all(|result| result.end == EpisodeEnd::Truncated && result.ticks == 3));
+//! assert_eq!(results.iter().map(|result| result.level).collect::<Vec<_>>(), [7, 8]);
+//! ```
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};

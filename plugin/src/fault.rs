@@ -81,3 +81,88 @@ pub(crate) fn announce_faults(mut faults: ResMut<Faults>, mut commands: Commands
         commands.trigger(FaultOccurred { fault: Fault(what) });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        fmt::{Debug, Write},
+        sync::{Arc, Mutex, PoisonError},
+    };
+
+    use tracing::{
+        Event as LogEvent, Level, Metadata, Subscriber,
+        field::{Field, Visit},
+        span,
+    };
+
+    use super::*;
+
+    /// Errors as text, as they were logged.
+    #[derive(Clone, Default)]
+    struct Log(Arc<Mutex<Vec<String>>>);
+
+    impl Log {
+        fn lines(&self) -> Vec<String> {
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        }
+    }
+
+    struct Message(String);
+
+    impl Visit for Message {
+        fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
+            if field.name() == "message" {
+                write!(self.0, "{value:?}").expect("text takes everything");
+            }
+        }
+    }
+
+    impl Subscriber for Log {
+        fn enabled(&self, metadata: &Metadata) -> bool {
+            *metadata.level() == Level::ERROR
+        }
+
+        fn event(&self, event: &LogEvent) {
+            let mut message = Message(String::new());
+            event.record(&mut message);
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).push(message.0);
+        }
+
+        fn new_span(&self, _: &span::Attributes) -> span::Id {
+            span::Id::from_u64(1)
+        }
+
+        fn record(&self, _: &span::Id, _: &span::Record) {}
+
+        fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
+
+        fn enter(&self, _: &span::Id) {}
+
+        fn exit(&self, _: &span::Id) {}
+    }
+
+    #[derive(Resource, Default)]
+    struct Heard(Vec<String>);
+
+    #[test]
+    fn a_fault_that_nobody_takes_is_logged_as_an_error_beside_its_event() {
+        let mut world = World::new();
+        world.init_resource::<Faults>();
+        world.init_resource::<Heard>();
+        world.add_observer(|event: On<FaultOccurred>, mut heard: ResMut<Heard>| heard.0.push(event.fault.to_string()));
+        let mut last = Schedule::default();
+        last.add_systems(announce_faults);
+        let log = Log::default();
+        let mut report = |world: &mut World, has_caller: bool, what: &str| {
+            let mut faults = world.resource_mut::<Faults>();
+            faults.set_caller(has_caller);
+            faults.report(what.to_owned());
+            tracing::subscriber::with_default(log.clone(), || last.run(world));
+        };
+        report(&mut world, false, "agent 0: something is wrong");
+        assert_eq!(log.lines(), ["agent 0: something is wrong"]);
+        assert_eq!(world.resource::<Heard>().0, log.lines());
+        report(&mut world, true, "agent 0: somebody else is told");
+        assert_eq!(log.lines().len(), 1, "whoever ticks the World gets this one");
+    }
+}

@@ -1,4 +1,20 @@
 //! Running a game without a window: as fast as it goes, one fixed tick at a time, never by the clock.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{headless::set_tick_rate, prelude::*};
+//!
+//! #[derive(Resource, Default)]
+//! struct Metres(f32);
+//!
+//! let mut app = headless_app();
+//! set_tick_rate(&mut app, 50.0);
+//! app.init_resource::<Metres>()
+//!     .add_systems(FixedUpdate, |time: Res<Time>, mut way: ResMut<Metres>| way.0 += 10.0 * time.delta_secs());
+//! // A second of game time, in no time.
+//! app.ticks(50).expect("no agent broke its contract");
+//! assert!((app.world().resource::<Metres>().0 - 10.0).abs() < 1e-3);
+//! ```
 
 use std::time::Duration;
 
@@ -122,7 +138,7 @@ fn run_frames(world: &mut World) -> Result<(), Fault> {
     for frame in 1.. {
         world.run_schedule(Main);
         world.clear_trackers();
-        if let Some(failure) = system_errors::take(world) {
+        if let Some(failure) = system_errors::take() {
             world.resource_mut::<Faults>().report(failure);
         }
         world.resource_mut::<Faults>().take()?;

@@ -1,4 +1,20 @@
 //! Bevy without a screen.
+//!
+//! ```
+//! use bevy::{prelude::*, window::PrimaryWindow};
+//! use bevy_playbot::{headless_plugins::HeadlessPlugins, prelude::*};
+//!
+//! let mut app = App::new();
+//! app.add_plugins((HeadlessPlugins::default(), PlaybotPlugin { placement: TickPlacement::Frame }));
+//! app.finish();
+//! app.cleanup();
+//! app.tick().expect("no agent broke its contract");
+//! // What games ask for is there.
+//! let mut windows = app.world_mut().query_filtered::<&Window, With<PrimaryWindow>>();
+//! assert_eq!(windows.single(app.world()).expect("one window").width(), 1280.0);
+//! assert!(app.world().contains_resource::<ButtonInput<KeyCode>>());
+//! assert!(app.world().contains_resource::<Assets<Image>>());
+//! ```
 
 use bevy::{
     app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},

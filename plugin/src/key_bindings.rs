@@ -1,4 +1,16 @@
 //! Which keys a person plays with, and which action they mean.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! let steer = KeyAxis::new([KeyCode::ArrowLeft], [KeyCode::ArrowRight]);
+//! let gas = KeyAxis::new([], [KeyCode::Space]);
+//! let drive = |axes: &[i8]| ActionValue::Continuous(axes.iter().map(|&value| f32::from(value)).collect());
+//! let keys = KeyBindings::new([steer, gas], drive, "arrows steer, space is the throttle");
+//! let held = [KeyCode::ArrowLeft, KeyCode::Space];
+//! assert_eq!(keys.action(|key| held.contains(&key)), ActionValue::Continuous(vec![-1.0, 1.0]));
+//! ```
 
 use std::{borrow::Cow, fmt, sync::Arc};
 

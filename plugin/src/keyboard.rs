@@ -1,4 +1,20 @@
 //! People at the keyboard.
+//!
+//! ```
+//! use bevy::{input::InputPlugin, prelude::*};
+//! use bevy_playbot::{keyboard::KeyboardPlugin, prelude::*};
+//!
+//! let mut app = headless_app();
+//! app.add_plugins((InputPlugin, KeyboardPlugin));
+//! // Action 0 is nobody's key, action 1 the space bar.
+//! let keys = KeyBindings::of_sets(&[vec![], vec![KeyCode::Space]]);
+//! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, keys)).id();
+//! app.tick().expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Action>(agent), Some(&Action(ActionValue::Discrete(0))));
+//! app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(KeyCode::Space);
+//! app.tick().expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Action>(agent), Some(&Action(ActionValue::Discrete(1))));
+//! ```
 
 use bevy::{input::InputSystems, prelude::*};
 
@@ -47,7 +63,7 @@ impl Plugin for KeyboardPlugin {
     }
 }
 
-fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
+pub(crate) fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
     // Nothing asks for the order of these.
     tapped.0.extend(keys.get_just_pressed());
 }

@@ -1,4 +1,29 @@
 //! Which level an agent plays next.
+//!
+//! ```
+//! use bevy_playbot::{prelude::*, streams::AgentStreams};
+//!
+//! /// A rule of the game: every second level.
+//! #[derive(Clone, Debug)]
+//! struct Even(u64);
+//!
+//! impl LevelSource for Even {
+//!     fn next_level(&mut self) -> Option<u64> {
+//!         self.0 += 2;
+//!         Some(self.0)
+//!     }
+//!
+//!     fn clone_box(&self) -> Box<dyn LevelSource> {
+//!         Box::new(self.clone())
+//!     }
+//! }
+//!
+//! let mut random = AgentStreams::new(1, 0).level;
+//! let mut three_of = |mut queue: LevelQueue| [0; 3].map(|_| queue.next_level(&mut random));
+//! assert_eq!(three_of(LevelQueue::list([3, 5])), [Some(3), Some(5), None]);
+//! assert_eq!(three_of(LevelQueue::rounds([3, 5])), [Some(3), Some(5), Some(3)]);
+//! assert_eq!(three_of(LevelQueue::Custom(Box::new(Even(0)))), [Some(2), Some(4), Some(6)]);
+//! ```
 
 use std::sync::Arc;
 

@@ -1,4 +1,25 @@
 //! What an agent sees.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! /// The game's own system: numbers of about the size of 1, as policies like them.
+//! fn see(mut agents: Query<(&Transform, &mut Observation)>) {
+//!     for (body, mut seen) in &mut agents {
+//!         seen.set([body.translation.x / 8.0, body.translation.y / 8.0]);
+//!     }
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_systems(ObserveSchedule, see);
+//! let agent = (Agent::new(0, ActionSpace::Discrete(2)), VectorSensor::new(["x", "y"]), Control::Human);
+//! let agent = app.world_mut().spawn((agent, Transform::from_xyz(4.0, 2.0, 0.0))).id();
+//! app.tick().expect("two names and two numbers");
+//! assert_eq!(app.world().get::<Observation>(agent).expect("every agent has one").vector, [0.5, 0.25]);
+//! app.world_mut().entity_mut(agent).insert(VectorSensor::new(["x", "y", "speed"]));
+//! assert!(app.tick().is_err(), "nobody fills in the speed");
+//! ```
 
 use std::sync::Arc;
 

@@ -52,8 +52,8 @@ impl PanicReports {
     pub fn add_to(self, app: &mut App) {
         let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
         app.insert_resource(self)
-            .add_systems(decide, note_actions.in_set(PlaybotSystems::Act).after(check_actions).ambiguous_with_all())
-            .add_systems(judge, note_outcomes.in_set(PlaybotSystems::Record).ambiguous_with_all());
+            .add_systems(decide, note_actions.in_set(PlaybotSystems::Act).after(check_actions))
+            .add_systems(judge, note_outcomes.in_set(PlaybotSystems::Record));
     }
 
     /// Writes elsewhere from now on.
@@ -62,7 +62,8 @@ impl PanicReports {
     }
 }
 
-fn note_actions(mut agents: Query<(&Agent, &Control, &Episode, &Action, &mut EpisodeTrace)>) {
+/// Keeps the action of this tick. Whatever hands it on to the game runs after this, because it may panic.
+pub fn note_actions(mut agents: Query<(&Agent, &Control, &Episode, &Action, &mut EpisodeTrace)>) {
     for (agent, control, episode, action, mut trace) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;
@@ -184,7 +185,9 @@ fn keep(
 ) -> Result<Option<PathBuf>, crate::demo::file::DemoFileError> {
     let (Some(reports), Some(first)) = (world.get_resource::<PanicReports>(), at.first()) else { return Ok(None) };
     let place = first.replace(", ", "-").replace(' ', "");
-    let path = reports.folder.join(format!("panic-{}-{place}.demo", reports.header.game));
+    // The folder may be everybody's, and two programs may well panic at the same place.
+    let name = format!("panic-{}-{place}-{}.demo", reports.header.game, std::process::id());
+    let path = reports.folder.join(name);
     let note = "kept when the game panicked in its last tick".to_owned();
     let mut writer = DemoWriter::replace(&path, DemoHeader { note, ..reports.header.clone() })?;
     episodes.iter().try_for_each(|episode| writer.push(episode))?;

@@ -1,4 +1,28 @@
 //! Where in a frame a tick lies, and in which frames there is one.
+//!
+//! ```
+//! use bevy::{prelude::*, time::TimePlugin};
+//! use bevy_playbot::{headless::set_tick_rate, placement::TickSchedules, prelude::*};
+//!
+//! #[derive(Resource, Default)]
+//! struct Judged(u32);
+//!
+//! /// For games of either placement: the app knows where its ticks end.
+//! fn count_ticks(app: &mut App) {
+//!     let judge = TickSchedules::of(app).judge;
+//!     app.init_resource::<Judged>()
+//!         .add_systems(judge, (|mut judged: ResMut<Judged>| judged.0 += 1).in_set(PlaybotSystems::Judge));
+//! }
+//!
+//! for placement in [TickPlacement::Fixed, TickPlacement::Frame] {
+//!     let mut app = App::new();
+//!     app.add_plugins((TimePlugin, PlaybotPlugin { placement }));
+//!     set_tick_rate(&mut app, 60.0);
+//!     count_ticks(&mut app);
+//!     app.ticks(5).expect("no agent broke its contract");
+//!     assert_eq!(app.world().resource::<Judged>().0, 5);
+//! }
+//! ```
 
 use bevy::{
     ecs::schedule::{InternedScheduleLabel, ScheduleLabel},

@@ -1,4 +1,16 @@
 //! The plugin itself: resources and the order of its systems.
+//!
+//! ```
+//! use bevy::{prelude::*, time::TimePlugin};
+//! use bevy_playbot::{prelude::*, tick::Tick};
+//!
+//! let mut app = App::new();
+//! // A game with a window adds `DefaultPlugins`, which bring the time along.
+//! app.add_plugins((TimePlugin, PlaybotPlugin::default()));
+//! app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Bot, BlindBot::Uniform));
+//! app.update();
+//! assert!(app.world().contains_resource::<Tick>());
+//! ```
 
 use bevy::{ecs::schedule::ScheduleLabel, input::InputSystems, prelude::*};
 

@@ -1,4 +1,28 @@
 //! Agents that are driven by a learned policy.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{policy::Decision, prelude::*};
+//! # use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner};
+//! # let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
+//! # let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings").policy();
+//!
+//! /// The game's own system.
+//! fn see(mut agents: Query<&mut Observation>) {
+//!     agents.iter_mut().for_each(|mut seen| seen.set([0.5]));
+//! }
+//!
+//! let mut app = headless_app();
+//! // `policy` reads one number and knows three actions.
+//! app.insert_resource(ActivePolicy { policy, draw: ActionDraw::Sample })
+//!     .insert_resource(PlaybotSeed(7))
+//!     .add_systems(ObserveSchedule, see);
+//! let agent = (Agent::new(0, ActionSpace::Discrete(3)), VectorSensor::new(["x"]), Control::Policy);
+//! let agent = app.world_mut().spawn(agent).id();
+//! app.tick().expect("the policy fits the game");
+//! let decision = app.world().get::<Decision>(agent).expect("every agent has one");
+//! assert!(decision.log_prob < 0.0, "it might have done something else");
+//! ```
 
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations, Policy};

@@ -1,4 +1,39 @@
 //! Policies that a game ships with: checked against the game, and put to work.
+//!
+//! ```
+//! use bevy_playbot::{
+//!     policy_file::{GameCard, PolicyCard, PolicyFile, check_policy, install_policy},
+//!     prelude::*,
+//! };
+//! use playbot_learner::DeviceKind;
+//! # use playbot_learner::{Learner as _, PolicySpec, PpoConfig, PpoLearner};
+//! # let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
+//! # let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?.policy();
+//! # let observations = vec!["x".into()];
+//! # let card = PolicyCard { game: "walk".into(), game_version: 1, observations, ..PolicyCard::default() };
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("walker.policy");
+//! # PolicyFile { card, policy, skills: None }.save(&path, &[0.5_f32], &[], 1)?;
+//!
+//! let walk = GameCard {
+//!     name: "walk",
+//!     version: 1,
+//!     observations: vec!["x".into()],
+//!     actions: ActionSpace::Discrete(3),
+//!     action_names: Vec::new(),
+//!     has_picture: false,
+//! };
+//! // `path` leads to a file that `playbot policy export` or `PolicyFile::save` has written.
+//! let file = PolicyFile::load(&path, DeviceKind::default())?;
+//! check_policy(&walk, &file)?;
+//! let mut app = headless_app();
+//! install_policy(app.world_mut(), &file, ActionDraw::Sample);
+//! assert!(app.world().contains_resource::<ActivePolicy>());
+//!
+//! let error = check_policy(&GameCard { version: 2, ..walk }, &file).expect_err("the rules have changed");
+//! assert!(error.to_string().contains("version 1 of `walk`, whose rules are at version 2"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use bevy::prelude::*;
 pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};

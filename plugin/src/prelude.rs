@@ -1,4 +1,12 @@
 //! What almost every game with agents needs.
+//!
+//! ```
+//! use bevy_playbot::prelude::*;
+//!
+//! let mut app = headless_app();
+//! app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Bot, BlindBot::Uniform));
+//! app.ticks(10).expect("no agent broke its contract");
+//! ```
 
 pub use crate::{
     action::{Action, ActionSpace, ActionValue},

@@ -1,4 +1,31 @@
 //! Worlds that are built anew for each episode, so that nothing of a game outlives one.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{prelude::*, renewal::Renewal};
+//!
+//! /// A game that counts where nobody can set it back, and ends after three ticks.
+//! fn count(mut ticks: Local<u32>, mut episodes: Query<&mut Episode>) {
+//!     *ticks += 1;
+//!     if *ticks == 3 {
+//!         episodes.iter_mut().for_each(|mut episode| episode.terminate(true));
+//!     }
+//! }
+//!
+//! fn build() -> World {
+//!     let mut app = headless_app();
+//!     app.add_systems(FixedUpdate, count);
+//!     app.world_mut().spawn(Agent::new(0, ActionSpace::Discrete(2)));
+//!     std::mem::take(app.world_mut())
+//! }
+//!
+//! let mut world = build();
+//! world.insert_resource(Renewal::new(|| Ok(build())));
+//! let agent = world.query_filtered::<Entity, With<Agent>>().single(&world).expect("one agent");
+//! world.entity_mut(agent).insert(Control::Human);
+//! world.ticks(9).expect("it can be built again");
+//! assert_eq!(world.get::<EpisodeCount>(agent).expect("it goes over").finished, 3);
+//! ```
 
 use std::{any::TypeId, sync::Arc};
 

@@ -1,4 +1,26 @@
 //! What the game pays an agent.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! /// The game's own system: time costs a little, and a coin in the second tick is worth a point.
+//! fn pay(mut agents: Query<(&Episode, &mut Reward)>) {
+//!     for (episode, mut reward) in &mut agents {
+//!         reward.add(-0.25);
+//!         if episode.tick == 1 {
+//!             reward.add(1.0);
+//!         }
+//!     }
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_systems(FixedUpdate, pay);
+//! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human)).id();
+//! app.ticks(2).expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Reward>(agent).expect("every agent has one").get(), 0.75);
+//! assert_eq!(app.world().get::<Episode>(agent).expect("every agent has one").total_reward, 0.5);
+//! ```
 
 use bevy::prelude::*;
 

@@ -1,4 +1,23 @@
 //! Skills: what the policy is asked to do for the next few ticks.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//! use playbot_learner::{Prior, SkillDraw};
+//!
+//! let mut app = headless_app();
+//! let prior = Prior::standard_normal(2, false);
+//! app.insert_resource(SkillPrior { prior, horizon: 10, draw: SkillDraw::Sample });
+//! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Policy)).id();
+//! let mut skill_after = |ticks| {
+//!     app.ticks(ticks).expect("no agent broke its contract");
+//!     app.world().get::<ActiveSkill>(agent).expect("every agent has one").z.clone()
+//! };
+//! let first = skill_after(1);
+//! assert_eq!(first.len(), 2);
+//! assert_eq!(skill_after(9), first, "held for 10 ticks");
+//! assert_ne!(skill_after(1), first, "and then another one is drawn");
+//! ```
 
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};

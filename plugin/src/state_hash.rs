@@ -1,4 +1,13 @@
 //! A fingerprint of the game's state, by which a replay proves that it is the same run.
+//!
+//! ```
+//! use bevy_playbot::prelude::*;
+//!
+//! let ball = |x: f32, y: f32| StateHash::of([x.to_bits().into(), y.to_bits().into()]);
+//! assert_eq!(ball(1.0, 2.0), ball(1.0, 2.0));
+//! assert_ne!(ball(1.0, 2.0), ball(2.0, 1.0), "the order counts");
+//! assert_ne!(ball(1.0, 2.0), ball(1.0, 2.000_001), "and so does every bit");
+//! ```
 
 use bevy::prelude::*;
 

@@ -1,4 +1,22 @@
 //! Random numbers: one seed for a World, streams of its own for each agent.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{prelude::*, streams::AgentStreams};
+//!
+//! let streams_of_agent_3 = |seed, others: u32| {
+//!     let mut app = headless_app();
+//!     app.insert_resource(PlaybotSeed(seed));
+//!     let agent = app.world_mut().spawn(Agent::new(3, ActionSpace::Discrete(2))).id();
+//!     for index in 0..others {
+//!         app.world_mut().spawn(Agent::new(index, ActionSpace::Discrete(2)));
+//!     }
+//!     app.tick().expect("each has a number of its own");
+//!     app.world().get::<AgentStreams>(agent).expect("every agent has them").clone()
+//! };
+//! assert_eq!(streams_of_agent_3(7, 0), streams_of_agent_3(7, 2), "others change nothing");
+//! assert_ne!(streams_of_agent_3(7, 0), streams_of_agent_3(8, 0));
+//! ```
 
 use bevy::prelude::*;
 use playbot_learner::Streams;

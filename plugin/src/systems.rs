@@ -1,4 +1,20 @@
 //! When the plugin does what.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::prelude::*;
+//!
+//! /// What has been hit is known after the physics, and still counts in this tick.
+//! fn pay_for_hits(mut rewards: Query<&mut Reward>) {
+//!     rewards.iter_mut().for_each(|mut reward| reward.add(-1.0));
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_systems(FixedPostUpdate, pay_for_hits.before(PlaybotSystems::Judge));
+//! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human)).id();
+//! app.tick().expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Episode>(agent).expect("every agent has one").total_reward, -1.0);
+//! ```
 
 use bevy::{ecs::schedule::ScheduleLabel, prelude::*};
 

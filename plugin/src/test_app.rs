@@ -1,8 +1,34 @@
 //! Helpers for tests of games that use the plugin. Plain functions and an extension trait, no macros: they work in any
 //! test harness.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{prelude::*, test_app::{PlaybotTestExt, test_app}};
+//!
+//! /// The game: an episode is won after three ticks.
+//! fn play(mut agents: Query<(&mut Episode, &mut StateHash)>) {
+//!     for (mut episode, mut hash) in &mut agents {
+//!         *hash = StateHash::of([episode.tick.into()]);
+//!         if episode.tick == 2 {
+//!             episode.terminate(true);
+//!         }
+//!     }
+//! }
+//!
+//! let mut app = test_app();
+//! app.add_systems(FixedUpdate, play);
+//! app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Bot, BlindBot::Uniform));
+//! assert_eq!(app.play_episodes(2, 100), Ok(6));
+//! let trace = app.hash_trace(6).expect("no agent broke its contract");
+//! assert_eq!(trace[..3], trace[3..], "each episode is the same");
+//! // Which systems are the game's: those of its crate, by name.
+//! assert_eq!(app.ambiguous_orders(&[module_path!()]), [""; 0]);
+//! ```
+
+use std::collections::BTreeMap;
 
 use bevy::{
-    ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel},
+    ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel, Schedules},
     prelude::*,
 };
 
@@ -17,6 +43,9 @@ use crate::{
 };
 
 /// A headless app whose fixed schedules refuse systems in an ambiguous order, since such a game is not reproducible.
+///
+/// Schedules that Bevy's own systems share, such as `PreUpdate` and `Last`, cannot refuse them, because those are in no
+/// certain order among themselves: ask [`ambiguous_orders`](PlaybotTestExt::ambiguous_orders) about yours.
 pub fn test_app() -> App {
     let mut app = headless_app();
     let strict = || ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
@@ -28,7 +57,7 @@ pub fn test_app() -> App {
     app
 }
 
-/// Questions that tests ask of an app with agents.
+/// Questions that tests ask of an app or a World with agents.
 pub trait PlaybotTestExt {
     /// Ticks until every agent has finished at least `episodes` episodes or is idle.
     ///
@@ -43,15 +72,23 @@ pub trait PlaybotTestExt {
     ///
     /// A fault of the game.
     fn hash_trace(&mut self, ticks: u64) -> Result<Vec<u64>, Fault>;
+
+    /// Pairs of systems that nobody has put in an order although one writes what the other uses, in every schedule that
+    /// has run: which schedule, which systems, and what they share. At least one of the two belongs to these crates, by
+    /// the path of its name; systems that have the whole World to themselves are compared with those of these crates only,
+    /// since they cannot say what they use.
+    ///
+    /// Systems have names if Bevy is built with its feature `debug`.
+    fn ambiguous_orders(&self, crates: &[&str]) -> Vec<String>;
 }
 
-impl PlaybotTestExt for App {
+impl PlaybotTestExt for World {
     fn play_episodes(&mut self, episodes: u64, limit: u64) -> Result<u64, Fault> {
         for tick in 0..limit {
             self.tick()?;
-            let mut agents = self.world_mut().query::<(&Control, &EpisodeCount)>();
+            let mut agents = self.query::<(&Control, &EpisodeCount)>();
             let done = |(control, count): (&Control, &EpisodeCount)| count.finished >= episodes || !control.is_active();
-            if agents.iter(self.world()).all(done) {
+            if agents.iter(self).all(done) {
                 return Ok(tick + 1);
             }
         }
@@ -62,10 +99,49 @@ impl PlaybotTestExt for App {
         let mut trace = Vec::new();
         for _ in 0..ticks {
             self.tick()?;
-            let world = self.world();
-            let agents = world.resource::<AgentOrder>().entities();
-            trace.extend(agents.iter().filter_map(|&agent| world.get::<StateHash>(agent)).map(|hash| hash.0));
+            let agents = self.resource::<AgentOrder>().entities();
+            trace.extend(agents.iter().filter_map(|&agent| self.get::<StateHash>(agent)).map(|hash| hash.0));
         }
         Ok(trace)
+    }
+
+    fn ambiguous_orders(&self, crates: &[&str]) -> Vec<String> {
+        let is_of = |name: &str| {
+            let is_in = |path: &&str| name.strip_prefix(*path).is_some_and(|rest| rest.starts_with("::"));
+            crates.iter().any(is_in)
+        };
+        let mut found = Vec::new();
+        for (label, schedule) in self.resource::<Schedules>().iter() {
+            // What has not run is not built yet.
+            let Ok(systems) = schedule.systems() else { continue };
+            let names: BTreeMap<_, _> = systems.map(|(key, system)| (key, system.name().to_string())).collect();
+            for (one, other, shared) in schedule.graph().conflicting_systems().iter() {
+                let (Some(one), Some(other)) = (names.get(one), names.get(other)) else { continue };
+                let ours = [one, other].into_iter().filter(|name| is_of(name)).count();
+                if ours == 0 || (shared.is_empty() && ours == 1) {
+                    continue;
+                }
+                let shared: Vec<String> =
+                    shared.iter().filter_map(|&id| self.components().get_name(id)).map(|it| it.to_string()).collect();
+                let what = if shared.is_empty() { "the whole World".to_owned() } else { shared.join(", ") };
+                found.push(format!("{label:?}: `{one}` and `{other}` share {what}"));
+            }
+        }
+        found.sort();
+        found
+    }
+}
+
+impl PlaybotTestExt for App {
+    fn play_episodes(&mut self, episodes: u64, limit: u64) -> Result<u64, Fault> {
+        self.world_mut().play_episodes(episodes, limit)
+    }
+
+    fn hash_trace(&mut self, ticks: u64) -> Result<Vec<u64>, Fault> {
+        self.world_mut().hash_trace(ticks)
+    }
+
+    fn ambiguous_orders(&self, crates: &[&str]) -> Vec<String> {
+        self.world().ambiguous_orders(crates)
     }
 }

@@ -1,4 +1,12 @@
 //! Counting ticks.
+//!
+//! ```
+//! use bevy_playbot::{prelude::*, tick::Tick};
+//!
+//! let mut app = headless_app();
+//! app.ticks(3).expect("no agent broke its contract");
+//! assert_eq!(app.world().resource::<Tick>(), &Tick(3));
+//! ```
 
 use bevy::prelude::*;
 

@@ -1,4 +1,11 @@
 //! Names that do not exist, and the nearest that does.
+//!
+//! ```
+//! use bevy_playbot::unknown_name::UnknownName;
+//!
+//! let error = UnknownName::new("mode", "hrad", &["easy", "hard"]);
+//! assert_eq!(error.to_string(), "unknown mode `hrad` (did you mean `hard`?); valid: easy, hard");
+//! ```
 
 use thiserror::Error;
 

@@ -1,6 +1,10 @@
 //! What is wrong with a foreign game is said, with the game's own names.
 
-use bevy::prelude::*;
+use bevy::{
+    diagnostic::{FrameCount, FrameCountPlugin},
+    prelude::*,
+    winit::EventLoopProxyWrapper,
+};
 use playbot_lab::{
     demo::verify::verify_file,
     eval::{Player, evaluate},
@@ -21,6 +25,15 @@ fn fault(game: &ForeignGame, ticks: u64) -> String {
     let bot = BlindBot::Constant(ActionValue::Discrete(1));
     world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::Always(3)));
     world.ticks(ticks).expect_err("something is wrong").to_string()
+}
+
+/// The game with something more.
+fn catch_game_with(more: fn(&mut App)) -> ForeignGame {
+    let broken = ForeignGame::new("broken", 1, move |app: &mut App| {
+        game(app);
+        more(app);
+    });
+    broken.keys([vec![], vec![KeyCode::ArrowLeft]]).observe(["x"], || [0.0]).restart(Restart::Startup)
 }
 
 #[test]
@@ -95,17 +108,36 @@ fn a_missing_resource_is_named_with_what_brings_it() {
     #[derive(Resource)]
     struct Lives(#[allow(dead_code)] u32);
     fn count(_lives: Res<Lives>) {}
-    let broken = ForeignGame::new("broken", 1, |app: &mut App| {
-        game(app);
+    let broken = catch_game_with(|app| {
         app.add_systems(Update, count);
     });
-    let broken = broken.keys([vec![], vec![KeyCode::ArrowLeft]]).observe(["x"], || [0.0]).restart(Restart::Startup);
     let text = fault(&broken, 2);
     assert!(!text.contains("panicked"), "{text}");
-    // The names are known if Bevy is built with its feature `debug`.
-    assert!(text.contains("`Lives`") || text.contains("feature `debug`"), "{text}");
+    for part in ["count` needs the resource `Lives`", "insert it, or add the plugin that brings it"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
     let text = fault(&catch_game().reward(|lives: Res<Lives>| lives.0 as f32), 2);
-    assert!(text.contains("`Lives`") || text.contains("feature `debug`"), "{text}");
+    assert!(text.contains("needs the resource `Lives`"), "{text}");
+}
+
+#[test]
+fn what_headless_plugins_lack_is_named_with_its_plugin() {
+    fn ask_the_window_system(_proxy: Res<EventLoopProxyWrapper>) {}
+    let broken = catch_game_with(|app| {
+        app.add_systems(Update, ask_the_window_system);
+    });
+    let text = fault(&broken, 2);
+    for part in ["ask_the_window_system` needs the resource `EventLoopProxyWrapper`", "`WinitPlugin`", "headless"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+    // One that the game has left out itself.
+    fn count(_frames: Res<FrameCount>) {}
+    let broken = catch_game_with(|app| {
+        app.add_systems(Update, count);
+    });
+    let broken = broken.headless(|usual| usual.build().disable::<FrameCountPlugin>());
+    let text = fault(&broken, 2);
+    assert!(text.contains("count` needs the resource `FrameCount`") && text.contains("`FrameCountPlugin` brings it"));
 }
 
 #[test]
@@ -140,6 +172,8 @@ fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
     let path = text.split("are in ").nth(1).and_then(|rest| rest.split(", which").next()).expect("a path");
+    let of_this_program = format!("-{}.demo", std::process::id());
+    assert!(path.ends_with(&of_this_program), "two programs must not write over each other's: {path}");
     let error = verify_file(&bomb(), std::path::Path::new(path), |_| {}).expect_err("panics again").to_string();
     assert!(error.contains("tick 4") && error.contains("the paddle has left the field"), "{error}");
     std::fs::remove_file(path).expect("it was there");

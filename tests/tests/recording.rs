@@ -7,6 +7,7 @@ use bevy_playbot::{
     demo::{
         file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
         recorder::flush_unfinished,
+        replay::{Divergence, ReplayDiverged},
     },
     vision::ObservationConfig,
 };
@@ -56,6 +57,10 @@ fn a_nondeterministic_game_is_found_out_at_the_first_tick_that_differs() {
     assert!(divergence.what.contains("state hash"), "{divergence}");
 }
 
+/// Divergences that were announced, with their agents.
+#[derive(Resource, Default)]
+struct Heard(Vec<(Entity, Divergence)>);
+
 #[test]
 fn hidden_randomness_in_the_game_is_reported() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -64,14 +69,17 @@ fn hidden_randomness_in_the_game_is_reported() {
     let episode = Arc::new(DemoReader::open(&path).expect("readable").read_all().expect("whole").remove(0));
     let (mut world, agents) = build_world(&Corridor, "plain", 0, 0, 1);
     world.insert_resource(Drift(1));
-    world.entity_mut(agents[0]).insert((
-        Control::Replay,
-        LevelQueue::Always(episode.level_seed),
-        bevy_playbot::demo::replay::Replay::new(episode),
-    ));
+    world.init_resource::<Heard>();
+    world.add_observer(|event: On<ReplayDiverged>, mut heard: ResMut<Heard>| {
+        heard.0.push((event.entity, event.divergence.clone()));
+    });
+    world.entity_mut(agents[0]).insert((Control::Replay, LevelQueue::Always(episode.level_seed), Replay::new(episode)));
     world.tick().expect("sound");
-    let replay = world.get::<bevy_playbot::demo::replay::Replay>(agents[0]).expect("inserted");
-    assert_eq!(replay.divergence().expect("diverges").tick, 0);
+    let divergence = world.get::<Replay>(agents[0]).and_then(Replay::divergence).expect("diverges").clone();
+    assert_eq!(divergence.tick, 0);
+    assert_eq!(world.resource::<Heard>().0, [(agents[0], divergence.clone())], "announced in its tick");
+    world.tick().expect("sound");
+    assert_eq!(world.resource::<Heard>().0.len(), 1, "said once");
 }
 
 #[test]

@@ -40,7 +40,10 @@ impl Plugin for Maze2dPlugin {
             .add_observer(arena::start_episode)
             .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Sync))
             // An agent is decided for by one alone, so it does not matter who decides for which agent first.
-            .add_systems(FixedPreUpdate, demonstrator_bot::decide.in_set(PlaybotSystems::Decide).ambiguous_with_all())
+            .add_systems(
+                FixedPreUpdate,
+                demonstrator_bot::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
+            )
             .add_systems(FixedUpdate, play::play.in_set(Maze2dSystems));
     }
 }

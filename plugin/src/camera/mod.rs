@@ -18,6 +18,23 @@
 //!
 //! Frames carry the number of the look they were extracted in through the render world. One that comes back with
 //! another number is reported in [`Faults`](crate::fault::Faults), with its agent and tick, and is not handed out.
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use bevy_playbot::{camera::{CameraSensor, CameraSensorPlugin}, prelude::*, vision::ImageOptions};
+//!
+//! let mut app = headless_app();
+//! app.add_plugins(CameraSensorPlugin::headless()?);
+//! let green = Sprite::from_color(Color::srgb(0.0, 1.0, 0.0), Vec2::splat(2.0));
+//! let player = app.world_mut().spawn((green, Transform::default())).id();
+//! // 16 units of the world around the player, as 64 × 64 pixels.
+//! let sensor = CameraSensor::following(player, 16.0, ImageOptions::default());
+//! app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, sensor));
+//! app.finish();
+//! app.cleanup();
+//! app.tick().expect("it can be drawn");
+//! # Ok::<(), bevy_playbot::vision::VisionError>(())
+//! ```
 
 mod adapter;
 mod atlas;

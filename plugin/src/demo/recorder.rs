@@ -1,4 +1,25 @@
 //! Writing down what agents do, whoever decides.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{demo::file::{DemoActions, DemoHeader, DemoReader, DemoWriter}, prelude::*};
+//!
+//! let folder = tempfile::tempdir().expect("a folder");
+//! let path = folder.path().join("walk.demo");
+//! let header = DemoHeader::new("walk", 1, "default", 60.0, DemoActions::Discrete(2));
+//! let mut app = headless_app();
+//! app.insert_resource(Recorder::new(DemoWriter::create(&path, header)?))
+//!     // The game: an episode is won after three ticks.
+//!     .add_systems(FixedUpdate, |mut episodes: Query<&mut Episode>| {
+//!         episodes.iter_mut().filter(|episode| episode.tick == 2).for_each(|mut episode| episode.terminate(true));
+//!     });
+//! let player = (Agent::new(0, ActionSpace::Discrete(2)), Control::Bot, BlindBot::Uniform);
+//! app.world_mut().spawn((player, Recording::default()));
+//! app.ticks(6).expect("no agent broke its contract");
+//! let episodes = DemoReader::open(&path)?.read_all()?;
+//! assert_eq!(episodes.iter().map(|episode| episode.len()).collect::<Vec<_>>(), [3, 3]);
+//! # Ok::<(), bevy_playbot::demo::file::DemoFileError>(())
+//! ```
 
 use bevy::prelude::*;
 

@@ -1,4 +1,35 @@
 //! Playing a recording back, and finding the first tick at which it is no longer the same game.
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use bevy::prelude::*;
+//! use bevy_playbot::{
+//!     demo::{file::{Decider, DemoActions, DemoEpisode, EpisodeActions}, replay::ReplayDiverged},
+//!     prelude::*,
+//! };
+//!
+//! #[derive(Resource, Default)]
+//! struct Heard(Vec<String>);
+//!
+//! // Three ticks of a game that paid nothing. A `DemoReader` gives out such episodes.
+//! let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
+//! episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
+//! (episode.rewards, episode.state_hashes, episode.deciders) = (vec![0.0; 3], vec![0; 3], vec![Decider::Human; 3]);
+//!
+//! let mut app = headless_app();
+//! app.init_resource::<Heard>()
+//!     .add_observer(|event: On<ReplayDiverged>, mut heard: ResMut<Heard>| heard.0.push(event.divergence.to_string()))
+//!     // Meanwhile the second tick pays a point.
+//!     .add_systems(FixedUpdate, |mut agents: Query<(&Episode, &mut Reward)>| {
+//!         agents.iter_mut().filter(|(episode, _)| episode.tick == 1).for_each(|(_, mut reward)| reward.add(1.0));
+//!     });
+//! let agent = app.world_mut().spawn(Agent::new(0, ActionSpace::Discrete(2))).id();
+//! Replay::begin(Arc::new(episode), &mut app.world_mut().entity_mut(agent));
+//! app.ticks(3).expect("no agent broke its contract");
+//! assert!(app.world().get::<Replay>(agent).is_some_and(Replay::is_finished));
+//! assert_eq!(app.world().resource::<Heard>().0, ["level 7, tick 1: the reward is 1, recorded was 0"]);
+//! ```
 
 use std::sync::Arc;
 
@@ -24,6 +55,15 @@ pub struct Replay {
     episode: Arc<DemoEpisode>,
     divergence: Option<Divergence>,
     finished: bool,
+}
+
+/// A replay has stopped being the recorded game: triggered once in a replay, in the tick that differs.
+#[derive(EntityEvent, Clone, Debug, PartialEq)]
+pub struct ReplayDiverged {
+    /// The agent that replays.
+    pub entity: Entity,
+    /// Where, and what differs.
+    pub divergence: Divergence,
 }
 
 /// Where a replay stopped being the recorded game.
@@ -53,7 +93,7 @@ impl Replay {
         agent.insert((Control::Replay, queue, Self::new(episode), AgentStreams::new(0, 0)));
     }
 
-    /// The first difference between the recording and the game, if one has been met.
+    /// The first difference between the recording and the game, if one has been met. [`ReplayDiverged`] announces it.
     pub fn divergence(&self) -> Option<&Divergence> {
         self.divergence.as_ref()
     }
@@ -93,8 +133,11 @@ pub(crate) fn run_replays(mut agents: Query<(&Control, &Episode, &mut Replay, &m
     }
 }
 
-pub(crate) fn check_replays(mut agents: Query<(&Control, &Episode, &Reward, &StateHash, &mut Replay)>) {
-    for (control, episode, reward, hash, mut replay) in &mut agents {
+pub(crate) fn check_replays(
+    mut agents: Query<(Entity, &Control, &Episode, &Reward, &StateHash, &mut Replay)>,
+    mut commands: Commands,
+) {
+    for (entity, control, episode, reward, hash, mut replay) in &mut agents {
         if *control != Control::Replay || !episode.is_running() || replay.finished {
             continue;
         }
@@ -104,7 +147,9 @@ pub(crate) fn check_replays(mut agents: Query<(&Control, &Episode, &Reward, &Sta
         if replay.divergence.is_none()
             && let Some(what) = what
         {
-            replay.divergence = Some(Divergence { level: episode.level, tick, what });
+            let divergence = Divergence { level: episode.level, tick, what };
+            replay.divergence = Some(divergence.clone());
+            commands.trigger(ReplayDiverged { entity, divergence });
         }
         replay.finished = episode.end().is_some() || tick as usize + 1 >= replay.episode.len();
     }

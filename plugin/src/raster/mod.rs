@@ -12,6 +12,22 @@
 //!
 //! Texels of half alpha are mixed in linear light. Where the centre of a pixel falls decides which texel it shows. All of
 //! it is sums, products and quotients in a fixed order, so a picture has the same bytes on every machine.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::{prelude::*, raster::{RasterPlugin, RasterSensor}, vision::ImageOptions};
+//!
+//! let mut app = headless_app();
+//! app.add_plugins(RasterPlugin);
+//! let red = Sprite::from_color(Color::srgb(1.0, 0.0, 0.0), Vec2::splat(2.0));
+//! let player = app.world_mut().spawn((red, Transform::default())).id();
+//! // Four units of the world around the player, a pixel for each.
+//! let sensor = RasterSensor::following(player, 4.0, ImageOptions { width: 4, height: 4, ..default() });
+//! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, sensor)).id();
+//! app.tick().expect("it can be drawn");
+//! let red = &app.world().get::<Observation>(agent).expect("every agent has one").image[..16];
+//! assert_eq!(red, [0, 0, 0, 0, 0, 255, 255, 0, 0, 255, 255, 0, 0, 0, 0, 0]);
+//! ```
 
 mod canvas;
 mod colour;

@@ -11,7 +11,11 @@ use super::{
     request::{RequestError, TakeoverRequest},
     seats::{Seat, playing_agents},
 };
-use crate::{fault::Faults, systems::PlaybotSystems};
+use crate::{
+    fault::{FaultSystems, Faults},
+    keyboard::note_taps,
+    systems::PlaybotSystems,
+};
 
 /// The environment variable that is looked at.
 const VARIABLE: &str = "PLAYBOT";
@@ -51,8 +55,13 @@ impl Plugin for TakeoverPlugin {
         };
         app.insert_resource(self.game.clone())
             .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
-            .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems))
-            .add_systems(Last, finish.after(PlaybotSystems::Reset).run_if(on_message::<AppExit>));
+            // People who have just lost their seat press nothing.
+            .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems).before(note_taps))
+            .add_systems(
+                Last,
+                // What goes wrong with the last episode is still said.
+                finish.after(PlaybotSystems::Reset).before(FaultSystems).run_if(on_message::<AppExit>),
+            );
     }
 }
 

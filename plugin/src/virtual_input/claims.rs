@@ -58,6 +58,15 @@ pub(super) fn check_claims(
             *control = Control::Idle;
             continue;
         }
+        if input.is_mixed() {
+            faults.report(format!(
+                "agent {}: its `VirtualInput` has sets of buttons for discrete actions, and its actions are {:?}: give \
+                 the axis that shall press them `ActionAxis::buttons`",
+                agent.index, agent.actions
+            ));
+            *control = Control::Idle;
+            continue;
+        }
         let reach = input.reach();
         let buttons = reach.buttons.iter().filter(|button| !matches!(button, VirtualButton::Gamepad(_)));
         let axes = reach.axes.iter().filter(|(axis, _)| !axis.is_gamepad());

@@ -29,6 +29,8 @@ use crate::action::{ActionSpace, ActionValue};
 #[reflect(Component)]
 pub struct VirtualInput {
     mapping: Mapping,
+    /// Sets of buttons were added to continuous actions, where they mean nothing.
+    is_mixed: bool,
 }
 
 #[derive(Clone, Debug, PartialEq, Reflect)]
@@ -47,33 +49,35 @@ impl VirtualInput {
 
     /// What each discrete action holds, on any device.
     pub fn discrete(actions: impl IntoIterator<Item = HeldInput>) -> Self {
-        Self { mapping: Mapping::Discrete(actions.into_iter().collect()) }
+        Self { mapping: Mapping::Discrete(actions.into_iter().collect()), is_mixed: false }
     }
 
     /// What each value of a continuous action moves.
     pub fn axes(axes: impl IntoIterator<Item = ActionAxis>) -> Self {
-        Self { mapping: Mapping::Continuous(axes.into_iter().collect()) }
+        Self { mapping: Mapping::Continuous(axes.into_iter().collect()), is_mixed: false }
     }
 
-    /// Adds a set of mouse buttons to each discrete action, in order. Continuous actions have
-    /// [`ActionAxis::buttons`].
+    /// Adds a set of mouse buttons to each discrete action, in order. Continuous actions have [`ActionAxis::buttons`];
+    /// an agent that has sets besides is a fault.
     pub fn mouse_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = MouseButton>>) -> Self {
         self.also(sets)
     }
 
-    /// Adds a set of gamepad buttons to each discrete action, in order.
+    /// Adds a set of gamepad buttons to each discrete action, in order, as [`mouse_buttons`](Self::mouse_buttons) does.
     pub fn gamepad_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = GamepadButton>>) -> Self {
         self.also(sets)
     }
 
     fn also<B: Into<VirtualButton>>(mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = B>>) -> Self {
-        if let Mapping::Discrete(actions) = &mut self.mapping {
-            for (index, set) in sets.into_iter().enumerate() {
-                if index == actions.len() {
-                    actions.push(HeldInput::default());
-                }
-                actions[index] = std::mem::take(&mut actions[index]).hold(set);
+        let Mapping::Discrete(actions) = &mut self.mapping else {
+            self.is_mixed |= sets.into_iter().next().is_some();
+            return self;
+        };
+        for (index, set) in sets.into_iter().enumerate() {
+            if index == actions.len() {
+                actions.push(HeldInput::default());
             }
+            actions[index] = std::mem::take(&mut actions[index]).hold(set);
         }
         self
     }
@@ -97,6 +101,11 @@ impl VirtualInput {
             }
             _ => HeldInput::default(),
         }
+    }
+
+    /// Whether sets of buttons were added to continuous actions.
+    pub(super) fn is_mixed(&self) -> bool {
+        self.is_mixed
     }
 
     /// Everything that any of its actions may hold or move.

@@ -64,9 +64,6 @@ pub use button::{UnknownInput, VirtualButton};
 pub use component::VirtualInput;
 pub use devices::VirtualDevices;
 pub use gamepad::VirtualGamepad;
+pub use held::HeldInput;
 pub use person::PressesForPeople;
 pub use plugin::{InputRoute, VirtualInputPlugin};
-
-// For playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
-pub use held::HeldInput;

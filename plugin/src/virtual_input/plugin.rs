@@ -23,7 +23,7 @@ use super::{
     direct::{self, DirectInput},
     gamepad::connect_gamepads,
 };
-use crate::{action::check_actions, fault::Faults, systems::PlaybotSystems};
+use crate::{action::check_actions, fault::Faults, panics::note_actions, systems::PlaybotSystems};
 
 /// The way from an action to the game.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
@@ -58,7 +58,7 @@ impl Plugin for VirtualInputPlugin {
             InputRoute::Messages => {
                 app.add_systems(
                     PreUpdate,
-                    (check_claims, act::send_messages)
+                    (check_claims.before(note_actions), act::send_messages)
                         .chain()
                         .after(check_actions)
                         .in_set(PlaybotSystems::Act)
@@ -68,7 +68,10 @@ impl Plugin for VirtualInputPlugin {
             InputRoute::Direct => {
                 app.add_systems(
                     FixedPreUpdate,
-                    (check_claims, direct::write_directly).chain().after(check_actions).in_set(PlaybotSystems::Act),
+                    (check_claims.before(note_actions), direct::write_directly)
+                        .chain()
+                        .after(check_actions)
+                        .in_set(PlaybotSystems::Act),
                 )
                 .add_systems(RunFixedMainLoop, direct::show_frame.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop))
                 .add_systems(

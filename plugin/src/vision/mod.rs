@@ -10,6 +10,16 @@
 //! A sensor fills [`Frame`] in [`VisionSystems::Render`]; [`VisionSystems::Compose`] checks its tick and makes
 //! [`Observation::image`](crate::observation::Observation::image) of it. Agents that nobody decides for, and agents between
 //! two episodes, are not looked after.
+//!
+//! ```
+//! use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
+//!
+//! let image = ImageOptions { width: 32, height: 24, stack: 4, grayscale: true, ..Default::default() };
+//! image.check().expect("sizes that can be drawn");
+//! assert_eq!(image.shape().numbers(), 4 * 24 * 32);
+//! let config = ObservationConfig { kind: ObservationKind::Raster, image };
+//! assert_eq!(config.to_string(), "32×24 grey pictures of the raster, 4 in a stack");
+//! ```
 
 mod blank;
 mod card;

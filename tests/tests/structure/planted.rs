@@ -4,6 +4,7 @@ use std::{fs, path::Path};
 
 use crate::{
     circles::{circles, folders},
+    doctests::without_example,
     imports::needs,
     modules::Modules,
     public::Public,
@@ -82,6 +83,22 @@ fn files_of_a_folder_are_looked_at_too() {
         ("a/c.rs", "use crate::a::B; pub struct C;"),
     ];
     assert_eq!(found(&files), ["b c"]);
+}
+
+#[test]
+fn public_modules_without_an_example_are_found() {
+    let shown = "//! ```\n//! f();\n//! ```\npub fn f() {}";
+    let (_folder, modules) = modules(&[
+        ("lib.rs", "pub mod a; pub mod b; pub mod c; mod d; #[doc(hidden)] pub mod e; pub mod f { pub fn g() {} }"),
+        ("a.rs", shown),
+        ("b.rs", "//! ```text\n//! f();\n//! ```\npub fn f() {}"),
+        ("c/mod.rs", "mod below; pub mod bare;"),
+        ("c/below.rs", shown),
+        ("c/bare.rs", "pub struct Bare;"),
+        ("d.rs", "pub struct Unseen;"),
+        ("e.rs", "pub struct Hidden;"),
+    ]);
+    assert_eq!(without_example(&modules), ["b", "c::bare", "f"]);
 }
 
 #[test]

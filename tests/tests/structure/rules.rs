@@ -9,6 +9,7 @@ use std::{
 
 use crate::{
     circles::{circles, folders},
+    doctests::without_example,
     files::{files, shown},
     imports::needs,
     items::items,
@@ -131,6 +132,16 @@ fn a_game_developer_meets_few_items() {
         );
     }
     fail_if_any(&faults, "Make what games do not need pub(crate) or #[doc(hidden)], or move it to playbot_lab.");
+}
+
+/// One short example at least, compiled as a documentation test, in every module of `bevy_playbot` that can be named from
+/// outside, or below it. What is `#[doc(hidden)]` needs none.
+#[test]
+fn every_concept_has_an_example() {
+    let (_, modules) = crates().into_iter().find(|(package, _)| package.name == "bevy_playbot").expect("it is there");
+    let faults: Vec<String> =
+        without_example(&modules).into_iter().map(|module| format!("bevy_playbot::{module}: no example")).collect();
+    fail_if_any(&faults, "Show in ten to twenty lines of the module's documentation how it is used.");
 }
 
 /// What `include_str!`, `include_bytes!` and `include!` read lies in the package, or is linked into it: otherwise it is

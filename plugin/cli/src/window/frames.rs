@@ -92,7 +92,7 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
         world.run_schedule(StandStill);
     } else {
         world.run_schedule(Main);
-        if let Some(failure) = system_errors::take(world) {
+        if let Some(failure) = system_errors::take() {
             world.resource_mut::<Faults>().report(failure);
             world.run_schedule(StandStill);
         }

@@ -21,6 +21,10 @@ use bevy_playbot::{
 /// Frames that a level may take to be ready, unless the game says otherwise.
 const PATIENCE: u32 = 3600;
 
+fn lists<T>(sets: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Vec<Vec<T>> {
+    sets.into_iter().map(|set| set.into_iter().collect()).collect()
+}
+
 impl ForeignGame {
     /// A game that `plugin` adds to an app which has Bevy's `DefaultPlugins`. Raise the version whenever an old recording
     /// would no longer replay.
@@ -56,13 +60,6 @@ impl ForeignGame {
         self
     }
 
-    fn with_input(self, change: impl FnOnce(Option<VirtualInput>) -> VirtualInput) -> Self {
-        self.with(|description| {
-            let input = &mut description.input;
-            input.pressed = Some(change(input.pressed.take()));
-        })
-    }
-
     /// Frames, and so ticks, in a second of game time; 60 unless said otherwise.
     pub fn hz(self, hz: f64) -> Self {
         self.with(|description| description.hz = hz)
@@ -70,29 +67,27 @@ impl ForeignGame {
 
     /// Discrete actions: the keys that each of them holds.
     pub fn keys(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
-        let sets: Vec<Vec<KeyCode>> = sets.into_iter().map(|set| set.into_iter().collect()).collect();
-        let input = VirtualInput::keys(sets.clone());
-        self.with(|description| description.input.keys = sets).with_input(|_| input)
+        self.with(|description| description.input.keys = lists(sets))
     }
 
     /// Mouse buttons that discrete actions hold besides, in the order of the actions.
     pub fn mouse_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = MouseButton>>) -> Self {
-        self.with_input(|input| input.unwrap_or_else(|| VirtualInput::discrete([])).mouse_buttons(sets))
+        self.with(|description| description.input.mouse = lists(sets))
     }
 
     /// Gamepad buttons that discrete actions hold besides, in the order of the actions.
     pub fn gamepad_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = GamepadButton>>) -> Self {
-        self.with_input(|input| input.unwrap_or_else(|| VirtualInput::discrete([])).gamepad_buttons(sets))
+        self.with(|description| description.input.pads = lists(sets))
     }
 
-    /// Continuous actions: what each of their values moves.
+    /// Continuous actions: what each of their values moves. Buttons belong to them by [`ActionAxis::buttons`].
     pub fn axes(self, axes: impl IntoIterator<Item = ActionAxis>) -> Self {
-        self.with_input(|_| VirtualInput::axes(axes))
+        self.with(|description| description.input.axes = Some(axes.into_iter().collect()))
     }
 
     /// Actions that press what this says.
     pub fn input(self, input: VirtualInput) -> Self {
-        self.with_input(|_| input)
+        self.with(|description| description.input.whole = Some(input))
     }
 
     /// Actions that a system hands to the game: it finds the agent's [`Action`](bevy_playbot::action::Action) and runs in every

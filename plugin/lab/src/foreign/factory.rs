@@ -68,7 +68,7 @@ impl<Out: 'static> OwnedSystem<Out> {
             Ok(out) => Ok(Some(out)),
             Err(RunSystemError::Skipped(_)) => Ok(None),
             Err(RunSystemError::Failed(error)) => {
-                Err(system_errors::explain(world, &format!("system `{}`", self.name), &error))
+                Err(system_errors::explain(&format!("system `{}`", self.name), &error))
             }
         }
     }

@@ -124,6 +124,9 @@ impl Game for ForeignGame {
 
     fn problem(&self) -> Option<String> {
         let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
+        if let Some(clash) = input.clash() {
+            return Some(format!("the game `{name}` {clash}"));
+        }
         if has_no_actions(&input.space()) {
             return Some(format!(
                 "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
@@ -168,8 +171,8 @@ impl Game for ForeignGame {
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         let sensor = VectorSensor::new(self.description.observation().names);
         let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
-        if let Some(input) = &self.description.input.pressed {
-            agent.insert(input.clone());
+        if let Some(input) = self.description.input.pressed() {
+            agent.insert(input);
         }
         agent.id()
     }

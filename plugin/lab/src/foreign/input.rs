@@ -3,15 +3,26 @@
 use bevy::prelude::*;
 
 use super::runtime::{playing_agent, with_foreign};
-use bevy_playbot::{action::ActionSpace, control::Control, key_bindings::KeyBindings, virtual_input::VirtualInput};
+use bevy_playbot::{
+    action::ActionSpace,
+    control::Control,
+    key_bindings::KeyBindings,
+    virtual_input::{ActionAxis, VirtualInput},
+};
 
-/// The way from an action into the game.
+/// The way from an action into the game, part by part: in which order they were said does not matter.
 #[derive(Clone, Default)]
 pub(super) struct Input {
-    /// Keys, buttons and sticks.
-    pub(super) pressed: Option<VirtualInput>,
-    /// The keys of each discrete action, as far as the game is played with keys.
+    /// The keys of each discrete action.
     pub(super) keys: Vec<Vec<KeyCode>>,
+    /// The mouse buttons of each discrete action.
+    pub(super) mouse: Vec<Vec<MouseButton>>,
+    /// The gamepad buttons of each discrete action.
+    pub(super) pads: Vec<Vec<GamepadButton>>,
+    /// What each value of a continuous action moves.
+    pub(super) axes: Option<Vec<ActionAxis>>,
+    /// What was said as a whole.
+    pub(super) whole: Option<VirtualInput>,
     /// For games that a system of their own hands actions to.
     pub(super) space: Option<ActionSpace>,
     /// Names of the actions.
@@ -20,8 +31,45 @@ pub(super) struct Input {
 
 impl Input {
     pub(super) fn space(&self) -> ActionSpace {
-        let pressed = || self.pressed.as_ref().map(VirtualInput::space);
+        let pressed = || self.pressed().map(|pressed| pressed.space());
         self.space.or_else(pressed).unwrap_or(ActionSpace::Discrete(0))
+    }
+
+    /// What the parts press together; none for a game that nothing is pressed in.
+    pub(super) fn pressed(&self) -> Option<VirtualInput> {
+        let is_discrete = !(self.keys.is_empty() && self.mouse.is_empty() && self.pads.is_empty());
+        let base = match (&self.whole, &self.axes) {
+            (Some(whole), _) => whole.clone(),
+            (None, Some(axes)) => VirtualInput::axes(axes.iter().cloned()),
+            (None, None) if is_discrete => VirtualInput::keys(self.keys.clone()),
+            (None, None) => return None,
+        };
+        match base.space() {
+            ActionSpace::Discrete(_) => Some(base.mouse_buttons(self.mouse.clone()).gamepad_buttons(self.pads.clone())),
+            ActionSpace::Continuous(_) => Some(base),
+        }
+    }
+
+    /// What was said of the input and does not go together.
+    pub(super) fn clash(&self) -> Option<String> {
+        let said =
+            [("`.keys`", !self.keys.is_empty()), ("`.axes`", self.axes.is_some()), ("`.input`", self.whole.is_some())];
+        let said: Vec<&str> = said.into_iter().filter_map(|(name, is_said)| is_said.then_some(name)).collect();
+        if said.len() > 1 {
+            return Some(format!(
+                "has {}, and each of them says what every action does: choose one",
+                said.join(" and ")
+            ));
+        }
+        let buttons = if self.mouse.is_empty() { "`.gamepad_buttons`" } else { "`.mouse_buttons`" };
+        let has_buttons = !(self.mouse.is_empty() && self.pads.is_empty());
+        let is_continuous = matches!(self.pressed()?.space(), ActionSpace::Continuous(_));
+        (has_buttons && is_continuous).then(|| {
+            format!(
+                "has {buttons}, which belong to discrete actions, and continuous ones: buttons of these are \
+                 `ActionAxis::buttons` in `.axes`"
+            )
+        })
     }
 
     /// Names as given, or those of the keys.
@@ -38,7 +86,7 @@ impl Input {
     pub(super) fn bindings(&self) -> Option<KeyBindings> {
         let is_keys = self.space.is_none()
             && !self.keys.is_empty()
-            && self.pressed == Some(VirtualInput::keys(self.keys.clone()));
+            && self.pressed() == Some(VirtualInput::keys(self.keys.clone()));
         is_keys.then(|| KeyBindings::of_sets(&self.keys))
     }
 }

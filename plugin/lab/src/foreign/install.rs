@@ -13,6 +13,7 @@ use super::{
 };
 use bevy_playbot::{
     action::check_actions,
+    panics::note_actions,
     placement::{TickSchedules, is_tick},
     systems::PlaybotSystems,
     virtual_input::{InputRoute, VirtualInputPlugin},
@@ -42,8 +43,9 @@ impl Plugin for ForeignPlugin {
             decide,
             (
                 ready::check.in_set(PlaybotSystems::Load),
-                demonstrator::decide.in_set(PlaybotSystems::Decide).ambiguous_with_all(),
-                input::act.in_set(PlaybotSystems::Act).after(check_actions).ambiguous_with_all(),
+                // An agent is decided for by one alone, so it does not matter who decides for which agent first.
+                demonstrator::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
+                input::act.in_set(PlaybotSystems::Act).after(check_actions).after(note_actions),
             ),
         )
         .add_systems(judge, outcome::judge.before(PlaybotSystems::Judge).run_if(is_tick));

@@ -6,10 +6,11 @@ use super::runtime::{Sensor, playing_agent, with_foreign};
 use bevy_playbot::{
     observation::{Observation, VectorSensor},
     systems::ObserveSchedule,
+    vision::VisionSystems,
 };
 
 pub(super) fn build(app: &mut App) {
-    app.add_systems(ObserveSchedule, observe.ambiguous_with_all());
+    app.add_systems(ObserveSchedule, observe.before(VisionSystems::Sync));
 }
 
 /// Fills the agent's vector, unless it has no sensor for one.

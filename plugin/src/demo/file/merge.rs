@@ -30,6 +30,14 @@ impl MergeReport {
 /// They must agree in everything that decides whether they replay together: game, version, mode, tick rate, actions, names
 /// of kept observations and noise. Testers may differ: the new file names all of them. The files themselves are left alone.
 ///
+/// ```no_run
+/// use bevy_playbot::demo::file::merge_demos;
+///
+/// let report = merge_demos(&["ada.demo", "bob.demo"], "all.demo")?;
+/// assert!(report.episodes() >= 2, "of the game {}", report.header.game);
+/// # Ok::<(), bevy_playbot::demo::file::DemoFileError>(())
+/// ```
+///
 /// # Errors
 ///
 /// The first file that is of another game, version or mode ([`DemoFault::ForeignGame`] and its kin) or differs otherwise

@@ -47,14 +47,13 @@ pub use episode_fault::EpisodeFault;
 pub use error::{DemoFault, DemoFileError};
 pub use find::find_demos;
 pub use header::{DemoActions, DemoHeader};
+pub use merge::{MergeReport, merge_demos};
 pub use reader::DemoReader;
 pub use writer::DemoWriter;
 
 // For playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub use header::DEMO_FORMAT;
-#[doc(hidden)]
-pub use merge::{MergeReport, merge_demos};
 #[doc(hidden)]
 pub use preamble::DEMO_MAGIC;
 #[doc(hidden)]

@@ -1,0 +1,100 @@
+//! A game that uses what windows are for, without one: a picture from the disk, states, text, a mesh and a material.
+
+use bevy::prelude::*;
+use playbot_lab::{
+    foreign::{ForeignGame, Restart},
+    prelude::*,
+    worlds::build_world,
+};
+
+#[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+enum Stage {
+    #[default]
+    Loading,
+    Playing,
+}
+
+#[derive(Resource)]
+struct Art(Handle<Image>);
+
+#[derive(Component)]
+struct Ball;
+
+/// The game, as its author wrote it.
+fn game(app: &mut App) {
+    app.init_state::<Stage>()
+        .add_systems(Startup, load)
+        .add_systems(Update, begin.run_if(in_state(Stage::Loading)))
+        .add_systems(OnEnter(Stage::Playing), spawn)
+        .add_systems(Update, roll.run_if(in_state(Stage::Playing)));
+}
+
+fn load(server: Res<AssetServer>, mut commands: Commands) {
+    commands.insert_resource(Art(server.load("maze2d/ball.png")));
+}
+
+fn begin(art: Res<Art>, images: Res<Assets<Image>>, mut next: ResMut<NextState<Stage>>) {
+    if images.contains(&art.0) {
+        next.set(Stage::Playing);
+    }
+}
+
+fn spawn(
+    art: Res<Art>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<ColorMaterial>>,
+    mut commands: Commands,
+) {
+    let here = DespawnOnExit(Stage::Playing);
+    let ground = (Mesh2d(meshes.add(Rectangle::new(10.0, 1.0))), MeshMaterial2d(materials.add(Color::WHITE)));
+    commands.spawn((here.clone(), ground, Transform::from_xyz(0.0, -1.0, 0.0)));
+    commands.spawn((here.clone(), Text2d::new("0 m"), Transform::from_xyz(0.0, 4.0, 1.0)));
+    commands.spawn((here, Ball, Sprite::from_image(art.0.clone()), Transform::default()));
+}
+
+fn roll(keys: Res<ButtonInput<KeyCode>>, mut ball: Single<&mut Transform, With<Ball>>, mut text: Single<&mut Text2d>) {
+    ball.translation.x += f32::from(u8::from(keys.pressed(KeyCode::ArrowRight)));
+    text.0 = format!("{} m", ball.translation.x);
+}
+
+/// The ball's way, and how wide its picture is.
+fn see(ball: Single<(&Transform, &Sprite), With<Ball>>, images: Res<Assets<Image>>) -> [f32; 2] {
+    let (place, sprite) = *ball;
+    [place.translation.x, images.get(&sprite.image).map_or(0.0, |image| image.width() as f32)]
+}
+
+/// The adapter.
+fn ball_game() -> ForeignGame {
+    ForeignGame::new("ball", 1, game)
+        .keys([vec![], vec![KeyCode::ArrowRight]])
+        .observe(["x", "width"], see)
+        .end(|ball: Single<&Transform, With<Ball>>| (ball.translation.x >= 5.0).then_some(EpisodeEnd::WON))
+        .time_limit(60)
+        .restart(Restart::state(Stage::Loading))
+        .ready(|stage: Res<State<Stage>>| *stage == Stage::Playing)
+        .headless(|usual| {
+            let file_path = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets").to_owned();
+            usual.build().set(AssetPlugin { file_path, ..default() })
+        })
+}
+
+#[test]
+fn it_plays_without_a_screen() {
+    let (mut world, agents) = build_world(&ball_game(), "default", 1, 0, 1);
+    let right = BlindBot::Constant(ActionValue::Discrete(1));
+    world.entity_mut(agents[0]).insert((Control::Bot, right, LevelQueue::list([1, 2])));
+    world.ticks(3).expect("the picture has arrived, and nothing is missing");
+    let seen = world.get::<Observation>(agents[0]).expect("an agent").vector.clone();
+    assert_eq!(seen, [2.0, 16.0], "after two ticks, with a picture of 16 pixels");
+    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+        world.tick().expect("sound");
+    }
+    let count = world.get::<EpisodeCount>(agents[0]).expect("an agent");
+    assert_eq!((count.finished, count.successes), (2, 2));
+    let mut texts = world.query::<&Text2d>();
+    assert_eq!(texts.iter(&world).map(|text| text.0.as_str()).collect::<Vec<_>>(), ["5 m"]);
+    let mut grounds = world.query::<(&Mesh2d, &MeshMaterial2d<ColorMaterial>)>();
+    let (mesh, material) = grounds.single(&world).expect("one ground");
+    assert!(world.resource::<Assets<Mesh>>().contains(mesh));
+    assert!(world.resource::<Assets<ColorMaterial>>().contains(material));
+}

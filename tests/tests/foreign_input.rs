@@ -1,0 +1,93 @@
+//! What is said of a foreign game's input, in whatever order.
+
+use bevy::prelude::*;
+use bevy_playbot::virtual_input::{ActionAxis, VirtualInput};
+use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+
+fn bare() -> ForeignGame {
+    ForeignGame::new("bare", 1, |_: &mut App| {}).observe(["nothing"], || [0.0])
+}
+
+const KEYS: [&[KeyCode]; 2] = [&[], &[KeyCode::Space]];
+const MOUSE: [&[MouseButton]; 2] = [&[], &[MouseButton::Left]];
+const PADS: [&[GamepadButton]; 3] = [&[], &[], &[GamepadButton::South]];
+
+fn keys(game: ForeignGame) -> ForeignGame {
+    game.keys(KEYS.map(<[_]>::to_vec))
+}
+
+fn mouse(game: ForeignGame) -> ForeignGame {
+    game.mouse_buttons(MOUSE.map(<[_]>::to_vec))
+}
+
+fn pads(game: ForeignGame) -> ForeignGame {
+    game.gamepad_buttons(PADS.map(<[_]>::to_vec))
+}
+
+/// What the game's agent presses.
+fn pressed(game: &ForeignGame) -> VirtualInput {
+    assert_eq!(game.problem(), None);
+    let (world, agents) = build_world(game, "default", 0, 0, 1);
+    world.get::<VirtualInput>(agents[0]).expect("it presses something").clone()
+}
+
+#[test]
+fn keys_and_buttons_come_in_any_order() {
+    let expected = VirtualInput::keys(KEYS.map(<[_]>::to_vec))
+        .mouse_buttons(MOUSE.map(<[_]>::to_vec))
+        .gamepad_buttons(PADS.map(<[_]>::to_vec));
+    assert_eq!(expected.space(), ActionSpace::Discrete(3));
+    for said in [
+        [keys, mouse, pads],
+        [keys, pads, mouse],
+        [mouse, keys, pads],
+        [mouse, pads, keys],
+        [pads, keys, mouse],
+        [pads, mouse, keys],
+    ] {
+        let game = said.into_iter().fold(bare(), |game, say| say(game));
+        assert_eq!(pressed(&game), expected);
+        assert_eq!(game.actions(), ActionSpace::Discrete(3));
+    }
+    let twice = keys(bare().keys([vec![KeyCode::KeyA]]));
+    assert_eq!(pressed(&twice), VirtualInput::keys(KEYS.map(<[_]>::to_vec)), "what was said last counts");
+}
+
+#[test]
+fn buttons_join_an_input_that_was_said_as_a_whole() {
+    let whole = || VirtualInput::keys(KEYS.map(<[_]>::to_vec));
+    let expected = whole().mouse_buttons(MOUSE.map(<[_]>::to_vec));
+    assert_eq!(pressed(&mouse(bare().input(whole()))), expected);
+    assert_eq!(pressed(&mouse(bare()).input(whole())), expected);
+}
+
+#[test]
+fn what_does_not_go_together_is_told() {
+    let steer = || [ActionAxis::keys([KeyCode::KeyA], [KeyCode::KeyD])];
+    let problem = |game: ForeignGame| game.problem().expect("they do not go together");
+    for game in [bare().axes(steer()).mouse_buttons([vec![MouseButton::Left]]), mouse(bare()).axes(steer())] {
+        let text = problem(game);
+        assert!(text.contains("`bare` has `.mouse_buttons`") && text.contains("`ActionAxis::buttons`"), "{text}");
+    }
+    let text = problem(pads(bare()).input(VirtualInput::axes(steer())));
+    assert!(text.contains("`.gamepad_buttons`"), "{text}");
+    for game in [keys(bare()).axes(steer()), keys(bare().axes(steer()))] {
+        let text = problem(game);
+        assert!(text.contains("has `.keys` and `.axes`") && text.contains("choose one"), "{text}");
+    }
+    // Whoever plays it hears of it.
+    let (mut world, _) = build_world(&keys(bare()).axes(steer()), "default", 0, 0, 1);
+    assert!(world.tick().expect_err("a problem").to_string().contains("`.keys` and `.axes`"));
+}
+
+#[test]
+fn sets_of_buttons_for_continuous_actions_are_a_fault() {
+    let mixed =
+        VirtualInput::axes([ActionAxis::stick(GamepadAxis::LeftStickX)]).gamepad_buttons([vec![GamepadButton::South]]);
+    let (mut world, agents) = build_world(&bare().input(mixed), "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert(Control::Human);
+    assert!(world.tick().is_ok(), "nothing is pressed for people");
+    world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
+    let text = world.tick().expect_err("they mean nothing").to_string();
+    assert!(text.contains("agent 0") && text.contains("`ActionAxis::buttons`"), "{text}");
+}
