@@ -7,7 +7,7 @@ use bevy_playbot::policy_file::policy_observation;
 use playbot_lab::games::Games;
 use playbot_lab::{
     game::Game,
-    policy_export::{export_policy, policy_file},
+    policy_export::{Provenance, export_policy, policy_file},
     train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
 };
 use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
@@ -109,7 +109,8 @@ fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<
         "{} of {} steps on {}, seed {}",
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed
     );
-    let about = (info.algorithm.name().to_owned(), training, code(&info.version, &info.revision));
+    let algorithm = info.algorithm.name().to_owned();
+    let about = Provenance { algorithm, training, code: code(&info.version, &info.revision) };
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
     file.card.game_version = info.game_version;
@@ -125,7 +126,7 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
         Some(demos) => format!("demonstrations in {}", demos.display()),
         None => "demonstrations".to_owned(),
     };
-    let about = ("bc".to_owned(), training, code);
+    let about = Provenance { algorithm: "bc".to_owned(), training, code };
     let observation_config = check_skills(path, &model, game, from, games)?;
     experiment.check_train(game)?;
     let file = policy_file(game, &observation_config, model.policy(), Some(cloning_skills(&model, &experiment)), about);
@@ -133,7 +134,8 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
 }
 
 fn code(version: &str, revision: &str) -> String {
-    format!("{version} ({revision})")
+/// What trained a policy: playbot, whatever the game is, which has a version of its own in the card.
+    format!("playbot {version} ({revision})")
 }
 
 fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliError> {
