@@ -14,19 +14,21 @@ use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
 use serde_json::json;
 
 use super::{
+    compute::Device,
     error::{CliError, Outcome, print_line},
     eval::{check_skills, cloning_skills},
     experiment::{ExperimentArgs, quoted},
     output::prepare,
+    program,
 };
 
 /// Make and look at the policy files that a game ships with.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot policy export --run runs/first --checkpoint best --out coinrun.policy
+  playbot policy export --run runs/first --checkpoint best --out GAME.policy
   playbot policy export --skills skills.safetensors --out clone.policy
-  playbot policy show coinrun.policy
-  playbot eval --policy coinrun.policy")]
+  playbot policy show GAME.policy
+  playbot eval --policy GAME.policy")]
 pub struct Args {
     #[command(subcommand)]
     verb: Verb,
@@ -40,9 +42,8 @@ enum Verb {
     Show {
         /// The file.
         file: PathBuf,
-        /// Where to compute: flex or ndarray.
-        #[arg(long, default_value_t)]
-        device: DeviceKind,
+        #[command(flatten)]
+        device: Device,
         /// Print it as a line of JSON.
         #[arg(long)]
         json: bool,
@@ -73,7 +74,7 @@ struct Export {
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Export(args) => export(&args, games),
-        Verb::Show { file, device, json } => show(&file, device, json),
+        Verb::Show { file, device, json } => show(&file, device.device, json),
     }
 }
 
@@ -90,7 +91,7 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
     check_policy(&game.card(), &file)?;
     export_policy(game, &file, &experiment.train, experiment.seed, &args.out)?;
     let out = args.out.display().to_string();
-    let mut command = format!("playbot eval --policy {}", quoted(&out));
+    let mut command = format!("{} eval --policy {}", program::name(), quoted(&out));
     if experiment.check_test(game).is_ok() {
         command += &format!(" --levels {}", quoted(&experiment.test.to_string()));
     }
@@ -133,8 +134,8 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     Ok((game, experiment, file))
 }
 
-fn code(version: &str, revision: &str) -> String {
 /// What trained a policy: playbot, whatever the game is, which has a version of its own in the card.
+fn code(version: &str, revision: &str) -> String {
     format!("playbot {version} ({revision})")
 }
 
