@@ -1,7 +1,7 @@
 //! Policies that a game ships with: checked against the game, and put to work.
 
 use bevy::prelude::*;
-pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};
+pub use playbot_learner::{DeviceKind, PolicyCard, PolicyFile, SkillSource};
 use thiserror::Error;
 
 use crate::{
