@@ -1,4 +1,4 @@
-//! Maze games for agents that see: the same games with the goal's direction and the distance of the walls around added to
+//! Maze games for agents that know where they are: the same games with the goal's direction and the distance of the walls around added to
 //! what an agent is told.
 //!
 //! In the originals an agent knows its own state only. That will do on one map, which can be learned by heart; in a maze
@@ -14,7 +14,7 @@ use playbot_lab::{
     mode::ModeError,
 };
 
-/// The eight ways that eyes look, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
+/// The eight ways that rays go, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
 /// a turn to the left. North is up in the game's own picture.
 pub const WAYS: [(&str, [f64; 2]); 8] = {
     const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -30,23 +30,23 @@ pub const WAYS: [(&str, [f64; 2]); 8] = {
     ]
 };
 
-/// Adds what eyes see to an observation, in the order of the names: the way to the goal along x and y, then the distance
+/// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the distance
 /// of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
-pub fn add_sights(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
+pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
     observation.vector.extend(to_goal);
     observation.vector.extend(WAYS.map(|(_, way)| wall(way)));
 }
 
-/// A game whose agents can be given eyes.
-pub trait GiveEyes: Game {
-    /// Name of the game with eyes.
-    const SIGHTED: &'static str;
+/// A game in which agents can be told the way to the goal and the distance of the walls.
+pub trait SenseRays: Game {
+    /// Name of the game with rays.
+    const NAME_WITH_RAYS: &'static str;
 
-    /// Adds a system that calls [`add_sights`] for every agent that plays and reads a vector, once that has been filled.
-    fn build_eyes(&self, app: &mut App);
+    /// Adds a system that calls [`push_rays`] for every agent that plays and reads a vector, once that has been filled.
+    fn build_rays(&self, app: &mut App);
 }
 
-/// A game with eyes: the inner one in everything but its name and what its agents observe.
+/// A game with rays: the inner one in everything but its name and what its agents observe.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithRays<G>(pub G);
 
@@ -59,7 +59,7 @@ macro_rules! as_without_rays {
     };
 }
 
-impl<G: GiveEyes> Game for WithRays<G> {
+impl<G: SenseRays> Game for WithRays<G> {
     as_without_rays! {
         fn version() -> u32;
         fn modes() -> &'static [&'static str];
@@ -83,7 +83,7 @@ impl<G: GiveEyes> Game for WithRays<G> {
     }
 
     fn name(&self) -> &'static str {
-        G::SIGHTED
+        G::NAME_WITH_RAYS
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -94,7 +94,7 @@ impl<G: GiveEyes> Game for WithRays<G> {
 
     fn build(&self, app: &mut App, mode: &str) {
         self.0.build(app, mode);
-        self.0.build_eyes(app);
+        self.0.build_rays(app);
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_told_apart_and_go_on_from_those_of_the_blind() {
+    fn names_are_told_apart_and_go_on_from_those_of_the_game_without_rays() {
         let games: [(&dyn Game, usize); 2] = [(&AntMazeWithRays::default(), 29), (&Maze2dWithRays::default(), 4)];
         for (game, own) in games {
             let names = game.observation().names;

@@ -13,7 +13,7 @@ use bevy_playbot::{
 use playbot_games::coinrun::CoinRun;
 use playbot_lab::prelude::*;
 use playbot_lab::{
-    policy_export::{export_policy, policy_file},
+    policy_export::{Provenance, export_policy, policy_file},
     worlds::build_world,
 };
 use playbot_learner::{ActionSpace, DeviceKind, FileError, Learner, PolicySpec, PpoConfig, PpoLearner};
@@ -25,10 +25,14 @@ fn learner(obs_dim: usize) -> PpoLearner {
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid")
 }
 
+fn provenance() -> Provenance {
+    Provenance { algorithm: "ppo".to_owned(), training: "nothing".to_owned(), code: "test".to_owned() }
+}
+
 /// A policy file of an untrained policy, written into `folder`.
 fn exported(folder: &Path) -> std::path::PathBuf {
     let game = CoinRun::default();
-    let about = ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
+    let about = provenance();
     let file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about);
     let path = folder.join("bot.policy");
     export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, &path).expect("writable");
@@ -119,14 +123,13 @@ fn torn_and_foreign_files_are_explained() {
 #[test]
 fn a_policy_of_another_game_names_the_difference() {
     let game = CoinRun::default();
-    let about = || ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
-    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, provenance());
     file.card.observations[7] = "heat".to_owned();
     let error = check_policy(&game.card(), &file).expect_err("another observation");
     assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
     file.card.observations.pop();
     assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
-    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, provenance());
     file.card.actions.swap(1, 7);
     let error = check_policy(&game.card(), &file).expect_err("other actions");
     assert!(matches!(&error, PolicyMisfit::ActionName { at: 1, expected, .. } if expected == "right"), "{error}");

@@ -155,7 +155,7 @@ impl<'a> Runner<'a> {
         let revision = env!("PLAYBOT_REVISION");
         if info.revision != revision {
             let folder = folder.display();
-            tell!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+            tell!("warning: {folder} was made by revision {} of playbot; this is {revision}", info.revision);
         }
         if info.device != self.device {
             tell!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);

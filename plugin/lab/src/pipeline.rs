@@ -36,7 +36,7 @@ use crate::{
     eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
-    policy_export::policy_file,
+    policy_export::{Provenance, policy_file},
     split::LevelSplit,
     train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
     worlds::build_world,
@@ -160,7 +160,10 @@ pub fn evaluate(
 /// [`install_policy`](bevy_playbot::policy_file::install_policy).
 pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
     let experiment = trainer.experiment();
-    let training = format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed);
-    let about = (experiment.algorithm.name().to_owned(), training, env!("CARGO_PKG_VERSION").to_owned());
-    policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), about)
+    let provenance = Provenance {
+        algorithm: experiment.algorithm.name().to_owned(),
+        training: format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed),
+        code: format!("playbot {}", env!("CARGO_PKG_VERSION")),
+    };
+    policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), provenance)
 }

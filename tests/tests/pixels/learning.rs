@@ -7,7 +7,7 @@ use bevy_playbot::{
 };
 use playbot_lab::{
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
-    policy_export::{export_policy, policy_file},
+    policy_export::{Provenance, export_policy, policy_file},
     prelude::*,
     train::{Algorithm, Experiment, Learner, Trainer, checkpoint::Which, run_dir::RunDir},
 };
@@ -49,7 +49,7 @@ fn what_is_learned_from_pictures_survives_its_files() {
     let (run, experiment, info) = RunDir::open(&run).expect("a run");
     let saved = run.checkpoint(Which::Last).expect("saved").learner_file();
     let learner = Learner::load(info.algorithm, &saved, DeviceKind::Flex).expect("as written");
-    let (path, about) = (folder.path().join("eyes.policy"), [(); 3].map(|()| "test".to_owned()).into());
+    let (path, about) = (folder.path().join("pixels.policy"), Provenance::default());
     let file =
         policy_file(&PaintedCorridor, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");

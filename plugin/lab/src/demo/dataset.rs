@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations, Streams, rng::shuffle};
 
 use super::{
-    replay_observations::{Watched, watch},
+    replay_observations::{ObservedEpisode, observe_replays},
     verify::VerifyError,
 };
 use crate::sensors::GameSensors;
@@ -151,13 +151,13 @@ impl Demonstrations {
             return Err(VerifyError::TooLarge { steps, observation_config: self.observation_config, bytes });
         }
         let originals = self.originals();
-        let mut watched = self.watch(game, threads, &originals, &progress)?;
+        let mut observed = self.observe(game, threads, &originals, &progress)?;
         let mut episodes = Vec::new();
         for (i, demo) in self.episodes.iter().enumerate() {
             let observations = if demo.is_seen {
                 progress(demo.episode.len() as u64);
                 Observations::Vector(demo.episode.observations.clone())
-            } else if let Some(observations) = watched.remove(&i) {
+            } else if let Some(observations) = observed.remove(&i) {
                 observations
             } else {
                 // An earlier episode is the same.
@@ -183,7 +183,7 @@ impl Demonstrations {
     }
 
     /// Replays what no file keeps, mode by mode.
-    fn watch(
+    fn observe(
         &self,
         game: &dyn Game,
         threads: usize,
@@ -199,8 +199,8 @@ impl Demonstrations {
         let (mut all, kind) = (BTreeMap::new(), self.observation_config.obs_kind(game));
         all.extend(self.nothing_to_see().map(|i| (i, Observations::empty(&kind))));
         for (mode, jobs) in by_mode {
-            for Watched { id, observations, divergence } in
-                watch(game, &self.observation_config, mode, jobs, threads, progress)?
+            for ObservedEpisode { id, observations, divergence } in
+                observe_replays(game, &self.observation_config, mode, jobs, threads, progress)?
             {
                 if let Some(divergence) = divergence {
                     let Demonstration { file, index, .. } = &self.episodes[id];
