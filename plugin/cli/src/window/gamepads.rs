@@ -36,7 +36,9 @@ fn let_go(mut gamepads: Query<&mut Gamepad, Without<VirtualGamepad>>) {
     for mut gamepad in &mut gamepads {
         gamepad.digital_mut().release_all();
         let moved: Vec<GamepadInput> = gamepad.get_analog_axes().copied().collect();
-        moved.into_iter().for_each(|input| gamepad.analog_mut().set(input, 0.0));
+        for input in moved {
+            gamepad.analog_mut().set(input, 0.0);
+        }
     }
 }
 
