@@ -1,6 +1,6 @@
 //! What can be said on the command line, and who does it.
 
-use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
+use std::{ffi::OsString, io::IsTerminal, panic::AssertUnwindSafe, process::ExitCode};
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use playbot_lab::{game::Game, games::Games};
@@ -182,7 +182,9 @@ fn init_tracing(verbose: u8) {
     let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
+    // Colours are for people.
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     // What cannot be written is not worth a word, which could not be written either.
     let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
-    format.with_writer(std::io::stderr).init();
+    format.with_ansi(colours).with_writer(std::io::stderr).init();
 }

@@ -17,7 +17,7 @@ use playbot_lab::{
 fn main() -> ExitCode {
     playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, game::game)
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
-        .observe((0..29).map(|index| index.to_string()), see)
+        .observe("x y vx vy coyote".split(' ').map(String::from).chain((0..24).map(|i| format!("ahead {i}"))), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
         .end(|on: Res<State<Screen>>| matches!(**on, Won | Lost).then(|| Terminated { success: **on == Won }))
         // With a new context for rapier, whose order would otherwise depend on what was before.
