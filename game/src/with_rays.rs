@@ -1,4 +1,4 @@
-//! Maze games for agents that see: the same games with the goal's direction and the distance of the walls around added to
+//! Maze games for agents that know where they are: the same games with the goal's direction and the distance of the walls around added to
 //! what an agent is told.
 //!
 //! In the originals an agent knows its own state only. That will do on one map, which can be learned by heart; in a maze
@@ -14,7 +14,7 @@ use playbot_lab::{
     mode::ModeError,
 };
 
-/// The eight ways that eyes look, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
+/// The eight ways that rays go, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
 /// a turn to the left. North is up in the game's own picture.
 pub const WAYS: [(&str, [f64; 2]); 8] = {
     const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -30,65 +30,60 @@ pub const WAYS: [(&str, [f64; 2]); 8] = {
     ]
 };
 
-/// Adds what eyes see to an observation, in the order of the names: the way to the goal along x and y, then the distance
+/// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the distance
 /// of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
-pub fn add_sights(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
+pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
     observation.vector.extend(to_goal);
     observation.vector.extend(WAYS.map(|(_, way)| wall(way)));
 }
 
-/// A game whose agents can be given eyes.
-pub trait GiveEyes: Game {
-    /// Name of the game with eyes.
-    const SIGHTED: &'static str;
+/// A game in which agents can be told the way to the goal and the distance of the walls.
+pub trait SenseRays: Game {
+    /// Name of the game with rays.
+    const NAME_WITH_RAYS: &'static str;
 
-    /// Adds a system that calls [`add_sights`] for every agent that plays and reads a vector, once that has been filled.
-    fn build_eyes(&self, app: &mut App);
+    /// Adds a system that calls [`push_rays`] for every agent that plays and reads a vector, once that has been filled.
+    fn build_rays(&self, app: &mut App);
 }
 
-/// A game with eyes: the inner one in everything but its name and what its agents observe.
+/// A game with rays: the inner one in everything but its name and what its agents observe.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithRays<G>(pub G);
 
-impl<G: GiveEyes> Game for WithRays<G> {
+/// Methods of the inner game that are this game's too.
+macro_rules! as_without_rays {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
+        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
+            self.0.$name($($argument),*)
+        })*
+    };
+}
+
+impl<G: SenseRays> Game for WithRays<G> {
+    as_without_rays! {
+        fn version() -> u32;
+        fn modes() -> &'static [&'static str];
+        fn check_mode(mode: &str) -> Result<(), ModeError>;
+        fn family(mode: &str) -> String;
+        fn fingerprint(mode: &str, level: u64) -> Option<u64>;
+        fn tick_hz() -> f64;
+        fn actions() -> ActionSpace;
+        fn action_names() -> Vec<String>;
+        fn key_bindings() -> Option<KeyBindings>;
+        fn picture() -> Option<Picture>;
+        fn build_picture(app: &mut App);
+        fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
+        fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
+        fn blind_bots() -> Vec<(&'static str, BlindBot)>;
+        fn demonstrator() -> Option<&'static str>;
+        fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);
+        fn show_level(request: &LevelRequest) -> Result<LevelView, InspectError>;
+        fn has_space_view() -> bool;
+        fn build_space_view(app: &mut App);
+    }
+
     fn name(&self) -> &'static str {
-        G::SIGHTED
-    }
-
-    fn version(&self) -> u32 {
-        self.0.version()
-    }
-
-    fn modes(&self) -> &'static [&'static str] {
-        self.0.modes()
-    }
-
-    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
-        self.0.check_mode(mode)
-    }
-
-    fn family(&self, mode: &str) -> String {
-        self.0.family(mode)
-    }
-
-    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
-        self.0.fingerprint(mode, level)
-    }
-
-    fn tick_hz(&self) -> f64 {
-        self.0.tick_hz()
-    }
-
-    fn actions(&self) -> ActionSpace {
-        self.0.actions()
-    }
-
-    fn action_names(&self) -> Vec<String> {
-        self.0.action_names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        self.0.key_bindings()
+        G::NAME_WITH_RAYS
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -97,17 +92,9 @@ impl<G: GiveEyes> Game for WithRays<G> {
         ObservationSpace { names: self.0.observation().names.into_iter().chain(goal).chain(walls).collect() }
     }
 
-    fn picture(&self) -> Option<Picture> {
-        self.0.picture()
-    }
-
-    fn build_picture(&self, app: &mut App) {
-        self.0.build_picture(app);
-    }
-
     fn build(&self, app: &mut App, mode: &str) {
         self.0.build(app, mode);
-        self.0.build_eyes(app);
+        self.0.build_rays(app);
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
@@ -116,41 +103,9 @@ impl<G: GiveEyes> Game for WithRays<G> {
         agent
     }
 
-    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        self.0.floor_plan(mode, level)
-    }
-
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        self.0.whereabouts(world, agent)
-    }
-
-    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
-        self.0.blind_bots()
-    }
-
-    fn demonstrator(&self) -> Option<&'static str> {
-        self.0.demonstrator()
-    }
-
-    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
-        self.0.attach_demonstrator(world, agent, noise);
-    }
-
     fn benchmarks(&self) -> Vec<Benchmark> {
         // Measured beside the game that sees less.
         Vec::new()
-    }
-
-    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        self.0.show_level(request)
-    }
-
-    fn has_space_view(&self) -> bool {
-        self.0.has_space_view()
-    }
-
-    fn build_space_view(&self, app: &mut App) {
-        self.0.build_space_view(app);
     }
 }
 
@@ -168,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_told_apart_and_go_on_from_those_of_the_blind() {
+    fn names_are_told_apart_and_go_on_from_those_of_the_game_without_rays() {
         let games: [(&dyn Game, usize); 2] = [(&AntMazeWithRays::default(), 29), (&Maze2dWithRays::default(), 4)];
         for (game, own) in games {
             let names = game.observation().names;

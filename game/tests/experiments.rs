@@ -1,17 +1,24 @@
 //! The experiments that come with the program can be run: names, modes, levels and values fit.
 
-use std::{
-    path::{Path, PathBuf},
-    process::Command,
-};
+#[path = "shared/program.rs"]
+mod program;
 
-use playbot_games::registry;
+use std::path::{Path, PathBuf};
+
+use playbot_games::registry::GAMES;
 use playbot_lab::{
+    game::Game,
+    games::Games,
     held_out::HeldOut,
     split::LevelSplit,
     train::{Experiment, config_file::read_experiment, study::study_runs},
 };
+use program::done;
 use serde_json::Value;
+
+fn game(name: &str) -> &'static dyn Game {
+    Games::new(&GAMES).expect("each has a name of its own").get(name).expect("a game")
+}
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/experiments")
@@ -33,7 +40,7 @@ fn names() -> Vec<String> {
 fn every_experiment_and_every_variant_fits_its_game() {
     for name in names() {
         for run in study_runs(&read(&name)).unwrap_or_else(|error| panic!("{name}: {error}")) {
-            let game = registry::game(&run.experiment.game).expect("a game");
+            let game = game(&run.experiment.game);
             run.experiment.check_levels(game).unwrap_or_else(|error| panic!("{name}, {}: {error}", run.variant));
             run.experiment.score.check_space(game.actions()).unwrap_or_else(|error| panic!("{name}: {error}"));
         }
@@ -45,7 +52,7 @@ fn what_is_held_out_is_not_trained_on_by_another_name() {
     let check = |game: &str, train: &str, test: &str| {
         let (train, test) = (train.parse().expect("a split"), test.parse().expect("a split"));
         let experiment = Experiment { train, test, ..read("maze2d-random") };
-        experiment.check_levels(registry::game(game).expect("a game")).map_err(|error| error.to_string())
+        experiment.check_levels(self::game(game)).map_err(|error| error.to_string())
     };
     for game in ["maze2d", "maze2d-sighted", "antmaze", "antmaze-sighted"] {
         for train in ["random+sparse:0..63", "random+limit=100:50..63", "random+loops=0.3+difficulty=4..8:50..50"] {
@@ -138,7 +145,7 @@ fn demonstrations_are_made_of_the_game_that_is_learned_and_not_of_held_out_level
         let experiment = read(&name);
         assert_eq!(args[0], experiment.game, "{name}");
         let levels: LevelSplit = value(&args, "--levels").parse().expect("a split");
-        let game = registry::game(&args[0]).expect("a game");
+        let game = game(&args[0]);
         game.check_mode(&levels.mode).expect("a mode");
         let hidden = HeldOut::new(game, &experiment.test);
         if args.iter().any(|arg| arg == "--hold-out") {
@@ -152,18 +159,11 @@ fn demonstrations_are_made_of_the_game_that_is_learned_and_not_of_held_out_level
     }
 }
 
-/// Runs the program in a folder.
-fn playbot(folder: &Path, args: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("starts");
-    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
 #[test]
 fn those_who_see_are_recorded_imitated_trained_and_measured() {
     for (name, sees) in [("maze2d-random-hour", 14), ("antmaze-random-hour", 39)] {
         let folder = tempfile::tempdir().expect("a folder");
-        let run = |args: &[&str]| playbot(folder.path(), args);
+        let run = |args: &[&str]| done(folder.path(), args).0;
         let [game, levels, noise] = {
             let args = recorded(name).expect("says how");
             [args[0].clone(), value(&args, "--levels").to_owned(), value(&args, "--noise").to_owned()]
@@ -180,7 +180,7 @@ fn those_who_see_are_recorded_imitated_trained_and_measured() {
         let measured = run(&["eval", "--run", "run", "--levels", &levels, "--episodes-per-level", "1", "--json"]);
         let measured: Value = serde_json::from_str(measured.trim()).expect("a line of JSON");
         assert_eq!(measured["episodes"], 2, "{measured}");
-        let sights = registry::game(&game).expect("a game").observation().len();
+        let sights = self::game(&game).observation().len();
         assert_eq!(sights, sees, "{name} is learned by those who see");
     }
 }

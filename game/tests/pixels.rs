@@ -1,11 +1,12 @@
 //! Learning from pictures by the program, and the experiments that come with it.
 
-use std::{
-    path::Path,
-    process::{Command, Output},
-};
+#[path = "shared/program.rs"]
+mod program;
+
+use std::path::Path;
 
 use playbot_lab::train::config_file::read_experiment;
+use program::{done, ended};
 use serde_json::Value;
 
 const EXPERIMENT: &str = r#"(
@@ -15,18 +16,6 @@ const EXPERIMENT: &str = r#"(
     ppo: (num_steps: 32, minibatches: 2),
     eval: (episodes_per_level: 1),
 )"#;
-
-fn playbot(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
-}
-
-/// What a call that works writes: data and messages.
-fn done(folder: &Path, args: &[&str]) -> (String, String) {
-    let output = playbot(folder, args);
-    let messages = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {messages}");
-    (String::from_utf8_lossy(&output.stdout).into_owned(), messages)
-}
 
 #[test]
 fn the_program_learns_from_pixels_and_knows_its_eyes_again() {
@@ -83,9 +72,7 @@ fn the_program_learns_from_pixels_and_knows_its_eyes_again() {
         ),
         (&["learn-skills", "--out", "t", "--experiment", "small.ron", "--set", "image.width=0"], "width is 0"),
     ] {
-        let output = playbot(folder, args);
-        let messages = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(3), "{args:?}: {messages}");
+        let (_, messages) = ended(folder, args, 3);
         assert!(messages.contains(words), "{args:?}: {messages}");
     }
     assert!(!folder.join("r").exists(), "nothing is begun that cannot work");
@@ -116,6 +103,6 @@ fn the_two_eyes_are_compared_and_the_worst_frame_is_drawn() {
     let table = std::fs::read_to_string(folder.join("eyes/table.md")).expect("written");
     assert!(table.contains("--levels hard:0..3 --frames 4 --out eyes"), "{table}");
     assert!(folder.join("eyes/worst.png").is_file() && folder.join("eyes/results.json").is_file());
-    let strict = playbot(folder, &[&eyes[..], &["--least-close", "1.1"]].concat());
-    assert_eq!(strict.status.code(), Some(1), "no picture is that close");
+    // No picture is that close.
+    ended(folder, &[&eyes[..], &["--least-close", "1.1"]].concat(), 1);
 }

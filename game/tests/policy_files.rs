@@ -1,6 +1,9 @@
 //! Policy files: exported by the program, read back by a game, and refused where they do not fit.
 
-use std::{path::Path, process::Command};
+#[path = "shared/program.rs"]
+mod program;
+
+use std::path::Path;
 
 use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
@@ -10,7 +13,7 @@ use bevy_playbot::{
 use playbot_games::coinrun::CoinRun;
 use playbot_lab::prelude::*;
 use playbot_lab::{
-    policy_export::{export_policy, policy_file},
+    policy_export::{Provenance, export_policy, policy_file},
     worlds::build_world,
 };
 use playbot_learner::{ActionSpace, DeviceKind, FileError, Learner, PolicySpec, PpoConfig, PpoLearner};
@@ -22,10 +25,14 @@ fn learner(obs_dim: usize) -> PpoLearner {
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid")
 }
 
+fn provenance() -> Provenance {
+    Provenance { algorithm: "ppo".to_owned(), training: "nothing".to_owned(), code: "test".to_owned() }
+}
+
 /// A policy file of an untrained policy, written into `folder`.
 fn exported(folder: &Path) -> std::path::PathBuf {
     let game = CoinRun::default();
-    let about = ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
+    let about = provenance();
     let file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about);
     let path = folder.join("bot.policy");
     export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, &path).expect("writable");
@@ -116,14 +123,13 @@ fn torn_and_foreign_files_are_explained() {
 #[test]
 fn a_policy_of_another_game_names_the_difference() {
     let game = CoinRun::default();
-    let about = || ("ppo".to_owned(), "nothing".to_owned(), "test".to_owned());
-    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, provenance());
     file.card.observations[7] = "heat".to_owned();
     let error = check_policy(&game.card(), &file).expect_err("another observation");
     assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
     file.card.observations.pop();
     assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
-    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, about());
+    let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, provenance());
     file.card.actions.swap(1, 7);
     let error = check_policy(&game.card(), &file).expect_err("other actions");
     assert!(matches!(&error, PolicyMisfit::ActionName { at: 1, expected, .. } if expected == "right"), "{error}");
@@ -136,71 +142,52 @@ fn a_policy_of_another_game_names_the_difference() {
 #[test]
 fn the_program_exports_shows_and_measures() {
     let folder = tempfile::tempdir().expect("a folder");
-    let playbot = |args: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder.path()).output();
-        let output = output.expect("the program starts");
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned(), errors)
-    };
+    let done = |args: &[&str]| program::done(folder.path(), args);
+    let refused = |args: &[&str]| program::ended(folder.path(), args, 3).1;
     let experiment = r#"(game: "coinrun", train: "hard:0..3", test: "hard:64..67", demos: "none", steps: 512, arenas: 4,
         ppo: (num_steps: 32, minibatches: 2, hidden: [16]))"#;
     std::fs::write(folder.path().join("small.ron"), experiment).expect("writable");
-    let done = |(code, _, errors): &(Option<i32>, String, String)| assert_eq!(*code, Some(0), "{errors}");
-    done(&playbot(&["train", "--algorithm", "ppo", "--experiment", "small.ron", "--run", "run"]));
-    done(&playbot(&["policy", "export", "--run", "run", "--out", "bot.policy"]));
-    let again = playbot(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
-    assert_eq!(again.0, Some(3));
-    let ignored = playbot(&["policy", "export", "--run", "run", "--set", "seed=2", "--out", "other.policy"]);
-    assert!(ignored.0 == Some(3) && ignored.2.contains("cannot be used with"), "{}", ignored.2);
-    let shown = playbot(&["policy", "show", "bot.policy", "--json"]);
-    done(&shown);
-    let card: Value = serde_json::from_str(&shown.1).expect("JSON");
+    done(&["train", "--algorithm", "ppo", "--experiment", "small.ron", "--run", "run"]);
+    done(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
+    refused(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
+    let ignored = refused(&["policy", "export", "--run", "run", "--set", "seed=2", "--out", "other.policy"]);
+    assert!(ignored.contains("cannot be used with"), "{ignored}");
+    let (shown, _) = done(&["policy", "show", "bot.policy", "--json"]);
+    let card: Value = serde_json::from_str(&shown).expect("JSON");
     assert_eq!(card["card"]["actions"][8], "right+jump");
     assert_eq!(card["card"]["training"], "512 of 512 steps on hard:0..3, seed 1");
     let measure = |args: &[&str]| {
-        let output = playbot(&[&["eval", "--levels", "hard:64..67", "--json", "--seed", "1"], args].concat());
-        done(&output);
-        let row: Value = serde_json::from_str(&output.1).expect("JSON");
+        let (row, _) = done(&[&["eval", "--levels", "hard:64..67", "--json", "--seed", "1"], args].concat());
+        let row: Value = serde_json::from_str(&row).expect("JSON");
         (row["return_mean"].clone(), row["length_mean"].clone())
     };
     let maze = r#"(game: "maze2d", train: "medium:0..3", test: "medium:4..5", demos: "maze.demo", steps: 128, arenas: 4,
         skills: (window: 10, epochs: 1, batch: 16, hidden: [16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
         ppo: (num_steps: 32, minibatches: 2, hidden: [16]), eval: (episodes_per_level: 1))"#;
     std::fs::write(folder.path().join("maze.ron"), maze).expect("writable");
-    done(&playbot(&["record", "maze2d", "--levels", "medium+fixed-start+end-at-goal:9..10", "--out", "maze.demo"]));
-    done(&playbot(&["learn-skills", "--experiment", "maze.ron", "--out", "sk.safetensors"]));
-    done(&playbot(&["train", "--algorithm", "ppo", "--experiment", "maze.ron", "--run", "maze"]));
-    let exported = playbot(&["policy", "export", "--run", "maze", "--out", "maze.policy"]);
-    done(&exported);
+    done(&["record", "maze2d", "--levels", "medium+fixed-start+end-at-goal:9..10", "--out", "maze.demo"]);
+    done(&["learn-skills", "--experiment", "maze.ron", "--out", "sk.safetensors"]);
+    done(&["train", "--algorithm", "ppo", "--experiment", "maze.ron", "--run", "maze"]);
+    let (_, told) = done(&["policy", "export", "--run", "maze", "--out", "maze.policy"]);
     // The words of the advice, as one copies them.
-    let advice = exported.2.split('`').nth(1).expect("a command").to_owned();
+    let advice = told.split('`').nth(1).expect("a command");
     assert_eq!(advice, "playbot eval --policy maze.policy --levels medium:4..5");
     let words: Vec<&str> = advice.split(' ').skip(1).chain(["--episodes-per-level", "1", "--json"]).collect();
-    let measured = playbot(&words);
-    done(&measured);
-    assert!(measured.1.contains("medium:4..5"), "{}", measured.1);
+    let (measured, _) = done(&words);
+    assert!(measured.contains("medium:4..5"), "{measured}");
     for args in [
         &["policy", "export", "--skills", "sk.safetensors", "--out", "clone.policy"][..],
         &["eval", "--skills", "sk.safetensors"],
     ] {
-        let (code, _, errors) = playbot(args);
-        assert_eq!(code, Some(3), "{errors}");
+        let errors = refused(args);
         for words in ["those of maze2d, not of `coinrun`", "--experiment", "--set game=maze2d"] {
             assert!(errors.contains(words), "{errors}");
         }
     }
-    done(&playbot(&[
-        "policy",
-        "export",
-        "--skills",
-        "sk.safetensors",
-        "--experiment",
-        "maze.ron",
-        "--out",
-        "clone.policy",
-    ]));
-    let usual = playbot(&["eval", "--policy", "clone.policy", "--episodes-per-level", "1", "--set", "game=coinrun"]);
-    assert!(usual.0 == Some(3) && usual.2.contains("for the game `maze2d`"), "{}", usual.2);
+    let clone = ["--skills", "sk.safetensors", "--experiment", "maze.ron", "--out", "clone.policy"];
+    done(&[&["policy", "export"], &clone[..]].concat());
+    let usual = refused(&["eval", "--policy", "clone.policy", "--episodes-per-level", "1", "--set", "game=coinrun"]);
+    assert!(usual.contains("for the game `maze2d`"), "{usual}");
 
     assert_eq!(
         measure(&["--policy", "bot.policy", "--experiment", "small.ron"]),

@@ -1,29 +1,11 @@
 //! `playbot train` and `playbot runs` as their users call them: what a run writes down, and how it is looked at.
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+#[path = "shared/program.rs"]
+mod program;
 
-use serde_json::Value;
+use std::{fs, path::Path};
 
-fn playbot(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
-}
-
-/// Standard output and standard error, if the exit code is as expected.
-fn output(folder: &Path, args: &[&str], code: i32) -> (String, String) {
-    let output = playbot(folder, args);
-    let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
-    let (out, err) = (text(output.stdout), text(output.stderr));
-    assert_eq!(output.status.code(), Some(code), "{args:?}: {out}{err}");
-    (out, err)
-}
-
-fn json_lines(text: &str) -> Vec<Value> {
-    text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
-}
+use program::{ended, json_lines};
 
 /// Trains PPO for four updates of 128 steps, three runs: two seeds, and another learning rate.
 fn three_runs(folder: &Path) {
@@ -36,7 +18,7 @@ fn three_runs(folder: &Path) {
     fs::write(folder.join("a.ron"), config("0.001")).expect("writable");
     fs::write(folder.join("b.ron"), config("0.002")).expect("writable");
     for (experiment, seed, run) in [("a.ron", "2", "runs/a/2"), ("a.ron", "1", "runs/a/1"), ("b.ron", "1", "runs/b")] {
-        output(folder, &["train", "--algorithm", "ppo", "--experiment", experiment, "--seed", seed, "--run", run], 0);
+        ended(folder, &["train", "--algorithm", "ppo", "--experiment", experiment, "--seed", seed, "--run", run], 0);
     }
 }
 
@@ -46,27 +28,27 @@ fn runs_are_listed_shown_and_compared() {
     let folder = folder.path();
     three_runs(folder);
 
-    let (listed, _) = output(folder, &["runs", "ls"], 0);
+    let (listed, _) = ended(folder, &["runs", "ls"], 0);
     assert_eq!(listed.lines().filter(|line| line.starts_with("runs/") && line.contains("512")).count(), 3, "{listed}");
-    let rows = json_lines(&output(folder, &["runs", "ls", "--json"], 0).0);
+    let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
     let paths: Vec<_> = rows.iter().filter_map(|row| row["path"].as_str()).collect();
     assert_eq!(paths, ["runs/a/1", "runs/a/2", "runs/b"]);
     assert!(rows.iter().all(|row| row["finished"] == true && row["steps"] == 512 && row["steps_per_s"].is_f64()));
 
-    let (shown, _) = output(folder, &["runs", "show", "runs/b", "--metric", "losses/entropy", "--plot", "b.svg"], 0);
+    let (shown, _) = ended(folder, &["runs", "show", "runs/b", "--metric", "losses/entropy", "--plot", "b.svg"], 0);
     assert!(shown.contains("ppo.lr=0.002") && shown.contains("losses/value_loss"), "{shown}");
     assert!(fs::read_to_string(folder.join("b.svg")).expect("written").contains("losses/entropy"));
-    let all = &json_lines(&output(folder, &["runs", "show", "runs/b", "--json"], 0).0)[0];
+    let all = &json_lines(&ended(folder, &["runs", "show", "runs/b", "--json"], 0).0)[0];
     assert_eq!(all["metrics"]["losses/entropy"]["last"]["step"], 512);
     assert_eq!(all["experiment"]["ppo"]["num_steps"], 16);
 
     let compare = ["runs", "compare", "runs", "--metric", "losses/entropy", "--threshold", "0", "--plot", "c.svg"];
-    let (compared, _) = output(folder, &compare, 0);
+    let (compared, _) = ended(folder, &compare, 0);
     assert!(compared.contains("ppo ppo.lr=0.001") && compared.contains("1 2"), "{compared}");
     assert!(compared.contains("128 (128 to 128)"), "{compared}");
     let svg = fs::read_to_string(folder.join("c.svg")).expect("written");
     assert_eq!((svg.matches("class=\"band").count(), svg.matches("class=\"line").count()), (1, 4), "two are keys");
-    let groups = json_lines(&output(folder, &[&compare[..3], &["--metric", "losses/entropy", "--json"]].concat(), 0).0);
+    let groups = json_lines(&ended(folder, &[&compare[..3], &["--metric", "losses/entropy", "--json"]].concat(), 0).0);
     assert_eq!(groups[0]["group"]["seeds"], serde_json::json!([1, 2]));
     assert!(groups[0]["threshold"].is_null(), "the threshold of an experiment is a success rate");
     let last = |run: &str| -> f64 {
@@ -83,10 +65,10 @@ fn runs_without_an_episode_are_left_out_and_early_ones_say_so() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     three_runs(folder);
-    let (nothing, why) = output(folder, &["runs", "compare", "runs"], 0);
+    let (nothing, why) = ended(folder, &["runs", "compare", "runs"], 0);
     assert!(nothing.is_empty() && why.contains("nothing to compare yet"), "{why}");
     assert!(why.contains("runs/b is left out: it has no charts/success_rate, since no episode has ended"), "{why}");
-    let (_, blank) = output(folder, &["runs", "show", "runs/b", "--plot", "none.svg"], 3);
+    let (_, blank) = ended(folder, &["runs", "show", "runs/b", "--plot", "none.svg"], 3);
     assert!(blank.contains("no episode has ended yet") && !folder.join("none.svg").exists(), "{blank}");
 
     let metrics = |run: &str, episodes: &str, rate: &str| {
@@ -96,11 +78,11 @@ fn runs_without_an_episode_are_left_out_and_early_ones_say_so() {
     };
     metrics("runs/a/1", "40", "0.9");
     metrics("runs/a/2", "200", "0");
-    let (table, warnings) = output(folder, &["runs", "compare", "runs", "--plot", "c.svg"], 0);
+    let (table, warnings) = ended(folder, &["runs", "compare", "runs", "--plot", "c.svg"], 0);
     assert!(warnings.contains("runs/b is left out") && !warnings.contains("runs/a"), "{warnings}");
     assert!(table.contains("never in 1 of 2, too few episodes in 1 of 2"), "{table}");
     metrics("runs/a/1", "200", "0");
-    output(folder, &["runs", "compare", "runs", "--plot", "c.svg"], 0);
+    ended(folder, &["runs", "compare", "runs", "--plot", "c.svg"], 0);
     let svg = fs::read_to_string(folder.join("c.svg")).expect("written");
     assert!(svg.contains(">1.0<") && !svg.contains("−") && !svg.contains(">-"), "a rate lies in 0..1: {svg}");
 }
@@ -119,7 +101,7 @@ fn the_threshold_is_that_of_the_experiments() {
     for run in ["runs/a/1", "runs/a/2", "runs/b"] {
         edit(&format!("{run}/metrics.jsonl"), "losses/entropy", "charts/success_rate");
     }
-    let compare = |more: &[&str]| output(folder, &[&["runs", "compare", "runs", "--json"], more].concat(), 0);
+    let compare = |more: &[&str]| ended(folder, &[&["runs", "compare", "runs", "--json"], more].concat(), 0);
     assert_eq!(json_lines(&compare(&[]).0)[0]["threshold"], 0.25);
     assert_eq!(json_lines(&compare(&["--threshold", "0.5"]).0)[0]["threshold"], 0.5);
     edit("runs/b/experiment.ron", "threshold: 0.25", "threshold: 0.75");
@@ -134,39 +116,39 @@ fn the_threshold_is_that_of_the_experiments() {
 fn damaged_runs_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    let (_, missing) = output(folder, &["runs", "ls"], 3);
+    let (_, missing) = ended(folder, &["runs", "ls"], 3);
     assert!(missing.contains("no folder runs"), "{missing}");
     fs::create_dir_all(folder.join("runs/empty")).expect("created");
-    let (_, nothing) = output(folder, &["runs", "ls"], 3);
+    let (_, nothing) = ended(folder, &["runs", "ls"], 3);
     assert!(nothing.contains("no runs in runs"), "{nothing}");
-    let (_, foreign) = output(folder, &["runs", "show", "runs/empty"], 3);
+    let (_, foreign) = ended(folder, &["runs", "show", "runs/empty"], 3);
     assert!(foreign.contains("is not the folder of a run"), "{foreign}");
 
     three_runs(folder);
     let metrics = folder.join("runs/b/metrics.jsonl");
     let whole = fs::read(&metrics).expect("written");
     fs::write(&metrics, &whole[..whole.len() - 9]).expect("writable");
-    let (shown, torn) = output(folder, &["runs", "show", "runs/b", "--json"], 0);
+    let (shown, torn) = ended(folder, &["runs", "show", "runs/b", "--json"], 0);
     assert!(torn.contains("metrics.jsonl: line 4 is damaged"), "{torn}");
     assert_eq!(json_lines(&shown)[0]["metrics"]["losses/entropy"]["last"]["step"], 384);
-    let (_, unknown) = output(folder, &["runs", "compare", "runs", "--metric", "losses/entrpy"], 3);
+    let (_, unknown) = ended(folder, &["runs", "compare", "runs", "--metric", "losses/entrpy"], 3);
     assert!(unknown.contains("did you mean `losses/entropy`?"), "{unknown}");
 
     fs::write(folder.join("runs/b/run.json"), "{").expect("writable");
-    let (listed, _) = output(folder, &["runs", "ls"], 1);
+    let (listed, _) = ended(folder, &["runs", "ls"], 1);
     assert!(listed.contains("runs/a/1") && listed.contains("damaged: runs/b/run.json"), "{listed}");
-    assert!(json_lines(&output(folder, &["runs", "ls", "--json"], 1).0)[2]["error"].is_string());
-    output(folder, &["runs", "compare", "runs"], 3);
+    assert!(json_lines(&ended(folder, &["runs", "ls", "--json"], 1).0)[2]["error"].is_string());
+    ended(folder, &["runs", "compare", "runs"], 3);
     let forget = |run: &str| {
         for file in ["metrics.jsonl", "timing.jsonl"] {
             fs::remove_file(folder.join(run).join(file)).expect("removed");
         }
     };
     forget("runs/a/1");
-    let (_, partly) = output(folder, &["runs", "compare", "runs/a", "--metric", "losses/entropy"], 0);
+    let (_, partly) = ended(folder, &["runs", "compare", "runs/a", "--metric", "losses/entropy"], 0);
     assert!(partly.contains("runs/a/1 is left out"), "{partly}");
     forget("runs/a/2");
-    let (_, early) = output(folder, &["runs", "compare", "runs/a"], 3);
+    let (_, early) = ended(folder, &["runs", "compare", "runs/a"], 3);
     assert!(early.contains("runs/a/1 has no metrics yet"), "{early}");
 }
 
@@ -194,7 +176,7 @@ fn a_resumed_run_shows_each_update_once_in_tensorboard() {
     };
     let before = events("runs/b");
     assert_eq!(before.len(), 2 + 4, "version, start, four updates");
-    output(folder, &["train", "--run", "runs/b", "--resume", "--steps", "640"], 0);
+    ended(folder, &["train", "--run", "runs/b", "--resume", "--steps", "640"], 0);
     let after = events("runs/b");
     assert_eq!(after.len(), 2 + 5);
     assert!(after[2..6] == before[2..], "the same updates at the same times");

@@ -1,13 +1,17 @@
 //! `playbot study` as its users call it: the same files in one go, after a kill, and when nothing is left to do.
 
+#[path = "shared/program.rs"]
+mod program;
+
 use std::{
     fs,
     io::{BufRead, BufReader},
     path::Path,
-    process::{Command, Output, Stdio},
+    process::{Output, Stdio},
     time::{Duration, Instant},
 };
 
+use program::{code, command, done, errors, playbot, said};
 use serde_json::Value;
 
 const TINY: &str = r#"(
@@ -25,25 +29,19 @@ const TINY: &str = r#"(
     checkpoints: (every: 2),
 )"#;
 
-fn command(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-    command.args(args).current_dir(folder);
-    command
-}
-
 fn study(folder: &Path, runs: &str, more: &[&str]) -> Output {
     let args = ["study", "--experiment", "tiny.ron", "--out", "out", "--runs", runs];
-    command(folder, &[&args, more].concat()).output().expect("the program starts")
+    playbot(folder, &[&args, more].concat())
 }
 
 fn ok(output: Output) -> Output {
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(code(&output), 0, "{}", errors(&output));
     output
 }
 
 fn refused(output: &Output, words: &str) {
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(3), "{errors}");
+    let errors = errors(output);
+    assert_eq!(code(output), 3, "{errors}");
     assert!(errors.contains(words), "{errors}");
 }
 
@@ -53,7 +51,7 @@ fn prepared() -> tempfile::TempDir {
     fs::write(folder.path().join("tiny.ron"), TINY).expect("writable");
     fs::create_dir(folder.path().join("demos")).expect("writable");
     let record = ["record", "coinrun", "--levels", "easy:0..7", "--out", "demos/a.demo"];
-    ok(command(folder.path(), &record).output().expect("the program starts"));
+    done(folder.path(), &record);
     folder
 }
 
@@ -69,7 +67,7 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     let folder = folder.path();
     let whole = ok(study(folder, "whole", &[]));
     let expected = written(folder);
-    let table = String::from_utf8_lossy(&whole.stdout).into_owned();
+    let table = said(&whole);
     assert_eq!(table.lines().count(), 6, "headings, rule and four variants: {table}");
     assert!(
         expected[0].contains(table.trim()) && expected[0].contains("playbot study --experiment tiny.ron --out out")
@@ -157,7 +155,7 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     foreign["revision"] = "another".into();
     fs::write(description("full-seed1"), foreign.to_string()).expect("writable");
     let resumed = ok(small(&["--resume"]));
-    let warnings = String::from_utf8_lossy(&resumed.stderr).into_owned();
+    let warnings = errors(&resumed);
     assert!(warnings.contains("full-seed1 was made by revision another"), "{warnings}");
     assert!(!warnings.contains("plain-seed1 was made"), "{warnings}");
 
@@ -173,9 +171,9 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     let kept = ["old", "old.checkpoint"].map(|name| folder.join(name));
     kept.iter().for_each(|file| fs::write(file, "old").expect("writable"));
     let learn = ["learn-skills", "--experiment", "tiny.ron", "--demos", "nowhere", "--out", "old", "--force"];
-    refused(&command(folder, &learn).output().expect("the program starts"), "nowhere");
+    refused(&playbot(folder, &learn), "nowhere");
     assert!(kept.iter().all(|file| file.exists()), "an unfinished training was lost");
     let learn = ["learn-skills", "--experiment", "tiny.ron", "--out", "old", "--force"];
-    ok(command(folder, &learn).output().expect("the program starts"));
+    done(folder, &learn);
     assert!(kept[0].exists() && !kept[1].exists());
 }

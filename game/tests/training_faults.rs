@@ -1,10 +1,15 @@
 //! Trainings that are killed, run out of disk or run away: nothing that was saved is lost.
 
+#[path = "shared/program.rs"]
+mod program;
+
 use std::{
     path::Path,
-    process::{Command, Output, Stdio},
+    process::{Child, Command, Output, Stdio},
     time::Duration,
 };
+
+use program::{code, command, done, ended, errors, playbot};
 
 const UPDATES: usize = 120;
 
@@ -22,19 +27,32 @@ fn write_experiment(folder: &Path, more: &str) {
     std::fs::write(folder.join("small.ron"), text).expect("writable");
 }
 
-fn train(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-    command.args(["train", "--algorithm", "ppo", "--experiment", "small.ron"]).args(args).current_dir(folder);
-    command
+fn train(folder: &Path, args: &[&str]) -> Output {
+    start(folder, args).output().expect("the program starts")
+}
+
+fn start(folder: &Path, args: &[&str]) -> Command {
+    command(folder, &[&["train", "--algorithm", "ppo", "--experiment", "small.ron"], args].concat())
 }
 
 fn resume(folder: &Path, run: &str) -> Output {
-    let args = ["train", "--resume", "--run", run];
-    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
+    playbot(folder, &["train", "--resume", "--run", run])
 }
 
-fn errors(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+/// Starts the program, and waits until it is at work.
+fn at_work(command: &mut Command, is_at_work: impl Fn() -> bool) -> Child {
+    let mut child = command.stderr(Stdio::null()).spawn().expect("the program starts");
+    while !is_at_work() {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
+        std::thread::park_timeout(Duration::from_millis(1));
+    }
+    child
+}
+
+/// SIGKILL: no handler runs, whatever was being written stays as it is.
+fn kill(mut child: Child) {
+    child.kill().expect("it runs");
+    child.wait().expect("a child");
 }
 
 /// Metrics, and weights and arenas of the last checkpoint.
@@ -63,61 +81,38 @@ fn logged(run: &Path) -> usize {
 fn a_killed_training_goes_on_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a folder");
     write_experiment(folder.path(), "");
-    let whole = train(folder.path(), &["--run", "whole"]).output().expect("the program starts");
+    let whole = train(folder.path(), &["--run", "whole"]);
     assert!(whole.status.success(), "{}", errors(&whole));
 
     let run = folder.path().join("killed");
-    let mut child =
-        train(folder.path(), &["--run", "killed"]).stderr(Stdio::null()).spawn().expect("the program starts");
-    while logged(&run) < 5 {
-        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
-        std::thread::park_timeout(Duration::from_millis(1));
-    }
-    // SIGKILL: no handler runs, whatever was being written stays as it is.
-    child.kill().expect("it runs");
-    child.wait().expect("a child");
+    kill(at_work(&mut start(folder.path(), &["--run", "killed"]), || logged(&run) >= 5));
     assert!(logged(&run) < UPDATES, "it was killed too late to prove anything");
     let resumed = resume(folder.path(), "killed");
     assert!(resumed.status.success(), "{}", errors(&resumed));
     assert!(results(&folder.path().join("whole")) == results(&run), "killing it changed the result");
 }
 
-/// Starts a training and waits until it has logged a few updates.
-fn running(folder: &Path, run: &str) -> std::process::Child {
-    let mut command = train(folder, &["--run", run, "--steps", "100000000"]);
-    let mut child = command.stderr(Stdio::null()).spawn().expect("the program starts");
-    while logged(&folder.join(run)) < 3 {
-        assert!(child.try_wait().expect("a child").is_none(), "it ended early");
-        std::thread::park_timeout(Duration::from_millis(1));
-    }
-    child
-}
-
 #[test]
 fn one_process_at_a_time_trains_in_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     write_experiment(folder.path(), "");
-    let mut child = running(folder.path(), "busy");
     let run = folder.path().join("busy");
+    let mut endless = start(folder.path(), &["--run", "busy", "--steps", "100000000"]);
+    let mut child = at_work(&mut endless, || logged(&run) >= 3);
     let before = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("written"));
-    let second = [
-        resume(folder.path(), "busy"),
-        train(folder.path(), &["--run", "busy", "--force"]).output().expect("the program starts"),
-    ];
-    let looked =
-        Command::new(env!("CARGO_BIN_EXE_playbot")).args(["runs", "ls", "."]).current_dir(folder.path()).output();
+    let second = [resume(folder.path(), "busy"), train(folder.path(), &["--run", "busy", "--force"])];
+    // Who looks needs no lock.
+    done(folder.path(), &["runs", "ls", "."]);
     assert!(child.try_wait().expect("a child").is_none(), "the first one goes on");
     for refused in second {
-        assert_eq!(refused.status.code(), Some(3), "{}", errors(&refused));
+        assert_eq!(code(&refused), 3, "{}", errors(&refused));
         assert!(errors(&refused).contains("busy is in use by another process"), "{}", errors(&refused));
     }
-    assert_eq!(looked.expect("the program starts").status.code(), Some(0), "who looks needs no lock");
     let after = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("still there"));
     assert!(before == after && !steps(&run).is_empty(), "the refused ones touched the run");
-    child.kill().expect("it runs");
-    child.wait().expect("a child");
+    kill(child);
     // Nothing is left of the lock, and the old run makes way as a whole.
-    let forced = train(folder.path(), &["--run", "busy", "--force", "--steps", "256"]).output().expect("it starts");
+    let forced = train(folder.path(), &["--run", "busy", "--force", "--steps", "256"]);
     assert!(forced.status.success(), "{}", errors(&forced));
     assert_eq!((logged(&run), steps(&run).len()), (1, 2));
     let names: Vec<_> =
@@ -132,14 +127,11 @@ fn what_is_no_run_is_never_replaced() {
     let precious = folder.path().join("demos/a.demo");
     std::fs::create_dir(folder.path().join("demos")).expect("writable");
     std::fs::write(&precious, "precious").expect("writable");
-    let forced = train(folder.path(), &["--run", "demos", "--force"]).output().expect("the program starts");
-    assert_eq!(forced.status.code(), Some(3), "{}", errors(&forced));
+    let forced = train(folder.path(), &["--run", "demos", "--force"]);
+    assert_eq!(code(&forced), 3, "{}", errors(&forced));
     assert!(errors(&forced).contains("demos is not the folder of a run"), "{}", errors(&forced));
-    let quick = ["quickstart", "--experiment", "small.ron", "--run", "demos"];
-    let quick = Command::new(env!("CARGO_BIN_EXE_playbot")).args(quick).current_dir(folder.path()).output();
-    let quick = quick.expect("the program starts");
-    assert_eq!(quick.status.code(), Some(3), "{}", errors(&quick));
-    assert!(errors(&quick).contains("demos holds something else"), "{}", errors(&quick));
+    let (_, errors) = ended(folder.path(), &["quickstart", "--experiment", "small.ron", "--run", "demos"], 3);
+    assert!(errors.contains("demos holds something else"), "{errors}");
     let left: Vec<_> = std::fs::read_dir(folder.path().join("demos")).expect("there").flatten().collect();
     assert!(left.len() == 1 && precious.exists(), "{left:?}");
 }
@@ -148,13 +140,11 @@ fn what_is_no_run_is_never_replaced() {
 fn what_does_not_fit_into_memory_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let large = ["observation=Raster", "image.width=512", "image.height=512", "image.stack=8", "ppo.num_steps=1048576"];
-    let sets = || large.iter().flat_map(|set| ["--set", set]);
+    let sets = large.map(|set| ["--set", set]).concat();
     for start in [&["train", "--algorithm", "ppo", "--run", "r"][..], &["quickstart", "--run", "r"]] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-        let output = command.args(start).args(sets()).current_dir(folder.path()).output().expect("the program starts");
-        assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
+        let (_, errors) = ended(folder.path(), &[start, &sets[..]].concat(), 3);
         for words in ["64 arenas × 1048576 steps × 6291456 bytes × 2", "`ppo.num_steps`", "`image.stack`"] {
-            assert!(errors(&output).contains(words), "{}", errors(&output));
+            assert!(errors.contains(words), "{errors}");
         }
     }
     assert!(!folder.path().join("r").exists());
@@ -164,7 +154,7 @@ fn what_does_not_fit_into_memory_is_refused() {
 fn a_torn_checkpoint_is_passed_over_for_the_one_before() {
     let folder = tempfile::tempdir().expect("a folder");
     write_experiment(folder.path(), "");
-    let whole = train(folder.path(), &["--run", "whole"]).output().expect("the program starts");
+    let whole = train(folder.path(), &["--run", "whole"]);
     assert!(whole.status.success(), "{}", errors(&whole));
     let run = folder.path().join("whole");
     let before = results(&run);
@@ -181,8 +171,8 @@ fn a_torn_checkpoint_is_passed_over_for_the_one_before() {
 fn a_training_that_runs_away_names_the_tensor_and_the_last_good_checkpoint() {
     let folder = tempfile::tempdir().expect("a folder");
     write_experiment(folder.path(), "lr: 1e30");
-    let output = train(folder.path(), &["--run", "wild"]).output().expect("the program starts");
-    assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+    let output = train(folder.path(), &["--run", "wild"]);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
     let text = errors(&output);
     assert!(text.contains("is not finite") && text.contains("wild/checkpoints/step-000000000000"), "{text}");
     assert!(text.contains("learning rate"), "{text}");
@@ -195,16 +185,12 @@ fn a_training_that_runs_away_names_the_tensor_and_the_last_good_checkpoint() {
 fn a_full_disk_leaves_the_old_checkpoint() {
     let folder = tempfile::tempdir().expect("a folder");
     write_experiment(folder.path(), "");
-    let start = train(folder.path(), &["--run", "full", "--steps", "512"]).output().expect("the program starts");
+    let start = train(folder.path(), &["--run", "full", "--steps", "512"]);
     assert!(start.status.success(), "{}", errors(&start));
     let run = folder.path().join("full");
     let (before, results_before) = (steps(&run), results(&run));
-    let limited = format!(
-        "trap '' XFSZ; ulimit -f 64; exec {} train --resume --run full --steps 5120",
-        env!("CARGO_BIN_EXE_playbot")
-    );
-    let output = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().expect("a shell");
-    assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+    let output = program::on_full_disk(folder.path(), 64, "train --resume --run full --steps 5120");
+    assert_eq!(code(&output), 2, "{}", errors(&output));
     let text = errors(&output);
     assert!(text.contains("learner.safetensors") && text.contains("--resume"), "{text}");
     assert_eq!(steps(&run), before, "the old checkpoints are still there and no new one is");
@@ -216,37 +202,22 @@ fn a_full_disk_leaves_the_old_checkpoint() {
 #[test]
 fn a_killed_skill_training_goes_on_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a folder");
-    let playbot = |args: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-        command.args(args).current_dir(folder.path());
-        command
+    let sets = ["hidden=[16]", "encoder_hidden=8", "gru_hidden=8", "window=5", "epochs=200"];
+    let sets = sets.map(|set| format!("--set=skills.{set}"));
+    let learn = |out: &'static str, more: &[&'static str]| {
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        [&["learn-skills", "--demos", "few.demo", "--out", out], &sets[..], more].concat()
     };
-    let done = |mut command: Command| {
-        let output = command.output().expect("the program starts");
-        assert!(output.status.success(), "{}", errors(&output));
-    };
-    let learn = |out: &str, more: &[&str]| {
-        let sets = ["hidden=[16]", "encoder_hidden=8", "gru_hidden=8", "window=5", "epochs=200"];
-        let mut command = playbot(&["learn-skills", "--demos", "few.demo", "--out", out]);
-        command.args(sets.iter().flat_map(|set| ["--set".to_owned(), format!("skills.{set}")])).args(more);
-        command
-    };
-    done(playbot(&["record", "coinrun", "--levels", "easy:0..9", "--out", "few.demo"]));
-    done(learn("whole", &[]));
+    done(folder.path(), &["record", "coinrun", "--levels", "easy:0..9", "--out", "few.demo"]);
+    done(folder.path(), &learn("whole", &[]));
     let checkpoint = folder.path().join("killed.checkpoint");
-    let mut child = learn("killed", &[]).stderr(Stdio::null()).spawn().expect("the program starts");
-    while !checkpoint.exists() {
-        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
-        std::thread::park_timeout(Duration::from_millis(1));
-    }
-    child.kill().expect("it runs");
-    child.wait().expect("a child");
+    kill(at_work(&mut command(folder.path(), &learn("killed", &[])), || checkpoint.exists()));
     assert!(checkpoint.exists() && !folder.path().join("killed").exists(), "it was killed too late");
-    let refused = learn("killed", &[]).output().expect("the program starts");
-    assert!(errors(&refused).contains("--resume") && refused.status.code() == Some(3), "{}", errors(&refused));
-    let other = learn("killed", &["--resume", "--set", "skills.lr=0.5"]).output().expect("the program starts");
-    assert!(errors(&other).contains("other settings") && other.status.code() == Some(3), "{}", errors(&other));
-    done(learn("killed", &["--resume"]));
+    let (_, refused) = ended(folder.path(), &learn("killed", &[]), 3);
+    assert!(refused.contains("--resume"), "{refused}");
+    let (_, other) = ended(folder.path(), &learn("killed", &["--resume", "--set", "skills.lr=0.5"]), 3);
+    assert!(other.contains("other settings"), "{other}");
+    done(folder.path(), &learn("killed", &["--resume"]));
     let read = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
     assert!(read("whole") == read("killed"), "killing it changed the result");
     assert!(!checkpoint.exists(), "nothing is left over");
@@ -255,15 +226,8 @@ fn a_killed_skill_training_goes_on_bit_for_bit() {
 #[test]
 fn recordings_that_are_too_short_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let playbot = |args: &[&str]| {
-        Command::new(env!("CARGO_BIN_EXE_playbot"))
-            .args(args)
-            .current_dir(folder.path())
-            .output()
-            .expect("the program starts")
-    };
-    assert!(playbot(&["record", "coinrun", "--levels", "easy:0..0", "--out", "one.demo"]).status.success());
-    let output = playbot(&["learn-skills", "--demos", "one.demo", "--out", "skills", "--set", "skills.window=900"]);
-    assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
-    assert!(errors(&output).contains("window of 900 steps"), "{}", errors(&output));
+    done(folder.path(), &["record", "coinrun", "--levels", "easy:0..0", "--out", "one.demo"]);
+    let learn = ["learn-skills", "--demos", "one.demo", "--out", "skills", "--set", "skills.window=900"];
+    let (_, errors) = ended(folder.path(), &learn, 3);
+    assert!(errors.contains("window of 900 steps"), "{errors}");
 }

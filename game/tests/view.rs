@@ -1,27 +1,17 @@
 //! Pictures from the command line.
 
-use std::{
-    fs::File,
-    io::BufReader,
-    path::Path,
-    process::{Command, Output},
-};
+#[path = "shared/program.rs"]
+mod program;
 
+use std::{fs::File, io::BufReader, path::Path};
+
+use program::{done, ended};
 use serde_json::Value;
-
-fn playbot(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 /// What `playbot ARGS --json` says of the picture that it has written.
 fn written(folder: &Path, args: &[&str]) -> Value {
-    let output = playbot(folder, &[args, &["--json"]].concat());
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", errors(&output));
-    serde_json::from_slice(&output.stdout).expect("a line of JSON")
+    let (line, _) = done(folder, &[args, &["--json"]].concat());
+    serde_json::from_str(&line).expect("a line of JSON")
 }
 
 /// A PNG: width, height and its frames in red, green and blue, each with the seconds it is shown.
@@ -138,8 +128,7 @@ fn an_episode_becomes_a_moving_picture() {
 fn recordings_and_policies_can_be_watched() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |args: &[&str]| {
-        let output = playbot(folder.path(), args);
-        assert_eq!(output.status.code(), Some(0), "{args:?}: {}", errors(&output));
+        done(folder.path(), args);
     };
     run(&["record", "coinrun", "--levels", "easy:3..6", "--noise", "0.2", "--out", "demos/a.demo"]);
     let demo = ["view", "coinrun", "--demo", "demos/a.demo", "--episode-number", "2", "--episode", "--scale", "1"];
@@ -171,9 +160,7 @@ fn recordings_and_policies_can_be_watched() {
 #[test]
 fn a_level_can_be_drawn_as_a_whole() {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = playbot(folder.path(), &["level", "coinrun", "--seed", "2", "--png", "level.png"]);
-    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
-    let text = String::from_utf8(output.stdout).expect("Unicode");
+    let (text, _) = done(folder.path(), &["level", "coinrun", "--seed", "2", "--png", "level.png"]);
     let rows: Vec<&str> = text.lines().filter(|line| line.starts_with(['#', '='])).collect();
     let picture = read(&folder.path().join("level.png"));
     assert_eq!(picture.size, (16 * rows[0].len(), 16 * rows.len()), "{text}");
@@ -211,9 +198,8 @@ fn bad_wishes_are_refused_in_words() {
         (&["--out", "."], 3, "written as .png"),
         (&["--out", "x.jpg"], 3, "written as .png"),
     ] {
-        let output = playbot(folder.path(), &[&["view", "coinrun"], args].concat());
-        assert_eq!(output.status.code(), Some(code), "{args:?}: {}", errors(&output));
-        assert!(errors(&output).contains(words), "{args:?}: {}", errors(&output));
+        let (_, errors) = ended(folder.path(), &[&["view", "coinrun"], args].concat(), code);
+        assert!(errors.contains(words), "{args:?}: {errors}");
     }
     assert!(!folder.path().join("view.png").exists());
 }

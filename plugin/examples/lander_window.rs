@@ -1,22 +1,25 @@
 //! A game with a window that ships with a policy, on `bevy_playbot` alone: land a capsule softly.
 //!
-//! `cargo run --release -p bevy_playbot --features camera,window,bevy/x11 --example lander_window [-- FILE.policy]`
+//! `cargo run --release -p bevy_playbot --features camera,window --example lander_window [-- FILE.policy]`
 //!
-//! The policy plays; F9 gives you the controls, of which there is one (space burns), and takes them back. `PLAYBOT`
-//! records or replays instead. The policy was made by `playbot_lab`'s example `lander`.
+//! The policy is part of the program, and plays; F9 gives you the controls, of which there is one (space burns), and takes
+//! them back. A file, or `PLAYBOT`, lets another policy play, or records or replays instead. The policy was made by
+//! `playbot_lab`'s example `lander`.
 
-mod lander_rules;
-
-use std::path::PathBuf;
+pub mod lander_rules;
 
 use bevy::prelude::*;
 use bevy_playbot::{
     headless::set_fixed_step,
+    policy_file::{DeviceKind, GameCard, PolicyFile, check_policy, install_policy},
     prelude::*,
     takeover::{GameIdentity, TakeoverPlugin, TakeoverRequest},
 };
 
-use lander_rules::rules::{Capsule, TICK_HZ, add_rules, capsule};
+use lander_rules::rules::{Capsule, OBSERVATION, TICK_HZ, add_rules, capsule};
+
+/// The policy that the game ships with.
+const SHIPPED: &[u8] = include_bytes!("lander.policy");
 
 /// Pixels per metre.
 const SCALE: f32 = 10.0;
@@ -24,12 +27,15 @@ const SCALE: f32 = 10.0;
 const GROUND: f32 = 280.0;
 
 fn main() -> AppExit {
-    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/models/lander.policy");
-    let policy = std::env::args_os().nth(1).map_or_else(|| shipped.into(), PathBuf::from);
     // What `PLAYBOT` says goes first.
     let mut takeover = TakeoverPlugin::new(GameIdentity::new("lander", 1).with_mode("moon"));
-    if takeover.request.is_none() {
-        takeover = takeover.with_request(TakeoverRequest::Policy(policy));
+    if let (None, Some(file)) = (&takeover.request, std::env::args_os().nth(1)) {
+        takeover = takeover.with_request(TakeoverRequest::Policy(file.into()));
+    }
+    let ships_alone = takeover.request.is_none();
+    if ships_alone {
+        // The key is for the policy that is part of the program.
+        takeover.key = None;
     }
     let window = Window { title: "Lander: space burns, F9 takes over".to_owned(), ..default() };
     let mut app = App::new();
@@ -39,16 +45,53 @@ fn main() -> AppExit {
         .add_systems(Update, draw);
     set_fixed_step(&mut app, TICK_HZ);
     add_rules(&mut app);
+    if ships_alone && let Err(error) = add_shipped_policy(&mut app) {
+        error!("{error}");
+        return AppExit::error();
+    }
     app.run()
 }
 
-fn setup(mut commands: Commands) {
+/// Lets the policy that is part of the program play agents under [`Control::Policy`], and F9 give them to a person.
+///
+/// # Errors
+///
+/// The file is damaged, or was made for other rules.
+pub fn add_shipped_policy(app: &mut App) -> Result<(), Box<dyn std::error::Error>> {
+    let file = PolicyFile::from_bytes("lander.policy".as_ref(), SHIPPED, DeviceKind::default())?;
+    let card = GameCard {
+        name: "lander",
+        version: 1,
+        observations: OBSERVATION.map(String::from).into(),
+        actions: ActionSpace::Discrete(2),
+        action_names: Vec::new(),
+        has_picture: false,
+    };
+    check_policy(&card, &file)?;
+    install_policy(app.world_mut(), &file, ActionDraw::Sample);
+    app.add_systems(Update, hand_over);
+    Ok(())
+}
+
+/// Between two ticks, F9 gives the controls to whoever does not have them.
+fn hand_over(keys: Option<Res<ButtonInput<KeyCode>>>, mut capsules: Query<(&mut Control, &mut ActiveSkill)>) {
+    if keys.is_none_or(|keys| !keys.just_pressed(KeyCode::F9)) {
+        return;
+    }
+    for (mut control, mut skill) in &mut capsules {
+        *control = if *control == Control::Policy { Control::Human } else { Control::Policy };
+        // A skill that was drawn for another state says nothing about this one.
+        skill.ticks_left = 0;
+    }
+}
+
+fn setup(mut commands: Commands, shipped: Option<Res<ActivePolicy>>) {
     commands.spawn(Camera2d);
     let ground = Sprite::from_color(Color::srgb(0.4, 0.4, 0.4), Vec2::new(2000.0, 40.0));
     commands.spawn((ground, Transform::from_xyz(0.0, -GROUND - 20.0, 0.0)));
     commands.spawn((
         capsule(0),
-        Control::Human,
+        if shipped.is_some() { Control::Policy } else { Control::Human },
         KeyBindings::of_sets(&[vec![], vec![KeyCode::Space]]),
         LevelQueue::Uniform { first: 64, last: 127 },
         Sprite::from_color(Color::WHITE, Vec2::new(24.0, 36.0)),

@@ -59,7 +59,7 @@ impl Action {
 
 /// Gives every agent an action.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Action>().register_type::<Action>();
+    app.register_required_components::<Agent, Action>();
 }
 
 /// Why an action does not belong to its space, or `None` if it does.
@@ -91,7 +91,7 @@ pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)
             continue;
         }
         if let Some(why) = misfit(&action.0, &agent.actions) {
-            faults.report(format!("agent {}, level {}, tick {}: {why}", agent.index, episode.level, episode.tick));
+            faults.report(format!("{}: {why}", episode.moment(agent)));
             *control = Control::Idle;
         }
     }

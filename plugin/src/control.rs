@@ -34,6 +34,11 @@ pub enum Control {
 }
 
 impl Control {
+    /// Who decides for an agent now; [`Idle`](Self::Idle) for an entity that is none.
+    pub fn of(world: &World, agent: Entity) -> Self {
+        world.get::<Self>(agent).copied().unwrap_or_default()
+    }
+
     /// Whether somebody decides, so that the game goes on.
     pub fn is_active(self) -> bool {
         self != Self::Idle

@@ -149,6 +149,11 @@ impl Episode {
         self.state == EpisodeState::Loading
     }
 
+    /// Where it stands, as messages have it: `agent 0, level 3, tick 7`.
+    pub fn moment(&self, agent: &Agent) -> String {
+        format!("agent {}, level {}, tick {}", agent.index, self.level, self.tick)
+    }
+
     /// Leaves the level at once, without a result; the next one starts with the next tick.
     pub fn abandon(&mut self) {
         self.state = EpisodeState::Waiting;
@@ -205,12 +210,7 @@ pub struct EpisodeCount {
 
 /// Gives every agent an episode.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Episode>()
-        .register_required_components::<Agent, EpisodeCount>()
-        .register_type::<Episode>()
-        .register_type::<EpisodeCount>()
-        .register_type::<EpisodeEnd>()
-        .register_type::<EpisodeResult>();
+    app.register_required_components::<Agent, Episode>().register_required_components::<Agent, EpisodeCount>();
 }
 
 /// Starts an episode for every agent that waits for one and is not idle.
@@ -247,13 +247,8 @@ pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &mut Reward, &mut Episo
             continue;
         }
         if !reward.get().is_finite() {
-            faults.report(format!(
-                "agent {}, level {}, tick {}: the reward is {}; the game must not produce it",
-                agent.index,
-                episode.level,
-                episode.tick,
-                reward.get()
-            ));
+            let (moment, reward) = (episode.moment(agent), reward.get());
+            faults.report(format!("{moment}: the reward is {reward}; the game must not produce it"));
         }
         episode.tick += 1;
         episode.total_reward += f64::from(reward.get());

@@ -32,7 +32,7 @@ use crate::{
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
-    renewal, system_errors,
+    renewal, system_errors, system_order,
     tick::Tick,
 };
 
@@ -89,13 +89,17 @@ pub fn set_frame_rate(app: &mut App, hz: f64) {
 /// panic.
 ///
 /// Schedules are set to run on the thread that calls them: Bevy's own threads cost more than they bring in a World of
-/// this size, and several Worlds side by side use the cores better.
+/// this size, and several Worlds side by side use the cores better. Where ticks are frames, the game may have left the order
+/// of its systems open: they get one.
 #[doc(hidden)]
 pub fn into_world(mut app: App) -> World {
     app.finish();
     app.cleanup();
     for (_, schedule) in app.world_mut().resource_mut::<Schedules>().iter_mut() {
         schedule.set_executor(SingleThreadedExecutor::new());
+    }
+    if app.world().contains_resource::<FrameGate>() {
+        system_order::put_in_order(app.world_mut());
     }
     system_errors::listen(app.world_mut());
     std::mem::take(app.world_mut())

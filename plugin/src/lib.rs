@@ -106,7 +106,6 @@ pub mod policy;
 pub mod policy_file;
 pub mod prelude;
 pub mod raster;
-mod reflect;
 pub mod renewal;
 pub mod reward;
 pub mod skill_prior;
@@ -114,6 +113,8 @@ pub mod state_hash;
 pub mod streams;
 #[doc(hidden)]
 pub mod system_errors;
+#[doc(hidden)]
+pub mod system_order;
 pub mod systems;
 pub mod takeover;
 pub mod test_app;

@@ -104,9 +104,7 @@ impl Observation {
 
 /// Gives every agent an observation.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Observation>()
-        .register_type::<Observation>()
-        .register_type::<VectorSensor>();
+    app.register_required_components::<Agent, Observation>();
 }
 
 /// Empties a batch for observations of a kind, and keeps its memory where it can.
@@ -127,16 +125,15 @@ pub(crate) fn check_observations(
             continue;
         }
         let (expected, got) = (sensor.space.len(), observation.vector.len());
-        let at = || format!("agent {}, level {}, tick {}", agent.index, episode.level, episode.tick);
         if got != expected {
             faults.report(format!(
                 "{}: the observation has {got} values, its sensor names {expected}; fill every value each tick",
-                at()
+                episode.moment(agent)
             ));
         } else if let Some(bad) = first_non_finite(&observation.vector) {
             faults.report(format!(
                 "{}: observation `{}` is {}; the game must not produce it",
-                at(),
+                episode.moment(agent),
                 sensor.space.names[bad],
                 observation.vector[bad]
             ));

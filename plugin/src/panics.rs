@@ -148,7 +148,7 @@ fn report(world: &mut World, words: &str) -> String {
         if !control.is_active() || !(episode.is_running() || episode.is_loading()) {
             continue;
         }
-        at.push(format!("agent {}, level {}, tick {}", agent.index, episode.level, episode.tick));
+        at.push(episode.moment(agent));
         let trace = world.get::<EpisodeTrace>(entity).and_then(|trace| trace.0.clone());
         episodes.push(whole(trace.filter(|_| episode.is_running()), agent, episode));
     }

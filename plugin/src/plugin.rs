@@ -19,7 +19,7 @@ use crate::{
     fault::{FaultSystems, Faults, announce_faults},
     observation,
     placement::{self, FrameGate, TickPlacement, TickSchedules},
-    policy, reflect, reward, skill_prior, streams,
+    policy, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
     tick, vision,
 };
@@ -39,7 +39,7 @@ impl Plugin for PlaybotPlugin {
             .init_resource::<Faults>()
             .init_resource::<tick::Tick>()
             .add_plugins((action::plugin, episode::plugin, observation::plugin))
-            .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin, reflect::plugin))
+            .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin))
             .init_schedule(ObserveSchedule)
             .add_systems(Last, announce_faults.in_set(FaultSystems).after(PlaybotSystems::Reset));
         let schedules = TickSchedules::new(self.placement);
@@ -128,4 +128,23 @@ fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
             episode::end_episodes.in_set(PlaybotSystems::Reset),
         ),
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{agent::Agent, headless::headless_app};
+
+    #[test]
+    fn inspectors_know_everything_that_agents_have() {
+        let mut app = headless_app();
+        let agent = app.world_mut().spawn(Agent::new(0, playbot_learner::ActionSpace::Discrete(2))).id();
+        let registry = app.world().resource::<AppTypeRegistry>().read();
+        let components: Vec<_> = app.world().inspect_entity(agent).expect("it is there").collect();
+        assert!(components.len() > 10, "an agent has {}", components.len());
+        for component in components {
+            let is_known = component.type_id().is_some_and(|id| registry.contains(id));
+            assert!(is_known, "{} is not registered", component.name());
+        }
+    }
 }

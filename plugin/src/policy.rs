@@ -73,10 +73,7 @@ pub struct Decision {
 
 /// What a policy adds to every agent.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Decision>()
-        .register_type::<ActivePolicy>()
-        .register_type::<ActionDraw>()
-        .register_type::<Decision>();
+    app.register_required_components::<Agent, Decision>();
 }
 
 /// Reused memory of [`run_policy`]: the rows of one batch.

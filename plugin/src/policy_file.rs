@@ -36,7 +36,7 @@
 //! ```
 
 use bevy::prelude::*;
-pub use playbot_learner::{PolicyCard, PolicyFile, SkillSource};
+pub use playbot_learner::{DeviceKind, PolicyCard, PolicyFile, SkillSource};
 use thiserror::Error;
 
 use crate::{

@@ -64,9 +64,7 @@ pub struct ActiveSkill {
 
 /// What skills add to every agent.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, ActiveSkill>()
-        .register_type::<SkillPrior>()
-        .register_type::<ActiveSkill>();
+    app.register_required_components::<Agent, ActiveSkill>();
 }
 
 /// No skill outlives its episode: the first tick of the next one draws anew, whoever plays it.

@@ -27,10 +27,7 @@ use crate::agent::Agent;
 
 /// Gives every agent its streams.
 pub(crate) fn plugin(app: &mut App) {
-    app.init_resource::<PlaybotSeed>()
-        .register_required_components::<Agent, AgentStreams>()
-        .register_type::<PlaybotSeed>()
-        .register_type::<AgentStreams>();
+    app.init_resource::<PlaybotSeed>().register_required_components::<Agent, AgentStreams>();
 }
 
 /// Seed from which all streams of random numbers of this World come.

@@ -4,10 +4,13 @@ mod corridor;
 mod documentation;
 pub mod faulty;
 pub mod foreign;
+pub mod measuring;
 pub mod memory;
 mod painted;
+pub mod recording;
 pub mod scene;
 pub mod soak;
+pub mod training;
 
 pub use corridor::{Cell, Corridor, Drift, PoisonAt, corridor_plugin, spawn_walker};
 pub use painted::PaintedCorridor;

@@ -5,17 +5,19 @@ use bevy::{
     prelude::*,
     winit::EventLoopProxyWrapper,
 };
-use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{
     demo::verify::verify_file,
-    eval::{EvalPlan, Player, evaluate},
+    eval::{Player, evaluate},
     foreign::{ForeignGame, Restart},
     prelude::*,
     train::{Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
-use playbot_tests::foreign::catch::{Paddle, Score, catch_game, game};
+use playbot_tests::{
+    foreign::catch::{Paddle, Score, catch_game, game},
+    measuring::plan,
+};
 
 /// Plays until something is wrong, for at most this many ticks.
 fn fault(game: &ForeignGame, ticks: u64) -> String {
@@ -23,19 +25,6 @@ fn fault(game: &ForeignGame, ticks: u64) -> String {
     let bot = BlindBot::Constant(ActionValue::Discrete(1));
     world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::Always(3)));
     world.ticks(ticks).expect_err("something is wrong").to_string()
-}
-
-fn plan() -> EvalPlan {
-    let split = "default:0..3".parse().expect("a split");
-    EvalPlan {
-        split,
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 2,
-        worlds: 1,
-        threads: 1,
-    }
 }
 
 /// The game with something more.
@@ -51,7 +40,8 @@ fn catch_game_with(more: fn(&mut App)) -> ForeignGame {
 fn a_game_without_actions_is_refused() {
     let mute = ForeignGame::new("mute", 1, game).observe(["x"], || [0.0]);
     assert!(fault(&mute, 1).contains("`mute` has no actions: say what an agent can do, for instance with `.keys`"));
-    let error = evaluate(&mute, &Player::Blind(BlindBot::Uniform), &plan(), |_| {}).expect_err("no actions");
+    let error =
+        evaluate(&mute, &Player::Blind(BlindBot::Uniform), &plan("default:0..3"), |_| {}).expect_err("no actions");
     assert!(error.to_string().contains("has no actions"), "{error}");
     let experiment =
         r#"(game: "mute", train: "default:0..3", test: "default:4..7", demos: "x", steps: 9000, algorithm: "ppo")"#;
@@ -188,9 +178,8 @@ fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
     assert!(error.contains("tick 4") && error.contains("the paddle has left the field"), "{error}");
     std::fs::remove_file(path).expect("it was there");
     // Measuring gets the error too, from whichever thread.
-    let plan = EvalPlan { threads: 2, ..plan() };
     let player = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
-    let error = evaluate(&bomb(), &player, &plan, |_| {}).expect_err("panics").to_string();
+    let error = evaluate(&bomb(), &player, &plan("default:0..3"), |_| {}).expect_err("panics").to_string();
     assert!(error.contains("the paddle has left the field"), "{error}");
 }
 

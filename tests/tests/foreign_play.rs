@@ -3,49 +3,29 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use bevy_playbot::{demo::file::DemoWriter, tick::Tick, vision::ObservationConfig};
+use bevy_playbot::{tick::Tick, vision::ObservationConfig};
 use playbot_lab::{
     demo::{dataset::Demonstrations, verify::verify_file},
     eval::{EvalPlan, Player, evaluate, summarize},
     foreign::ForeignGame,
     prelude::*,
-    train::{
-        Algorithm, Experiment, Trainer,
-        checkpoint::Which,
-        config_file::parse_experiment,
-        run_dir::{RunDir, RunInfo},
-    },
+    train::{Trainer, config_file::parse_experiment, run_dir::RunDir},
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
-use playbot_tests::foreign::{
-    catch::{Apple, catch_game},
-    rooms::{PlayedFrames, Stage, rooms_game},
+use playbot_tests::{
+    foreign::{
+        catch::{Apple, catch_game},
+        rooms::{PlayedFrames, Stage, rooms_game},
+        traces,
+    },
+    measuring::plan,
+    recording::record_demonstrator,
+    training::{check_resuming, train},
 };
 
-/// Records the demonstrator for these levels.
-fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>, noise: f64) {
-    let header = game.demo_header("default");
-    let (mut world, agents) = build_world(game, "default", 5, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
-    game.attach_demonstrator(&mut world, agents[0], noise);
-    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list(levels)));
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
-        world.tick().expect("sound");
-    }
-}
-
 fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32, f64)> {
-    let split: LevelSplit = "default:0..7".parse().expect("a split");
-    let plan = EvalPlan {
-        split,
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 4,
-        worlds: 2,
-        threads,
-    };
+    let plan = EvalPlan { threads, ..plan("default:0..7") };
     let results = evaluate(game, &player, &plan, |_| {}).expect("can be played");
     assert_eq!(results.len(), 8);
     let summary = summarize("player", &plan.split, &results);
@@ -70,7 +50,7 @@ fn recordings_replay_and_are_learned_from() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("catch.demo");
     // Three rounds, so that episodes also follow each other in one World, which a replay does in another order.
-    record(&catch_game(), &path, (0..9).chain(0..3).collect(), 0.3);
+    record_demonstrator(&catch_game(), "default", 0.3, &path, (0..9).chain(0..3));
     let report = verify_file(&catch_game(), &path, |_| {}).expect("readable");
     assert_eq!((report.episodes, &report.divergences), (12, &Vec::new()));
     let demos = Demonstrations::read(&catch_game(), &ObservationConfig::default(), &path, None).expect("readable");
@@ -87,7 +67,7 @@ fn states_and_loading_screens_pass_before_the_first_tick() {
     world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([1, 2, 3])));
     let mut lengths = Vec::new();
     let mut count = 0;
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+    while Control::of(&world, agents[0]).is_active() {
         let ended = world.get::<EpisodeCount>(agents[0]).expect("an agent").finished;
         world.tick().expect("sound");
         count += 1;
@@ -108,19 +88,7 @@ fn states_and_loading_screens_pass_before_the_first_tick() {
 #[test]
 fn the_first_episode_and_a_later_one_of_a_level_are_the_same() {
     for game in [catch_game(), rooms_game()] {
-        let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
-        let bot = BlindBot::Constant(ActionValue::Discrete(1));
-        world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::rounds([5, 8])));
-        let mut traces = vec![Vec::new()];
-        while traces.len() < 5 {
-            let ended = world.get::<EpisodeCount>(agents[0]).expect("an agent").finished;
-            world.tick().expect("sound");
-            let hash = world.get::<StateHash>(agents[0]).expect("an agent").0;
-            traces.last_mut().expect("never empty").push(hash);
-            if world.get::<EpisodeCount>(agents[0]).expect("an agent").finished > ended {
-                traces.push(Vec::new());
-            }
-        }
+        let traces = traces(&game, 1, &[5, 8, 5, 8]);
         assert_eq!(traces[0], traces[2], "{}: level 5", game.name());
         assert_eq!(traces[1], traces[3], "{}: level 8", game.name());
         let distinct: std::collections::BTreeSet<_> = traces[0].iter().collect();
@@ -134,30 +102,6 @@ const EXPERIMENT: &str = r#"(
     ppo: (num_steps: 64, minibatches: 4, hidden: [16, 16], lr: 0.003),
 )"#;
 
-fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Vec<Vec<u8>> {
-    let info = RunInfo {
-        algorithm: Algorithm::Ppo,
-        seed: 1,
-        version: "test".into(),
-        revision: "test".into(),
-        game_version: 1,
-        skills: None,
-        device: DeviceKind::Flex,
-    };
-    let run = match RunDir::create(folder, trainer.experiment(), &info, false) {
-        Ok(run) => run,
-        Err(_) => RunDir::open(folder).expect("a run").0,
-    };
-    while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
-        let report = trainer.update().expect("learns");
-        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
-    }
-    run.save(&mut trainer).expect("writable");
-    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
-    let files = [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()];
-    files.into_iter().map(|path| std::fs::read(path).expect("written")).collect()
-}
-
 fn fresh(game: &ForeignGame, threads: usize) -> Trainer {
     let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
     Trainer::new(game, &experiment, None, DeviceKind::Flex, threads).expect("fits")
@@ -165,17 +109,9 @@ fn fresh(game: &ForeignGame, threads: usize) -> Trainer {
 
 #[test]
 fn training_that_was_killed_in_the_middle_of_episodes_goes_on_bit_for_bit() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (whole, halved) = (folder.path().join("whole"), folder.path().join("halved"));
     let game = catch_game();
-    let mut trainer = fresh(&game, 2);
-    assert_eq!(trainer.worlds_mut().count(), 8, "one arena in each World");
-    let expected = train(&whole, trainer, None);
-    train(&halved, fresh(&game, 1), Some(2));
-    let (run, experiment, _): (RunDir, Experiment, _) = RunDir::open(&halved).expect("readable");
-    let resumed = run.resume(&game, &experiment, DeviceKind::Flex, 2).expect("replays");
-    assert_eq!(resumed.updates(), 2);
-    assert!(train(&halved, resumed, None) == expected, "stopping in the middle changed the result");
+    assert_eq!(fresh(&game, 2).worlds_mut().count(), 8, "one arena in each World");
+    check_resuming(&game, |threads| fresh(&game, threads), 2);
 }
 
 #[test]

@@ -5,55 +5,37 @@ use std::{path::Path, sync::Arc};
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
-        file::{DemoEpisode, DemoReader, DemoWriter},
+        file::{DemoEpisode, DemoReader},
         replay::Divergence,
     },
     renewal::Renewal,
-    vision::ObservationConfig,
 };
 use playbot_lab::{
     demo::verify::{ReplayStage, verify_file},
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
     prelude::*,
-    train::{
-        Algorithm, Trainer,
-        checkpoint::Which,
-        config_file::parse_experiment,
-        run_dir::{RunDir, RunInfo},
-    },
+    train::{Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
-use playbot_tests::foreign::stubborn::{Gusts, Planted, stubborn_game};
-
-fn is_active(world: &World, agent: Entity) -> bool {
-    world.get::<Control>(agent).is_some_and(|control| control.is_active())
-}
-
-/// State hashes of the episodes of one agent that always does the same.
-fn traces(game: &ForeignGame, levels: &[u64]) -> Vec<Vec<u64>> {
-    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
-    let bot = BlindBot::Constant(ActionValue::Discrete(0));
-    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list(levels)));
-    let (mut traces, mut trace) = (Vec::new(), Vec::new());
-    while traces.len() < levels.len() {
-        world.tick().expect("sound");
-        trace.push(world.get::<StateHash>(agents[0]).expect("an agent").0);
-        if world.get::<EpisodeCount>(agents[0]).expect("an agent").finished > traces.len() as u64 {
-            traces.push(std::mem::take(&mut trace));
-        }
-    }
-    traces
-}
+use playbot_tests::{
+    foreign::{
+        stubborn::{Gusts, Planted, stubborn_game},
+        traces,
+    },
+    measuring::plan,
+    recording::record_demonstrator,
+    training::check_resuming,
+};
 
 #[test]
 fn an_episode_is_the_same_whenever_it_is_played() {
-    let rebuilt = traces(&stubborn_game(Restart::Rebuild), &[1, 2, 1, 2]);
+    let rebuilt = traces(&stubborn_game(Restart::Rebuild), 0, &[1, 2, 1, 2]);
     assert_eq!(rebuilt[0], rebuilt[2]);
     assert_eq!(rebuilt[1], rebuilt[3]);
     assert_ne!(rebuilt[0], rebuilt[1], "the hash sees the level");
-    let restarted = traces(&stubborn_game(Restart::Startup), &[1, 2, 1, 2]);
+    let restarted = traces(&stubborn_game(Restart::Startup), 0, &[1, 2, 1, 2]);
     assert_eq!(restarted[0].len(), 20, "nobody pushes the ball: only the clock ends the episode");
     assert_ne!(restarted[0], restarted[2], "the gusts outlive `Restart::Startup`");
 }
@@ -72,7 +54,7 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
     world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([3, 5, 8])));
     let mut seen = vec![world.id()];
     let mut ticks = 0;
-    while is_active(&world, agents[0]) {
+    while Control::of(&world, agents[0]).is_active() {
         world.tick().expect("sound");
         ticks += 1;
         if seen.last() != Some(&world.id()) {
@@ -87,19 +69,6 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
     assert_eq!(world.resource::<Ends>().0, 3);
     assert_eq!(world.resource::<bevy_playbot::tick::Tick>().0, 61);
     assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 3);
-}
-
-/// Records the demonstrator, with noise.
-fn record(game: &ForeignGame, path: &Path, levels: Vec<u64>) {
-    let (mut world, agents) = build_world(game, "default", 5, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(path, game.demo_header("default")).expect("a fresh file")));
-    game.attach_demonstrator(&mut world, agents[0], 0.4);
-    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list(levels)));
-    while is_active(&world, agents[0]) {
-        world.tick().expect("sound");
-    }
-    let recorder = world.resource::<Recorder>();
-    assert_eq!(recorder.episodes(), world.get::<EpisodeCount>(agents[0]).expect("an agent").finished);
 }
 
 /// Replays a recording, the last episode first.
@@ -117,13 +86,13 @@ fn recordings_replay_in_any_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("rebuilt.demo");
     let game = stubborn_game(Restart::Rebuild);
-    record(&game, &path, vec![0, 1, 2, 3, 0, 1]);
+    record_demonstrator(&game, "default", 0.4, &path, [0, 1, 2, 3, 0, 1]);
     let report = verify_file(&game, &path, |_| {}).expect("readable");
     assert_eq!((report.episodes, &report.divergences), (6, &Vec::new()));
     assert_eq!(replayed_backwards(&game, &path), vec![None; 6]);
     let path = folder.path().join("restarted.demo");
     let game = stubborn_game(Restart::Startup);
-    record(&game, &path, vec![0, 1, 2, 3, 0, 1]);
+    record_demonstrator(&game, "default", 0.4, &path, [0, 1, 2, 3, 0, 1]);
     let divergences = replayed_backwards(&game, &path);
     assert!(divergences.iter().any(Option::is_some), "the order counts with `Restart::Startup`");
 }
@@ -131,9 +100,7 @@ fn recordings_replay_in_any_order() {
 #[test]
 fn what_is_measured_does_not_depend_on_what_was_played_before() {
     let measure = |arenas, threads| -> Vec<EpisodeResult> {
-        let split = "default:0..5".parse().expect("a split");
-        let observation_config = ObservationConfig::default();
-        let plan = EvalPlan { split, observation_config, episodes_per_level: 2, seed: 1, arenas, worlds: 1, threads };
+        let plan = EvalPlan { episodes_per_level: 2, arenas, worlds: 1, threads, ..plan("default:0..5") };
         evaluate(&stubborn_game(Restart::Rebuild), &Player::Demonstrator, &plan, |_| {}).expect("can be played")
     };
     let alone = measure(1, 1);
@@ -153,43 +120,11 @@ fn fresh(game: &ForeignGame, threads: usize) -> Trainer {
     Trainer::new(game, &experiment, None, DeviceKind::Flex, threads).expect("fits")
 }
 
-/// Trains into a folder, and returns what the run has written at its end.
-fn train(folder: &Path, mut trainer: Trainer, stop_after: u64) -> Vec<Vec<u8>> {
-    let info = RunInfo {
-        algorithm: Algorithm::Ppo,
-        seed: 1,
-        version: "test".into(),
-        revision: "test".into(),
-        game_version: 1,
-        skills: None,
-        device: DeviceKind::Flex,
-    };
-    let run = match RunDir::create(folder, trainer.experiment(), &info, false) {
-        Ok(run) => run,
-        Err(_) => RunDir::open(folder).expect("a run").0,
-    };
-    while !trainer.is_done() && trainer.updates() < stop_after {
-        let report = trainer.update().expect("learns");
-        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
-    }
-    run.save(&mut trainer).expect("writable");
-    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
-    let files = [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()];
-    files.into_iter().map(|path| std::fs::read(path).expect("written")).collect()
-}
-
 #[test]
 fn a_training_that_was_stopped_in_the_middle_of_episodes_goes_on_bit_for_bit() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (whole, halved) = (folder.path().join("whole"), folder.path().join("halved"));
     let game = stubborn_game(Restart::Rebuild);
-    let expected = train(&whole, fresh(&game, 2), u64::MAX);
-    // 64 ticks in each arena by then: at least two Worlds have been replaced in each.
-    train(&halved, fresh(&game, 1), 2);
-    let (run, experiment, _) = RunDir::open(&halved).expect("readable");
-    let resumed = run.resume(&game, &experiment, DeviceKind::Flex, 2).expect("replays");
-    assert_eq!(resumed.updates(), 2);
-    assert!(train(&halved, resumed, u64::MAX) == expected, "stopping in the middle changed the result");
+    // Two updates are 64 ticks in each arena: at least two Worlds have been replaced in each by then.
+    check_resuming(&game, |threads| fresh(&game, threads), 2);
 }
 
 #[test]

@@ -4,6 +4,11 @@
 #[allow(dead_code, reason = "its `main` is for those who run the example")]
 mod lander;
 
+#[path = "../../plugin/examples/lander_window.rs"]
+#[allow(dead_code, reason = "its `main` opens a window")]
+mod lander_window;
+
+use bevy::prelude::{ButtonInput, KeyCode};
 use bevy_playbot::{
     headless::set_tick_rate,
     policy_file::{PolicyFile, check_policy, install_policy},
@@ -42,6 +47,42 @@ fn the_lander_goes_the_whole_road() {
     }
     let count = app.world().get::<EpisodeCount>(agent).expect("required by Agent");
     assert_eq!(count.finished, 2, "both levels are over after 401 ticks at most");
+}
+
+/// The game of `lander_window` without its window: the policy that is part of the program plays.
+#[test]
+fn the_policy_that_is_shipped_lands_softly_on_levels_that_it_has_not_seen() {
+    let mut app = headless_app();
+    set_tick_rate(&mut app, TICK_HZ);
+    lander_window::lander_rules::rules::add_rules(&mut app);
+    lander_window::add_shipped_policy(&mut app).expect("made for these rules");
+    let levels = LevelQueue::list((64..128).collect::<Vec<_>>());
+    let capsule = lander_window::lander_rules::rules::capsule(0);
+    let agent = app.world_mut().spawn((capsule, Control::Policy, levels)).id();
+    while app.world().get::<Control>(agent) != Some(&Control::Idle) {
+        app.tick().expect("the policy acts as the game allows");
+    }
+    let count = *app.world().get::<EpisodeCount>(agent).expect("required by Agent");
+    assert_eq!(count.finished, 64);
+    assert!(count.successes > 57, "{} of 64 landings were soft", count.successes);
+}
+
+#[test]
+fn f9_gives_the_controls_and_takes_them_back() {
+    let mut app = headless_app();
+    set_tick_rate(&mut app, TICK_HZ);
+    lander_window::lander_rules::rules::add_rules(&mut app);
+    lander_window::add_shipped_policy(&mut app).expect("made for these rules");
+    let mut keys = ButtonInput::default();
+    keys.press(KeyCode::F9);
+    app.insert_resource(keys);
+    let capsule = lander_window::lander_rules::rules::capsule(0);
+    let agent = app.world_mut().spawn((capsule, Control::Policy, LevelQueue::Always(64))).id();
+    for wanted in [Control::Human, Control::Policy] {
+        // Nobody clears the keys here: it is pressed anew in every tick.
+        app.tick().expect("sound");
+        assert_eq!(app.world().get::<Control>(agent), Some(&wanted));
+    }
 }
 
 /// The recordings that are learned from are worth it.

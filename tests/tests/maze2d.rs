@@ -1,13 +1,10 @@
 //! Maze2D as a Bevy game: the same as its rules, reproducible on any number of threads, open to rays, and clear about
 //! bad input.
 
-use std::path::Path;
-
 use bevy::prelude::*;
 use bevy_playbot::{
-    demo::file::{DemoEnd, DemoReader, DemoWriter},
+    demo::file::{DemoEnd, DemoReader},
     test_app::{PlaybotTestExt, test_app},
-    vision::ObservationConfig,
 };
 use bevy_rapier2d::rapier::prelude::{QueryFilter, Ray, Vector};
 use playbot_games::maze2d::{
@@ -25,6 +22,7 @@ use playbot_lab::{
     parallel::on_threads,
     worlds::build_world,
 };
+use playbot_tests::{measuring::plan, recording::record_demonstrator};
 
 const GAME: Maze2d = Maze2d { physics: false };
 
@@ -112,16 +110,7 @@ fn a_hundred_thousand_steps_are_the_same_on_one_and_on_two_threads() {
 
 /// The ends of the first `episodes` episodes of the demonstrator.
 fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<playbot_lab::eval::EpisodeResult> {
-    let split = LevelSplit { mode: text.to_owned(), first: 0, last: levels - 1 };
-    let plan = EvalPlan {
-        split,
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 8,
-        worlds: 2,
-        threads: 2,
-    };
+    let plan = EvalPlan { arenas: 8, ..plan(&format!("{text}:0..{}", levels - 1)) };
     evaluate(&GAME, player, &plan, |_| {}).expect("sound")
 }
 
@@ -189,19 +178,6 @@ fn a_level_that_cannot_be_made_is_a_fault_that_says_why() {
     assert!(fault.starts_with("agent 0, level 3: ") && fault.contains("500"), "{fault}");
 }
 
-/// Records `levels` levels of the demonstrator.
-fn record(path: &Path, text: &str, levels: u64) {
-    let header = GAME.demo_header(text);
-    let (mut world, agents) = build_world(&GAME, text, 5, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
-    GAME.attach_demonstrator(&mut world, agents[0], 0.5);
-    let queue = LevelQueue::list((0..levels).collect::<Vec<_>>());
-    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
-        world.tick().expect("sound");
-    }
-}
-
 #[test]
 fn recordings_replay_to_the_bit() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -209,7 +185,7 @@ fn recordings_replay_to_the_bit() {
         ["medium+retarget", "random+end-at-goal", "umaze+contact=rapier+sparse"].into_iter().enumerate()
     {
         let path = folder.path().join(format!("{index}.demo"));
-        record(&path, text, 6);
+        record_demonstrator(&GAME, text, 0.5, &path, 0..6);
         let report = verify_file(&GAME, &path, |_| {}).expect("readable");
         assert_eq!((report.episodes, report.divergences.len()), (6, 0), "{text}: {:?}", report.divergences);
         let reader = DemoReader::open(&path).expect("readable");

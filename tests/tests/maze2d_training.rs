@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
-use bevy_playbot::{demo::file::DemoWriter, policy::ActionDraw, vision::ObservationConfig};
+use bevy_playbot::{demo::file::DemoWriter, policy::ActionDraw};
 use playbot_games::maze2d::Maze2d;
 use playbot_lab::prelude::*;
 use playbot_lab::{
-    demo::dataset::Demonstrations,
     eval::{EvalPlan, Player, evaluate, summarize},
+    pipeline::learn_skills,
     train::{Algorithm, Experiment, Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
-use playbot_learner::{DeviceKind, SkillModel, SkillTrainer};
+use playbot_learner::{DeviceKind, SkillModel};
+use playbot_tests::measuring::plan;
 
 const GAME: Maze2d = Maze2d { physics: false };
 
@@ -54,30 +55,14 @@ fn skills() -> SkillModel {
     while world.resource::<Recorder>().steps() < 20_000 {
         world.tick().expect("sound");
     }
-    let demos = Demonstrations::read(&GAME, &ObservationConfig::default(), &path, None).expect("readable");
-    let dataset = demos.dataset(&GAME, 2, |_| {}).expect("replays");
-    let config = experiment(Algorithm::ScorePpo).skills;
-    let epochs = config.epochs;
-    let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");
-    for _ in 0..epochs {
-        trainer.train_epoch(&mut |_| std::ops::ControlFlow::Continue(())).expect("learns");
-    }
-    trainer.into_model()
+    let experiment = Experiment { demos: Some(path), ..experiment(Algorithm::ScorePpo) };
+    learn_skills(&GAME, &experiment, DeviceKind::Flex, 2).expect("learns")
 }
 
 /// Mean return and success rate on the held-out levels.
 fn measure(player: &Player) -> (f64, f64) {
-    let split: LevelSplit = experiment(Algorithm::Ppo).test;
-    let plan = EvalPlan {
-        split: split.clone(),
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 32,
-        worlds: 2,
-        threads: 2,
-    };
-    let summary = summarize("player", &split, &evaluate(&GAME, player, &plan, |_| {}).expect("sound"));
+    let plan = EvalPlan { arenas: 32, ..plan("umaze:64..127") };
+    let summary = summarize("player", &plan.split, &evaluate(&GAME, player, &plan, |_| {}).expect("sound"));
     (summary.return_mean, summary.success)
 }
 

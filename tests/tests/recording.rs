@@ -19,7 +19,7 @@ use playbot_lab::{
     },
     worlds::build_world,
 };
-use playbot_tests::{Corridor, Drift};
+use playbot_tests::{Corridor, Drift, recording};
 
 fn header() -> DemoHeader {
     Corridor.demo_header("plain")
@@ -28,17 +28,8 @@ fn header() -> DemoHeader {
 /// Records a random walker for this many episodes.
 fn record(path: &Path, header: DemoHeader, episodes: u64) {
     let (mut world, agents) = build_world(&Corridor, "plain", 5, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
-    let levels: Vec<u64> = (0..episodes).collect();
-    world.entity_mut(agents[0]).insert((
-        Control::Bot,
-        BlindBot::Uniform,
-        Recording::default(),
-        LevelQueue::list(levels),
-    ));
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
-        world.tick().expect("sound");
-    }
+    world.entity_mut(agents[0]).insert(BlindBot::Uniform);
+    recording::record(world, agents[0], header, path, 0..episodes);
 }
 
 #[test]

@@ -2,13 +2,9 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{policy::AgentStreams, vision::ObservationConfig};
-use playbot_lab::{
-    prelude::*,
-    train::{Experiment, collect::Collector, config_file::parse_experiment},
-    worlds::build_world,
-};
-use playbot_learner::{DeviceKind, Learner as _, Policy, PolicySpec, PpoLearner, Prior, SkillDraw, rng::normal};
-use playbot_tests::Corridor;
+use playbot_lab::{prelude::*, train::collect::Collector, worlds::build_world};
+use playbot_learner::{PpoConfig, Prior, SkillDraw, rng::normal};
+use playbot_tests::{Corridor, training::untrained};
 
 /// Seed of the Worlds.
 const SEED: u64 = 7;
@@ -61,20 +57,6 @@ fn a_skill_is_held_for_its_ticks_and_ends_with_its_episode() {
     assert_eq!((finished(0), finished(1)), (2, 14));
 }
 
-fn policy() -> Policy {
-    let experiment = r#"(
-        game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused", steps: 512, arenas: 8,
-        algorithm: "ppo", ppo: (num_steps: 32, minibatches: 4, hidden: [8]),
-    )"#;
-    let experiment: Experiment = parse_experiment(experiment, std::path::Path::new("test.ron")).expect("valid");
-    let spec = PolicySpec {
-        obs: ObservationConfig::default().obs_kind(&Corridor),
-        latent: 0,
-        action_space: Corridor.actions(),
-    };
-    PpoLearner::new(experiment.ppo, spec, 1, DeviceKind::Flex).expect("valid").policy()
-}
-
 #[test]
 fn rollouts_hold_the_skill_of_each_tick_however_they_are_cut() {
     const AGENTS: usize = 3;
@@ -84,7 +66,9 @@ fn rollouts_hold_the_skill_of_each_tick_however_they_are_cut() {
         let mut collector =
             Collector::new(&Corridor, &split, &observation_config, SEED, 0, AGENTS as u32, Some(prior(5)))
                 .expect("can be seen");
-        let (policy, mut z, mut ends) = (policy(), Vec::new(), Vec::new());
+        let config = PpoConfig { hidden: vec![8], ..PpoConfig::default() };
+        let policy = untrained(&Corridor, &observation_config, config);
+        let (mut z, mut ends) = (Vec::new(), Vec::new());
         for &steps in lengths {
             let (rollout, _) = collector.collect(&policy, 2, steps).expect("sound");
             let both = rollout.terminated.iter().zip(&rollout.truncated);

@@ -1,33 +1,22 @@
 //! Where agents went, as the evaluation notes it and the picture shows it.
 
 use bevy::math::{Rect, Vec2};
-use bevy_playbot::vision::ObservationConfig;
 use playbot_games::{
     maze::{Cell, Planner, fixed},
-    registry,
+    registry::GAMES,
 };
 use playbot_lab::{
     drawing::Shape,
     eval::{EvalPlan, Player, Trail, evaluate, evaluate_with_trails},
     floor_plan::FloorPlan,
     game::Game,
+    games::Games,
     report::{Floor, TrailChart, Visits, Walker},
 };
+use playbot_tests::measuring::plan;
 
 fn game(name: &str) -> &'static dyn Game {
-    registry::game(name).expect("a game")
-}
-
-fn plan(levels: &str, threads: usize) -> EvalPlan {
-    EvalPlan {
-        split: levels.parse().expect("a split"),
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 4,
-        worlds: 2,
-        threads,
-    }
+    Games::new(&GAMES).expect("each has a name of its own").get(name).expect("a game")
 }
 
 fn right_jump() -> Player {
@@ -36,7 +25,7 @@ fn right_jump() -> Player {
 }
 
 fn trails(name: &str, player: &Player, levels: &str) -> Vec<Trail> {
-    evaluate_with_trails(game(name), player, &plan(levels, 2), |_| {}).expect("sound")
+    evaluate_with_trails(game(name), player, &plan(levels), |_| {}).expect("sound")
 }
 
 #[test]
@@ -62,9 +51,10 @@ fn a_trail_has_the_place_after_every_tick_of_its_own_episode() {
 fn following_changes_no_result_and_threads_change_nothing() {
     let player = right_jump();
     let followed = trails("coinrun", &player, "hard:0..7");
-    let plain = evaluate(game("coinrun"), &player, &plan("hard:0..7", 1), |_| {}).expect("sound");
+    let alone = EvalPlan { threads: 1, ..plan("hard:0..7") };
+    let plain = evaluate(game("coinrun"), &player, &alone, |_| {}).expect("sound");
     assert_eq!(followed.iter().map(|trail| trail.result).collect::<Vec<_>>(), plain);
-    let alone = evaluate_with_trails(game("coinrun"), &player, &plan("hard:0..7", 1), |_| {}).expect("sound");
+    let alone = evaluate_with_trails(game("coinrun"), &player, &alone, |_| {}).expect("sound");
     assert_eq!(alone, followed);
 }
 

@@ -2,21 +2,23 @@
 
 use std::path::Path;
 
-use bevy_playbot::{bot::BlindBot, demo::file::DemoWriter, vision::ObservationConfig};
 use playbot_games::coinrun::CoinRun;
 use playbot_lab::prelude::*;
 use playbot_lab::{
-    demo::dataset::Demonstrations,
+    pipeline::learn_skills,
     train::{
         Algorithm, Experiment, TrainError, Trainer,
-        checkpoint::Which,
         config_file::parse_experiment,
-        run_dir::{RunDir, RunError, RunInfo},
+        run_dir::{RunDir, RunError},
     },
     worlds::build_world,
 };
-use playbot_learner::{DeviceKind, SkillModel, SkillTrainer};
-use playbot_tests::Corridor;
+use playbot_learner::{DeviceKind, SkillModel};
+use playbot_tests::{
+    Corridor,
+    recording::record_random,
+    training::{check_resuming, run_info, train, written},
+};
 
 const EXPERIMENT: &str = r#"(
     game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused",
@@ -31,74 +33,18 @@ fn experiment() -> Experiment {
     parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid")
 }
 
-fn info(algorithm: Algorithm) -> RunInfo {
-    let device = DeviceKind::Flex;
-    RunInfo {
-        algorithm,
-        seed: 1,
-        version: "test".into(),
-        revision: "test".into(),
-        game_version: 1,
-        skills: None,
-        device,
-    }
-}
-
 /// A skill model from a random walker that is worth copying in half of its steps.
 fn skills(folder: &Path) -> SkillModel {
     let path = folder.join("walk.demo");
-    let header = Corridor.demo_header("plain");
-    let (mut world, agents) = build_world(&Corridor, "plain", 5, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(&path, header).expect("fresh")));
-    let levels: Vec<u64> = (0..60).collect();
-    world.entity_mut(agents[0]).insert((
-        Control::Bot,
-        BlindBot::Uniform,
-        Recording::default(),
-        LevelQueue::list(levels),
-    ));
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
-        world.tick().expect("sound");
-    }
-    let demos = Demonstrations::read(&Corridor, &ObservationConfig::default(), &path, None).expect("readable");
-    let dataset = demos.dataset(&Corridor, 2, |_| {}).expect("replays");
-    let config = experiment().skills;
-    let epochs = config.epochs;
-    let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("valid");
-    for _ in 0..epochs {
-        trainer.train_epoch(&mut |_| std::ops::ControlFlow::Continue(())).expect("learns");
-    }
-    trainer.into_model()
+    record_random(&Corridor, "plain", 5, &path, 16..76);
+    let experiment = Experiment { demos: Some(path), ..experiment() };
+    learn_skills(&Corridor, &experiment, DeviceKind::Flex, 2).expect("learns")
 }
 
 fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer {
     let skills = algorithm.needs_skills().then_some(skills);
     let experiment = Experiment { algorithm, ..experiment() };
     Trainer::new(&Corridor, &experiment, skills, DeviceKind::Flex, threads).expect("fits")
-}
-
-/// Trains to the end in `folder` and returns the bytes of metrics and checkpoint.
-fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
-    let run = RunDir::create(folder, trainer.experiment(), &info(trainer.experiment().algorithm), false)
-        .or_else(|error| match error {
-            RunError::Exists(_) => RunDir::open(folder).map(|(run, ..)| run),
-            other => Err(other),
-        })
-        .expect("writable");
-    while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
-        let report = trainer.update().expect("learns");
-        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
-    }
-    run.save(&mut trainer).expect("writable");
-    trainer
-}
-
-fn bytes(folder: &Path) -> Vec<Vec<u8>> {
-    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
-    [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
-        .into_iter()
-        .map(|path| std::fs::read(path).expect("written"))
-        .collect()
 }
 
 #[test]
@@ -112,7 +58,7 @@ fn the_same_seed_gives_the_same_bytes_on_one_and_on_two_threads() {
             .map(|(index, threads)| {
                 let run = folder.path().join(format!("{algorithm}-{index}"));
                 train(&run, trainer(algorithm, &skills, threads), None);
-                bytes(&run)
+                written(&run)
             })
             .collect();
         assert!(results[0] == results[1], "{algorithm}: one thread and two threads differ");
@@ -125,15 +71,7 @@ fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let skills = skills(folder.path());
     for algorithm in Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()) {
-        let (whole, halved) =
-            (folder.path().join(format!("{algorithm}-w")), folder.path().join(format!("{algorithm}-h")));
-        train(&whole, trainer(algorithm, &skills, 2), None);
-        train(&halved, trainer(algorithm, &skills, 2), Some(3));
-        let (run, experiment, _) = RunDir::open(&halved).expect("readable");
-        let resumed = run.resume(&Corridor, &experiment, DeviceKind::Flex, 2).expect("a checkpoint");
-        assert_eq!(resumed.updates(), 3);
-        train(&halved, resumed, None);
-        assert!(bytes(&whole) == bytes(&halved), "{algorithm}: stopping in the middle changed the result");
+        check_resuming(&Corridor, |threads| trainer(algorithm, &skills, threads), 3);
     }
 }
 
@@ -211,11 +149,11 @@ fn levels_can_be_chosen_as_the_original_does() {
 fn an_existing_run_is_not_overwritten() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run");
-    RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), false).expect("fresh");
-    let error = RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), false).err().expect("exists");
+    RunDir::create(&path, &experiment(), &run_info(&experiment()), false).expect("fresh");
+    let error = RunDir::create(&path, &experiment(), &run_info(&experiment()), false).err().expect("exists");
     let text = error.to_string();
     assert!(text.contains("--resume") && text.contains("--force"), "{text}");
-    RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), true).expect("forced");
+    RunDir::create(&path, &experiment(), &run_info(&experiment()), true).expect("forced");
     let nothing = RunDir::open(&path).expect("readable").0;
     let resumed = nothing.resume(&Corridor, &experiment(), DeviceKind::Flex, 1).err().expect("empty");
     assert!(matches!(resumed, RunError::NoCheckpoint { .. }), "{resumed}");
@@ -227,6 +165,6 @@ fn an_unwritable_folder_is_named() {
     let file = folder.path().join("file");
     std::fs::write(&file, b"in the way").expect("writable");
     let path = file.join("run");
-    let error = RunDir::create(&path, &experiment(), &info(Algorithm::Ppo), false).err().expect("a file in the way");
+    let error = RunDir::create(&path, &experiment(), &run_info(&experiment()), false).err().expect("a file in the way");
     assert!(error.to_string().contains(&path.display().to_string()), "{error}");
 }

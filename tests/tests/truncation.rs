@@ -1,28 +1,16 @@
 //! Where time is up, a rollout keeps the state that came after, with its value and the skill under which it is valued.
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
-    prelude::*,
-    train::{collect::Collector, config_file::parse_experiment},
-};
-use playbot_learner::{
-    Actions, DeviceKind, Learner as _, Observations, Policy, PolicySpec, PpoLearner, Prior, Rollout, SkillDraw,
-};
-use playbot_tests::Corridor;
+use playbot_lab::{prelude::*, train::collect::Collector};
+use playbot_learner::{Actions, Observations, Policy, PpoConfig, Prior, Rollout, SkillDraw};
+use playbot_tests::{Corridor, training::untrained};
 
 const AGENTS: usize = 8;
 const TICKS: usize = 400;
 
-/// A policy that has learned nothing, with a critic that has an opinion all the same.
 fn policy() -> Policy {
-    let experiment = r#"(
-        game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused", steps: 512, arenas: 8,
-        algorithm: "ppo", ppo: (num_steps: 32, minibatches: 4, hidden: [8]),
-    )"#;
-    let experiment = parse_experiment(experiment, std::path::Path::new("test.ron")).expect("valid");
-    let obs = ObservationConfig::default().obs_kind(&Corridor);
-    let spec = PolicySpec { obs, latent: 0, action_space: Corridor.actions() };
-    PpoLearner::new(experiment.ppo, spec, 1, DeviceKind::Flex).expect("valid").policy()
+    let config = PpoConfig { hidden: vec![8], ..PpoConfig::default() };
+    untrained(&Corridor, &ObservationConfig::default(), config)
 }
 
 /// A rollout in which nobody knows the way, so that time is up for some. Skills are held for `horizon` ticks.

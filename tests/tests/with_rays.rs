@@ -1,4 +1,4 @@
-//! Games with eyes: the same games, to the bit, whose agents are told more.
+//! Games with rays: the same games, to the bit, whose agents are told more.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use playbot_lab::{
     worlds::{add_game, build_observing_world, build_world, spawn_agents},
 };
 
-/// Every game with eyes, the same without, a mode, and how long an episode may take there.
+/// Every game with rays, the same without, a mode, and how long an episode may take there.
 fn games() -> [(Arc<dyn Game>, Arc<dyn Game>, &'static str, u64); 2] {
     [
         (Arc::new(Maze2dWithRays::default()), Arc::new(Maze2d::default()), "random+goal=random+limit=60", 60),
@@ -36,11 +36,11 @@ fn build(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, fi
 }
 
 #[test]
-fn eyes_change_nothing_in_the_game() {
-    for (sighted, blind, mode, _) in games() {
-        let mut pair = [&sighted, &blind].map(|game| build(&**game, mode, &ObservationConfig::default(), 0));
-        let (all, own) = (sighted.observation().len(), blind.observation().len());
-        assert_eq!((all, sighted.version()), (own + 10, blind.version()));
+fn rays_change_nothing_in_the_game() {
+    for (with_rays, without, mode, _) in games() {
+        let mut pair = [&with_rays, &without].map(|game| build(&**game, mode, &ObservationConfig::default(), 0));
+        let (all, own) = (with_rays.observation().len(), without.observation().len());
+        assert_eq!((all, with_rays.version()), (own + 10, without.version()));
         for tick in 0..150 {
             let [(seen, hashes), (told, others)] = pair.each_mut().map(|(world, agents)| {
                 world.tick().expect("sound");
@@ -52,9 +52,9 @@ fn eyes_change_nothing_in_the_game() {
                     agents.iter().map(|&agent| world.get::<StateHash>(agent).map(|hash| hash.0)).collect();
                 (vectors, hashes)
             });
-            assert_eq!(hashes, others, "{}, tick {tick}", sighted.name());
+            assert_eq!(hashes, others, "{}, tick {tick}", with_rays.name());
             for (seen, told) in seen.iter().zip(&told) {
-                assert_eq!((seen.len(), &seen[..own]), (all, &told[..]), "{}, tick {tick}", sighted.name());
+                assert_eq!((seen.len(), &seen[..own]), (all, &told[..]), "{}, tick {tick}", with_rays.name());
             }
         }
     }

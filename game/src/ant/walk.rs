@@ -136,10 +136,7 @@ pub(super) fn walk(
         walker.body.step(&torques(action, &mut episode));
         let state = walker.body.state();
         if !state.is_finite() {
-            faults.report(format!(
-                "agent {}, level {}, tick {}: the ant's state is no longer finite",
-                agent.index, episode.level, episode.tick
-            ));
+            faults.report(format!("{}: the ant's state is no longer finite", episode.moment(agent)));
             continue;
         }
         *hash = state.hash();

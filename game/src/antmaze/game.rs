@@ -29,7 +29,7 @@ use crate::{
         view::VIEW,
     },
     maze::{
-        Map, Maze, MazeModeError,
+        Map, Maze, read_mode,
         show_level::{self, MazeSource, unfit},
     },
 };
@@ -66,7 +66,7 @@ impl Game for AntMaze {
     }
 
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
-        mode.parse::<AntMazeMode>().map(drop).map_err(|error| error.of(mode))
+        read_mode::<AntMazeMode>(mode).map(drop)
     }
 
     fn family(&self, mode: &str) -> String {
@@ -153,7 +153,7 @@ impl Game for AntMaze {
 
 /// The maze of a level, with its start and goal.
 fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
-    let parsed: AntMazeMode = mode.parse().map_err(|error: MazeModeError| error.of(mode))?;
-    let level = generate(&parsed, seed).map_err(unfit)?;
+    let mode: AntMazeMode = read_mode(mode)?;
+    let level = generate(&mode, seed).map_err(unfit)?;
     level.maze.with_ends(level.start, level.goal).map_err(unfit)
 }

@@ -20,7 +20,6 @@ pub mod walls;
 pub mod waypoints;
 pub mod with_rays;
 
-pub use crate::maze::MazeModeError as AntMazeModeError;
 pub use demonstrator_bot::DemonstratorBot;
 pub use game::AntMaze;
 pub use level::{AntMazeLevel, generate};

@@ -2,8 +2,6 @@
 
 use std::{fmt, str::FromStr};
 
-use bevy_playbot::unknown_name::UnknownName;
-
 use crate::maze::{Cell, Map, MazeModeError, OptionError, fixed::antmaze};
 
 /// What a level of AntMaze is made of. Written as the map and its options, `large+sparse+limit=500`; what is left out is as
@@ -98,13 +96,11 @@ impl AntMazeMode {
             "random-start" => self.random_start = true,
             _ if key == "limit" => {
                 let ticks = value.parse().ok().filter(|ticks| *ticks > 0);
-                self.limit = ticks.ok_or_else(|| wrong(key, value, "write ticks, at least 1, as in limit=1000"))?;
+                let wanted = "write ticks, at least 1, as in limit=1000";
+                self.limit = ticks.ok_or_else(|| OptionError::new(key, value, wanted))?;
             }
             _ if self.map.set_option(key, value)? => {}
-            _ => {
-                let valid: Vec<_> = OPTIONS.iter().chain(self.map.valid_options()).copied().collect();
-                return Err(UnknownName::new("option", option, &valid).into());
-            }
+            _ => return Err(self.map.unknown_option(option, &OPTIONS).into()),
         }
         Ok(())
     }
@@ -113,7 +109,7 @@ impl AntMazeMode {
         self.map.check()?;
         if self.goals == Goals::Demo && self.demo_goals().is_empty() {
             let why = "generated mazes have no goals of demonstrations; take goals=random";
-            return Err(wrong("goals", "demo", why).into());
+            return Err(OptionError::new("goals", "demo", why).into());
         }
         Ok(self)
     }
@@ -121,10 +117,6 @@ impl AntMazeMode {
 
 fn usual_limit(map: &Map) -> u32 {
     if *map == Map::Umaze { 700 } else { 1000 }
-}
-
-fn wrong(key: &str, value: &str, wanted: &'static str) -> OptionError {
-    OptionError { key: key.to_owned(), value: value.to_owned(), wanted }
 }
 
 /// What an option is about, so that it is said only once.
@@ -150,8 +142,7 @@ impl FromStr for AntMazeMode {
 
 impl fmt::Display for AntMazeMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.map.name())?;
-        self.map.options().iter().try_for_each(|option| write!(f, "+{option}"))?;
+        write!(f, "{}", self.map)?;
         f.write_str(match self.pay {
             Pay::Distance => "",
             Pay::Exponential => "+dense=exp",

@@ -31,8 +31,7 @@ pub(super) fn play(
         ant.0.step(&torques(action, &mut episode));
         let state = ant.0.state();
         if let Some(why) = astray(&state, &level.0) {
-            let Episode { level, tick, .. } = *episode;
-            faults.report(format!("agent {}, level {level}, tick {tick}: {why}", agent.index));
+            faults.report(format!("{}: {why}", episode.moment(agent)));
             *control = Control::Idle;
             continue;
         }

@@ -1,4 +1,4 @@
-//! AntMaze for ants that see.
+//! AntMaze for ants that are told where the goal and the walls are.
 
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
@@ -12,39 +12,42 @@ use super::{
 };
 use crate::{
     ant::walls::Walls,
-    with_rays::{GiveEyes, WithRays, add_sights},
+    with_rays::{SenseRays, WithRays, push_rays},
 };
 
-/// How far an ant sees, in metres: two cells.
-pub const SIGHT: f32 = 8.0;
-/// Eyes look between the floor and the top of the walls, in metres.
-const EYES: std::ops::RangeInclusive<f32> = 0.1..=1.9;
+/// How far a ray reaches, in metres: two cells.
+pub const RAY_LENGTH: f32 = 8.0;
+/// Rays go between the floor and the top of the walls, in metres.
+const RAY_HEIGHTS: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 
-/// AntMaze with eyes, under its name `antmaze-sighted`. East is x and north is y.
+/// AntMaze with rays, under its name `antmaze-sighted`. East is x and north is y.
 pub type AntMazeWithRays = WithRays<AntMaze>;
 
-impl GiveEyes for AntMaze {
-    const SIGHTED: &'static str = "antmaze-sighted";
+impl SenseRays for AntMaze {
+    const NAME_WITH_RAYS: &'static str = "antmaze-sighted";
 
-    fn build_eyes(&self, app: &mut App) {
-        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Sync));
+    fn build_rays(&self, app: &mut App) {
+        app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
-fn see(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), With<VectorSensor>>) {
+fn sense_rays(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), With<VectorSensor>>) {
     for (episode, ant, level, mut observation) in &mut ants {
         if episode.is_running() {
             let at = ant.0.torso().0;
-            let eye = Vec3::new(at.x, at.y, at.z.clamp(*EYES.start(), *EYES.end()));
+            let from = Vec3::new(at.x, at.y, at.z.clamp(*RAY_HEIGHTS.start(), *RAY_HEIGHTS.end()));
             let to_goal = Vec2::from(level.0.goal_at) - at.truncate();
-            add_sights(&mut observation, to_goal.to_array(), |way| distance(ant.0.walls(), eye, way));
+            push_rays(&mut observation, to_goal.to_array(), |way| distance(ant.0.walls(), from, way));
         }
     }
 }
 
-fn distance(walls: &Walls, eye: Vec3, [east, north]: [f64; 2]) -> f32 {
-    let ray = Ray::new(eye, Vec3::new(east as f32, north as f32, 0.0));
-    walls.physics().cast_ray(&ray, SIGHT, true, QueryFilter::default()).map_or(SIGHT, |(_, distance)| distance)
+fn distance(walls: &Walls, from: Vec3, [east, north]: [f64; 2]) -> f32 {
+    let ray = Ray::new(from, Vec3::new(east as f32, north as f32, 0.0));
+    walls
+        .physics()
+        .cast_ray(&ray, RAY_LENGTH, true, QueryFilter::default())
+        .map_or(RAY_LENGTH, |(_, distance)| distance)
 }
 
 #[cfg(test)]

@@ -47,9 +47,9 @@ pub(super) fn decide(
         let Some(sim) = sim else { continue };
         if episode.tick > 0 && sim.state_hash() != hash.0 {
             faults.report(format!(
-                "agent {}, level {}, tick {}: the planner's copy of the level is in another state than the game; it \
-                 knows the rules of CoinRun only",
-                agent.index, episode.level, episode.tick
+                "{}: the planner's copy of the level is in another state than the game; it knows the rules of CoinRun \
+                 only",
+                episode.moment(agent)
             ));
             continue;
         }

@@ -7,6 +7,7 @@ use bevy_playbot::vision::{ObservationKind, Picture};
 use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
+    experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
 };
@@ -129,8 +130,9 @@ impl Game for CoinRun {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
 
-    fn experiment(&self) -> Option<(&'static str, &'static str)> {
-        Some(("assets/experiments/coinrun.ron", include_str!("../../assets/experiments/coinrun.ron")))
+    fn experiment(&self) -> Option<ExperimentText> {
+        let text = include_str!("../../assets/experiments/coinrun.ron");
+        Some(ExperimentText { origin: "assets/experiments/coinrun.ron".into(), text: text.into() })
     }
 
     fn benchmarks(&self) -> Vec<Benchmark> {

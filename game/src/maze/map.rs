@@ -3,9 +3,11 @@
 use std::{fmt, str::FromStr};
 
 use bevy_playbot::unknown_name::UnknownName;
-use thiserror::Error;
 
-use super::{error::MazeError, fixed, generator::generate, layout::Maze, spec::MazeSpec, spec_text::OptionError};
+use super::{
+    error::MazeError, fixed, generator::generate, layout::Maze, mode_error::MazeModeError, spec::MazeSpec,
+    spec_text::OptionError,
+};
 
 /// Where the mazes of a mode come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,20 +22,6 @@ pub enum Map {
     Xl,
     /// Another maze for each seed.
     Random(MazeSpec),
-}
-
-/// The text is no map.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum MapError {
-    /// No map, or no option, has this name.
-    #[error(transparent)]
-    Name(#[from] UnknownName),
-    /// The value of an option cannot be read.
-    #[error(transparent)]
-    Option(#[from] OptionError),
-    /// There can be no such maze.
-    #[error(transparent)]
-    Maze(#[from] MazeError),
 }
 
 impl Map {
@@ -109,6 +97,11 @@ impl Map {
         }
     }
 
+    /// An option that neither this map nor the game on it takes, which has these options of its own.
+    pub fn unknown_option(&self, option: &str, of_game: &[&str]) -> UnknownName {
+        UnknownName::new("option", option, &[of_game, self.valid_options()].concat())
+    }
+
     /// Checks that there can be such a maze: call it when all options have been taken.
     ///
     /// # Errors
@@ -153,10 +146,10 @@ impl Map {
 }
 
 impl FromStr for Map {
-    type Err = MapError;
+    type Err = MazeModeError;
 
     /// Reads a name with the map's options behind it: `medium`, `random+size=9x9+loops=0.2`.
-    fn from_str(text: &str) -> Result<Self, MapError> {
+    fn from_str(text: &str) -> Result<Self, MazeModeError> {
         let mut words = text.split('+');
         let mut map = Self::named(words.next().unwrap_or_default())?;
         for word in words {

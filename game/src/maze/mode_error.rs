@@ -1,4 +1,6 @@
-//! What can be wrong with the mode of a game that is played in mazes.
+//! What can be wrong with a map and with the mode of a game that is played on it.
+
+use std::str::FromStr;
 
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_lab::mode::ModeError;
@@ -6,7 +8,7 @@ use thiserror::Error;
 
 use super::{error::MazeError, spec_text::OptionError};
 
-/// The text is not a mode: a map with options, joined by `+`.
+/// The text is no map, or no mode: a map with options, joined by `+`.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum MazeModeError {
     /// An unknown map or option.
@@ -27,14 +29,6 @@ pub enum MazeModeError {
 }
 
 impl MazeModeError {
-    /// The error as games give it: for this mode.
-    pub fn of(self, mode: &str) -> ModeError {
-        match self {
-            Self::Name(unknown) => unknown.into(),
-            other => ModeError::Option { mode: mode.to_owned(), why: other.to_string() },
-        }
-    }
-
     /// Checks that no two options are about the same `subject`.
     ///
     /// # Errors
@@ -49,4 +43,16 @@ impl MazeModeError {
             None => Ok(()),
         }
     }
+}
+
+/// Reads a mode of a game, with the error as games give it.
+///
+/// # Errors
+///
+/// The text is no mode.
+pub fn read_mode<Mode: FromStr<Err = MazeModeError>>(text: &str) -> Result<Mode, ModeError> {
+    text.parse::<Mode>().map_err(|error| match error {
+        MazeModeError::Name(unknown) => unknown.into(),
+        other => ModeError::Option { mode: text.to_owned(), why: other.to_string() },
+    })
 }

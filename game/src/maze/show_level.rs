@@ -9,7 +9,7 @@ use playbot_lab::{
 };
 use serde_json::json;
 
-use super::{Cell, MAX_CELLS, Map, MapError, Maze, MazeError};
+use super::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
 
 /// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
 const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
@@ -55,7 +55,7 @@ fn maze(request: &LevelRequest, game: &MazeSource) -> Result<Maze, InspectError>
     let seed = request.seed.unwrap_or(0);
     let map: Map = match text.parse() {
         Ok(map) => map,
-        Err(MapError::Name(error)) if error.what == "map" => {
+        Err(MazeModeError::Name(error)) if error.what == "map" => {
             return from_file(Path::new(text), request, &error.to_string());
         }
         // Not an option of the map: one of the game's.

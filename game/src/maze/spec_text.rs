@@ -18,6 +18,13 @@ pub struct OptionError {
     pub wanted: &'static str,
 }
 
+impl OptionError {
+    /// For this option, with what is wanted instead.
+    pub fn new(key: &str, value: &str, wanted: &'static str) -> Self {
+        Self { key: key.to_owned(), value: value.to_owned(), wanted }
+    }
+}
+
 impl MazeSpec {
     /// Options of a mode with generated mazes, each with a value it takes.
     pub const OPTIONS: [&'static str; 4] = ["size=9x9", "loops=0.2", "corridor=2", "difficulty=10..20"];
@@ -28,7 +35,7 @@ impl MazeSpec {
     ///
     /// The value cannot be read. Whether it makes sense is [`check`](Self::check)ed apart.
     pub fn set_option(&mut self, key: &str, value: &str) -> Result<bool, OptionError> {
-        let wrong = |wanted| OptionError { key: key.to_owned(), value: value.to_owned(), wanted };
+        let wrong = |wanted| OptionError::new(key, value, wanted);
         match key {
             "size" => {
                 (self.rows, self.columns) =

@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     maze::{
-        Map, Maze, MazeModeError,
+        Map, Maze, read_mode,
         show_level::{self, MazeSource, unfit},
     },
     with_rays::WithRays,
@@ -72,7 +72,7 @@ impl Game for Maze2d {
     }
 
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
-        mode.parse::<Maze2dMode>().map(drop).map_err(|error| error.of(mode))
+        read_mode::<Maze2dMode>(mode).map(drop)
     }
 
     fn family(&self, mode: &str) -> String {
@@ -172,7 +172,7 @@ impl Game for Maze2d {
 
 /// The maze of a level, with its start and goal.
 fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
-    let parsed: Maze2dMode = mode.parse().map_err(|error: MazeModeError| error.of(mode))?;
-    let Maze2dLevel { maze, start_cell, goal_cell, .. } = Maze2dLevel::new(&parsed, seed).map_err(unfit)?;
+    let mode: Maze2dMode = read_mode(mode)?;
+    let Maze2dLevel { maze, start_cell, goal_cell, .. } = Maze2dLevel::new(&mode, seed).map_err(unfit)?;
     maze.with_ends(start_cell, goal_cell).map_err(unfit)
 }

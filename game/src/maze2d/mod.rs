@@ -26,7 +26,6 @@ mod trace;
 pub mod walls;
 pub mod with_rays;
 
-pub use crate::maze::MazeModeError as Maze2dModeError;
 pub use ball::Ball;
 pub use demonstrator::Demonstrator;
 pub use demonstrator_bot::DemonstratorBot;

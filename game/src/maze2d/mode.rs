@@ -2,8 +2,6 @@
 
 use std::{fmt, str::FromStr};
 
-use bevy_playbot::unknown_name::UnknownName;
-
 use super::walls::D4RL_OFFSET;
 use crate::maze::{Map, Maze, MazeError, MazeModeError, OptionError};
 
@@ -107,24 +105,18 @@ impl Maze2dMode {
             ("limit", _) => {
                 let steps = value.parse().ok().filter(|&steps| steps > 0);
                 let wanted = "write steps, at least 1, as in limit=1000";
-                let wrong = || OptionError { key: key.to_owned(), value: value.to_owned(), wanted };
-                self.limit = steps.ok_or_else(wrong)?;
+                self.limit = steps.ok_or_else(|| OptionError::new(key, value, wanted))?;
             }
             _ if self.map.set_option(key, value)? => {}
-            _ => return Err(self.unknown(option).into()),
+            _ => return Err(self.map.unknown_option(option, &OPTIONS).into()),
         }
         Ok(())
     }
 
-    fn unknown(&self, option: &str) -> UnknownName {
-        let valid: Vec<&str> = OPTIONS.iter().chain(self.map.valid_options()).copied().collect();
-        UnknownName::new("option", option, &valid)
-    }
-
-    /// What differs from the map's defaults, in the order in which it is written.
+    /// What differs from the map's defaults besides its own options, in the order in which it is written.
     fn options(&self) -> Vec<String> {
         let usual = Self::new(self.map.clone());
-        let mut options = self.map.options();
+        let mut options = Vec::new();
         let mut add = |differs: bool, option: &str| {
             if differs {
                 options.push(option.to_owned());
@@ -189,7 +181,7 @@ impl FromStr for Maze2dMode {
 
 impl fmt::Display for Maze2dMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.map.name())?;
+        write!(f, "{}", self.map)?;
         self.options().iter().try_for_each(|option| write!(f, "+{option}"))
     }
 }

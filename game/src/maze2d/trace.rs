@@ -4,7 +4,7 @@ use std::path::Path;
 
 use playbot_lab::inspect::{InspectError, Print, TraceRequest, plain, read_text};
 
-use crate::maze::MazeModeError;
+use crate::maze::{read_mode, show_level::unfit};
 
 use super::{
     Ball, Maze2dLevel, Maze2dMode,
@@ -21,9 +21,8 @@ pub(super) fn run(request: &TraceRequest, print: Print) -> Result<Option<String>
                 .to_owned(),
         ));
     };
-    let name = request.mode.unwrap_or("medium");
-    let mode: Maze2dMode = name.parse().map_err(|error: MazeModeError| error.of(name))?;
-    let mut level = Maze2dLevel::new(&mode, request.seed).map_err(|error| InspectError::Usage(error.to_string()))?;
+    let mode: Maze2dMode = read_mode(request.mode.unwrap_or("medium"))?;
+    let mut level = Maze2dLevel::new(&mode, request.seed).map_err(unfit)?;
     if !request.start.is_empty() {
         level.start = start(request.start, &level)?;
     }

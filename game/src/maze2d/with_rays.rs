@@ -1,4 +1,4 @@
-//! Maze2D for balls that see.
+//! Maze2D for balls that are told where the goal and the walls are.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
@@ -10,26 +10,26 @@ use super::{
     game::Maze2d,
     play,
 };
-use crate::with_rays::{GiveEyes, WithRays, add_sights};
+use crate::with_rays::{SenseRays, WithRays, push_rays};
 
-/// How far a ball sees from its centre, in metres: four cells.
-pub const SIGHT: f64 = 4.0;
+/// How far a ray reaches from the centre of a ball, in metres: four cells.
+pub const RAY_LENGTH: f64 = 4.0;
 
-/// Maze2D with eyes, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up the
+/// Maze2D with rays, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up the
 /// rows, against x.
 pub type Maze2dWithRays = WithRays<Maze2d>;
 
-impl GiveEyes for Maze2d {
-    const SIGHTED: &'static str = "maze2d-sighted";
+impl SenseRays for Maze2d {
+    const NAME_WITH_RAYS: &'static str = "maze2d-sighted";
 
-    fn build_eyes(&self, app: &mut App) {
-        app.add_systems(ObserveSchedule, see.after(play::observe).before(VisionSystems::Sync));
+    fn build_rays(&self, app: &mut App) {
+        app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
 /// The walls are squares on a grid, and arenas have no rapier context in training: rays walk the grid, which is exact and
 /// takes no more than a few steps.
-fn see(
+fn sense_rays(
     mut balls: Query<(&Episode, &MazeBall, &PlaysIn, &mut Observation), With<VectorSensor>>,
     arenas: Query<&MazeArena>,
 ) {
@@ -38,8 +38,8 @@ fn see(
         if episode.is_running() {
             let (place, level) = (ball.0.position, &arena.level);
             let to_goal = sub(level.goal(), place).map(|along| along as f32);
-            let wall = |[east, north]: [f64; 2]| level.walls.ray(place, [-north, east], SIGHT) as f32;
-            add_sights(&mut observation, to_goal, wall);
+            let wall = |[east, north]: [f64; 2]| level.walls.ray(place, [-north, east], RAY_LENGTH) as f32;
+            push_rays(&mut observation, to_goal, wall);
         }
     }
 }
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_sees_farther_than_four_cells() {
+    fn no_ray_reaches_farther_than_four_cells() {
         // Six free cells to the east of (3, 1), a wall right behind it.
         let seen = seen("large+no-offset", [3.0, 1.0]);
         assert_near(&[seen[6], seen[10]], &[4.0, 0.5]);

@@ -1,7 +1,5 @@
 //! Measurements and what is drawn of them.
 
-use std::process::Command;
-
 use crate::program::{code, errors, lines, playbot};
 
 #[test]
@@ -61,8 +59,8 @@ fn a_measurement_outlives_its_plot() {
 #[test]
 fn cameras_work_silently_without_a_desktop() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-    command.args(["eyes", "coinrun", "--levels", "hard:0..0", "--frames", "1"]).current_dir(folder.path());
+    let eyes = ["eyes", "coinrun", "--levels", "hard:0..0", "--frames", "1"];
+    let mut command = crate::program::command(folder.path(), &eyes);
     let output = command.env_remove("XDG_RUNTIME_DIR").env_remove("NODEVICE_SELECT").output().expect("it starts");
     assert_eq!(code(&output), 0, "{}", errors(&output));
     assert!(!errors(&output).contains("XDG_RUNTIME_DIR"), "{}", errors(&output));

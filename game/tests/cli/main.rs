@@ -1,6 +1,7 @@
 //! The program as its users call it.
 
 mod eval;
+#[path = "../shared/program.rs"]
 mod program;
 mod trace;
 mod usage;

@@ -1,7 +1,9 @@
 //! From recordings to reports.
 
-use std::process::{Command, Output};
+use std::process::Output;
 
+#[cfg(target_os = "linux")]
+use crate::program::command;
 use crate::program::{code, errors, lines, playbot, said};
 
 #[cfg(target_os = "linux")]
@@ -10,8 +12,7 @@ fn nobody_listening_stops_no_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let deaf = |args: &[&str]| {
         let full = std::fs::File::create("/dev/full").expect("a disk that is always full");
-        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-        command.args(args).current_dir(folder.path()).stderr(full).output().expect("the program starts")
+        command(folder.path(), args).stderr(full).output().expect("the program starts")
     };
     let recorded = deaf(&["record", "coinrun", "--levels", "easy:0..3", "--out", "a.demo"]);
     assert_eq!(code(&recorded), 0);

@@ -1,26 +1,14 @@
 //! `playbot level` and `playbot eval --plot` as their users call them.
 
-use std::{
-    path::Path,
-    process::{Command, Output},
-};
-
 use playbot_games::maze::{MazeSpec, generate};
 use serde_json::{Value, json};
 
-fn playbot(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_playbot")).args(args).current_dir(folder).output().expect("the program starts")
-}
-
-fn text(output: &Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
+use crate::program::{done, ended};
 
 fn level(args: &[&str]) -> Value {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = playbot(folder.path(), &[&["level"], args, &["--json"]].concat());
-    serde_json::from_str(&text(&output)).expect("a line of JSON")
+    let (line, _) = done(folder.path(), &[&["level"], args, &["--json"]].concat());
+    serde_json::from_str(&line).expect("a line of JSON")
 }
 
 #[test]
@@ -51,7 +39,7 @@ fn a_seed_makes_a_maze_and_options_shape_it() {
 #[test]
 fn people_see_the_path() {
     let folder = tempfile::tempdir().expect("a folder");
-    let shown = text(&playbot(folder.path(), &["level", "antmaze", "--map", "umaze"]));
+    let shown = done(folder.path(), &["level", "antmaze", "--map", "umaze"]).0;
     assert!(shown.starts_with("#####\n#S..#\n###.#\n#G..#\n#####\n") && shown.contains("6 moves"), "{shown}");
 }
 
@@ -60,7 +48,7 @@ fn a_file_of_rows_is_a_map() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("mine.txt"), "11111\r\n1r0g1\r\n11111\r\n\n").expect("writable");
     let args = ["level", "maze2d", "--map", "mine.txt", "--json", "--png", "mine.png"];
-    let shown: Value = serde_json::from_str(&text(&playbot(folder.path(), &args))).expect("JSON");
+    let shown: Value = serde_json::from_str(&done(folder.path(), &args).0).expect("JSON");
     assert_eq!((&shown["rows"][1], &shown["shortest_path_length"]), (&json!("#SOG#"), &json!(2)));
     let file = std::fs::File::open(folder.path().join("mine.png")).expect("drawn");
     let size = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG").info().size();
@@ -70,9 +58,9 @@ fn a_file_of_rows_is_a_map() {
 #[test]
 fn what_is_shown_can_be_edited_and_read_back() {
     let folder = tempfile::tempdir().expect("a folder");
-    let shown = text(&playbot(folder.path(), &["level", "antmaze", "--map", "umaze"]));
+    let shown = done(folder.path(), &["level", "antmaze", "--map", "umaze"]).0;
     std::fs::write(folder.path().join("mine.txt"), format!("\u{feff}{shown}")).expect("writable");
-    let again = text(&playbot(folder.path(), &["level", "antmaze", "--map", "mine.txt"]));
+    let again = done(folder.path(), &["level", "antmaze", "--map", "mine.txt"]).0;
     assert_eq!(again, shown);
 }
 
@@ -125,9 +113,7 @@ fn what_is_wrong_with_a_map_is_said() {
         (&["--mode", "medium"], &["--map"]),
         (&["--map", "medium", "--png", "a.gif"], &[".png or .svg"]),
     ] {
-        let output = playbot(folder.path(), &[&["level", "maze2d"], args].concat());
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(3), "{args:?}: {errors}");
+        let (_, errors) = ended(folder.path(), &[&["level", "maze2d"], args].concat(), 3);
         assert!(words.iter().all(|word| errors.contains(word)), "{args:?}: {errors}");
     }
 }
@@ -138,8 +124,8 @@ fn eval_draws_where_players_went() {
     let base =
         ["eval", "--bot", "random", "--bot", "right-jump", "--levels", "hard:64..65", "--episodes-per-level", "1"];
     for file in ["where.svg", "where.png"] {
-        let output = playbot(folder.path(), &[&base[..], &["--json", "--plot", file]].concat());
-        assert_eq!(text(&output).lines().count(), 2);
+        let (rows, _) = done(folder.path(), &[&base[..], &["--json", "--plot", file]].concat());
+        assert_eq!(rows.lines().count(), 2);
     }
     let svg = std::fs::read_to_string(folder.path().join("where.svg")).expect("drawn");
     for part in ["hard:64", "hard:65", ">random<", ">right-jump<", "goal reached in ", "<polyline"] {
@@ -155,9 +141,7 @@ fn eval_draws_where_players_went() {
             "no floor plan",
         ),
     ] {
-        let output = playbot(folder.path(), args);
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(3), "{errors}");
+        let (_, errors) = ended(folder.path(), args, 3);
         assert!(errors.contains(words), "{errors}");
     }
 }

@@ -4,3 +4,5 @@ mod cli;
 mod fixed;
 mod generator;
 mod planner;
+#[path = "../shared/program.rs"]
+mod program;

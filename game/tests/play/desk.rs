@@ -9,6 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::program::command;
+
 /// Nothing takes longer, not even on a machine that draws in software and has other things to do.
 const PATIENCE: Duration = Duration::from_secs(60);
 const NEEDS: &str = "this test opens a window on a display of its own and needs Xvfb, xdotool and a Vulkan driver: \
@@ -47,8 +49,8 @@ impl Desk {
 
     /// The program with these arguments, on this display.
     pub fn playbot(&self, folder: &Path, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-        command.args(args).current_dir(folder).env("DISPLAY", &self.display);
+        let mut command = command(folder, args);
+        command.env("DISPLAY", &self.display);
         command
     }
 

@@ -2,15 +2,14 @@
 #![cfg(feature = "window")]
 
 mod desk;
+#[path = "../shared/program.rs"]
+mod program;
 
-use std::{
-    collections::BTreeSet,
-    path::Path,
-    process::{Command, Output},
-};
+use std::{collections::BTreeSet, path::Path, process::Command};
 
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader, EpisodeActions};
 use desk::Desk;
+use program::{code, command, errors, said};
 
 /// Side of the window.
 const SIDE: usize = 704;
@@ -21,18 +20,13 @@ fn episodes(folder: &Path, file: &str) -> Vec<DemoEpisode> {
     DemoReader::open(folder.join(file)).and_then(DemoReader::read_all).expect("a sound recording")
 }
 
-fn errors(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
 /// Replays a recording without a display, and returns what `demo ls` says of it.
 fn verified(folder: &Path, file: &str) -> String {
     let playbot = |verb: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-        let output = command.args(["demo", verb, file]).current_dir(folder).env_remove("DISPLAY").output();
-        let output = output.expect("the program starts");
-        assert_eq!(output.status.code(), Some(0), "demo {verb}: {}", errors(&output));
-        String::from_utf8_lossy(&output.stdout).into_owned()
+        let mut command = command(folder, &["demo", verb, file]);
+        let output = command.env_remove("DISPLAY").output().expect("the program starts");
+        assert_eq!(code(&output), 0, "demo {verb}: {}", errors(&output));
+        said(&output)
     };
     assert!(playbot("verify").contains("all as recorded"));
     playbot("ls")
@@ -155,7 +149,7 @@ fn what_is_missing_is_named() {
     let play = ["play", "coinrun", "--record", "a.demo"];
     let refuse = |command: &mut Command, words: &str| {
         let output = command.output().expect("the program starts");
-        assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
+        assert_eq!(code(&output), 3, "{}", errors(&output));
         assert!(errors(&output).contains(words), "{}", errors(&output));
         assert!(!folder.path().join("a.demo").exists(), "no recording without a window");
     };

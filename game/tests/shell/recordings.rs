@@ -2,11 +2,13 @@
 
 use std::{fs, path::Path};
 
-use super::{code, errors, lines, playbot, said};
+#[cfg(unix)]
+use crate::program::on_full_disk;
+use crate::program::{code, errors, lines, playbot, said};
 
 fn record(folder: &Path, file: &str, more: &[&str]) {
     let output = playbot(folder, &[&["record", "coinrun", "--out", file], more].concat());
-    assert_eq!(code(&output), Some(0), "{}", errors(&output));
+    assert_eq!(code(&output), 0, "{}", errors(&output));
 }
 
 #[test]
@@ -21,7 +23,7 @@ fn every_recording_is_verified_whatever_is_wrong_with_another() {
     fs::write(folder.join("c.demo"), "not a recording").expect("writable");
 
     let all = playbot(folder, &["demo", "verify", ".", "--json"]);
-    assert_eq!(code(&all), Some(1), "{}", errors(&all));
+    assert_eq!(code(&all), 1, "{}", errors(&all));
     let rows = lines(&all);
     let file = |index: usize| rows[index]["file"].as_str().expect("a path").trim_start_matches("./").to_owned();
     assert_eq!([0, 1, 2, 3].map(file), ["a.demo", "b.demo", "c.demo", "z.demo"]);
@@ -32,9 +34,9 @@ fn every_recording_is_verified_whatever_is_wrong_with_another() {
     assert!(words.contains("b.demo: episode 1") && words.contains("z.demo: 2 episodes"), "{words}");
 
     let sound = playbot(folder, &["demo", "verify", "a.demo", "z.demo"]);
-    assert_eq!((code(&sound), said(&sound).lines().count()), (Some(0), 2));
+    assert_eq!((code(&sound), said(&sound).lines().count()), (0, 2));
     let missing = playbot(folder, &["demo", "verify", "a.demo", "nothing.demo"]);
-    assert_eq!((code(&missing), said(&missing)), (Some(3), String::new()), "a path that is not there is wrong usage");
+    assert_eq!((code(&missing), said(&missing)), (3, String::new()), "a path that is not there is wrong usage");
 }
 
 #[test]
@@ -45,7 +47,7 @@ fn a_repair_that_saves_nothing_says_so() {
     let bytes = fs::read(folder.join("one.demo")).expect("readable");
     fs::write(folder.join("one.demo"), &bytes[..bytes.len() - 5]).expect("writable");
     let repaired = playbot(folder, &["demo", "repair", "one.demo", "--out", "none.demo"]);
-    assert_eq!(code(&repaired), Some(1), "{}", errors(&repaired));
+    assert_eq!(code(&repaired), 1, "{}", errors(&repaired));
     assert!(said(&repaired).contains("no episode is whole, so nothing is kept"), "{}", said(&repaired));
 }
 
@@ -66,7 +68,7 @@ fn an_episode_that_was_cut_off_is_in_no_share() {
 fn a_game_without_demonstrator_is_not_recorded() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = playbot(folder.path(), &["record", "ant", "--out", "y.demo", "--steps", "100"]);
-    assert_eq!(code(&output), Some(3), "{}", errors(&output));
+    assert_eq!(code(&output), 3, "{}", errors(&output));
     for words in ["`ant` has no demonstrator", "train a policy", "playbot play ant --record"] {
         assert!(errors(&output).contains(words), "{}", errors(&output));
     }
@@ -77,12 +79,12 @@ fn a_game_without_demonstrator_is_not_recorded() {
 #[test]
 fn a_full_disk_is_no_wrong_usage() {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = super::on_full_disk(folder.path(), 0, "record coinrun --levels easy:0..0 --out full.demo");
-    assert_eq!(code(&output), Some(2), "{}", errors(&output));
+    let output = on_full_disk(folder.path(), 0, "record coinrun --levels easy:0..0 --out full.demo");
+    assert_eq!(code(&output), 2, "{}", errors(&output));
     assert!(errors(&output).contains("cannot write the header"), "{}", errors(&output));
     fs::create_dir(folder.path().join("a.demo")).expect("writable");
     let output = playbot(folder.path(), &["record", "coinrun", "--levels", "easy:0..0", "--out", "a.demo", "--force"]);
-    assert_eq!(code(&output), Some(3), "a folder was named: {}", errors(&output));
+    assert_eq!(code(&output), 3, "a folder was named: {}", errors(&output));
 }
 
 #[test]
@@ -92,7 +94,7 @@ fn recordings_of_many_testers_become_one_that_replays() {
     record(folder, "ada.demo", &["--levels", "easy:0..1"]);
     record(folder, "bob.demo", &["--levels", "easy:2..4"]);
     let merged = playbot(folder, &["demo", "merge", "--out", "new/all.demo", "ada.demo", "bob.demo", "--json"]);
-    assert_eq!(code(&merged), Some(0), "{}", errors(&merged));
+    assert_eq!(code(&merged), 0, "{}", errors(&merged));
     let report = lines(&merged).remove(0);
     let counts = [0, 1].map(|index| report["files"][index]["episodes"].as_u64());
     assert_eq!((report["episodes"].as_u64(), counts), (Some(5), [Some(2), Some(3)]), "{report}");
@@ -100,7 +102,7 @@ fn recordings_of_many_testers_become_one_that_replays() {
     let levels: Vec<_> = lines(&shown).iter().map(|episode| episode["level"].as_u64()).collect();
     assert_eq!(levels, [0, 1, 2, 3, 4].map(Some), "in the order of the files");
     let verified = playbot(folder, &["demo", "verify", "new/all.demo"]);
-    assert_eq!(code(&verified), Some(0), "{}", errors(&verified));
+    assert_eq!(code(&verified), 0, "{}", errors(&verified));
     assert!(
         said(&verified).contains("5 episodes") && said(&verified).contains("all as recorded"),
         "{}",
@@ -108,7 +110,7 @@ fn recordings_of_many_testers_become_one_that_replays() {
     );
 
     let again = playbot(folder, &["demo", "merge", "--out", "new/all.demo", "ada.demo"]);
-    assert_eq!(code(&again), Some(3), "{}", errors(&again));
+    assert_eq!(code(&again), 3, "{}", errors(&again));
     assert!(errors(&again).contains("exists already; nothing was written"), "{}", errors(&again));
 }
 
@@ -126,7 +128,7 @@ fn recordings_that_do_not_belong_together_are_not_merged() {
         (&[], "<FILE>"),
     ] {
         let output = merge(files);
-        assert_eq!(code(&output), Some(3), "{files:?}: {}", errors(&output));
+        assert_eq!(code(&output), 3, "{files:?}: {}", errors(&output));
         assert!(errors(&output).contains(words), "{files:?}: {}", errors(&output));
         assert!(!folder.join("all.demo").exists(), "{files:?}: nothing is left");
     }

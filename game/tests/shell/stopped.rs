@@ -7,15 +7,14 @@ use std::{
     time::Duration,
 };
 
-use super::{code, errors, lines, playbot};
+use crate::program::{code, command, errors, lines, playbot};
 
 const ENDLESS: u64 = 1_000_000_000;
 
 /// Starts the program, waits until it is at work, presses Ctrl-C and waits for its end.
 fn interrupted(folder: &Path, args: &[&str], at_work: impl Fn() -> bool) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
-    let command = command.args(args).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::piped());
-    let mut child = command.spawn().expect("the program starts");
+    let mut command = command(folder, args);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts");
     while !at_work() {
         assert!(child.try_wait().expect("a child").is_none(), "{args:?} ended by itself");
         std::thread::park_timeout(Duration::from_millis(5));
@@ -23,7 +22,7 @@ fn interrupted(folder: &Path, args: &[&str], at_work: impl Fn() -> bool) -> Outp
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a shell's kill");
     assert!(sent.success());
     let output = child.wait_with_output().expect("a child");
-    assert_eq!(code(&output), Some(130), "{args:?}: {}", errors(&output));
+    assert_eq!(code(&output), 130, "{args:?}: {}", errors(&output));
     output
 }
 
@@ -47,7 +46,7 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     // As it says, but for the number of steps.
     let advice = advice.replace(&rest, "100");
     let output = playbot(folder, &base.into_iter().chain(advice.split(' ')).collect::<Vec<_>>());
-    assert_eq!(code(&output), Some(0), "{}", errors(&output));
+    assert_eq!(code(&output), 0, "{}", errors(&output));
     assert_eq!(listed("steps"), Some(recorded + 100), "the steps that were there are not counted again");
 }
 
@@ -64,7 +63,7 @@ fn stopped_learning_is_not_done() {
     );
     fs::write(folder.join("small.ron"), text).expect("writable");
     let recorded = playbot(folder, &["record", "coinrun", "--levels", "easy:0..3", "--out", "few.demo"]);
-    assert_eq!(code(&recorded), Some(0), "{}", errors(&recorded));
+    assert_eq!(code(&recorded), 0, "{}", errors(&recorded));
     let from = ["--experiment", "small.ron"];
     for (args, sign, words) in [
         (&["learn-skills", "--out", "skills"][..], "skills.checkpoint", "the same command and --resume"),

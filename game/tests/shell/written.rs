@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use super::{code, errors, playbot};
+#[cfg(unix)]
+use crate::program::on_full_disk;
+use crate::program::{code, errors, playbot};
 
 #[test]
 fn a_file_that_cannot_be_written_is_refused_before_anything_is_read() {
@@ -13,7 +15,7 @@ fn a_file_that_cannot_be_written_is_refused_before_anything_is_read() {
     for verb in [&["learn-skills", "--demos", "missing"][..], &["policy", "export", "--run", "missing"]] {
         for (out, exit, words) in [("file/out", 2, "cannot create file"), ("folder", 3, "folder is a folder")] {
             let output = playbot(folder, &[verb, &["--out", out, "--force"]].concat());
-            assert_eq!(code(&output), Some(exit), "{verb:?}: {}", errors(&output));
+            assert_eq!(code(&output), exit, "{verb:?}: {}", errors(&output));
             assert!(errors(&output).contains(words), "{verb:?}: {}", errors(&output));
         }
     }
@@ -24,13 +26,13 @@ fn the_folder_of_a_skill_model_is_made() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let recorded = playbot(folder, &["record", "coinrun", "--levels", "easy:0..3", "--out", "few.demo"]);
-    assert_eq!(code(&recorded), Some(0), "{}", errors(&recorded));
+    assert_eq!(code(&recorded), 0, "{}", errors(&recorded));
     let sets = ["hidden=[16]", "encoder_hidden=8", "gru_hidden=8", "window=5", "epochs=1"];
     let sets = sets.iter().flat_map(|set| ["--set".to_owned(), format!("skills.{set}")]).collect::<Vec<_>>();
     let mut args = vec!["learn-skills", "--demos", "few.demo", "--out", "new/folder/skills", "--max-steps", "10"];
     args.extend(sets.iter().map(String::as_str));
     let output = playbot(folder, &args);
-    assert_eq!(code(&output), Some(0), "{}", errors(&output));
+    assert_eq!(code(&output), 0, "{}", errors(&output));
     assert!(
         errors(&output).contains("steps in 1 episode from few.demo (more than was asked for"),
         "{}",
@@ -50,11 +52,11 @@ fn a_training_that_was_never_saved_is_started_again() {
         ppo: (num_steps: 32, minibatches: 4, hidden: [32, 32]))"#;
     fs::write(folder.path().join("small.ron"), text).expect("writable");
     let train = "train --algorithm ppo --experiment small.ron --run full";
-    let output = super::on_full_disk(folder.path(), 64, train);
-    assert_eq!(code(&output), Some(2), "{}", errors(&output));
+    let output = on_full_disk(folder.path(), 64, train);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
     let words = errors(&output);
     assert!(words.contains("cannot write") && words.contains("start again (`train` with --force"), "{words}");
     let again: Vec<&str> = train.split(' ').chain(["--force"]).collect();
     let output = playbot(folder.path(), &again);
-    assert_eq!(code(&output), Some(0), "as it was told to: {}", errors(&output));
+    assert_eq!(code(&output), 0, "as it was told to: {}", errors(&output));
 }

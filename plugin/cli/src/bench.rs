@@ -27,7 +27,7 @@ use super::{
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --json
-  playbot bench --case sim/coinrun/vector --threads 1")]
+  playbot bench --case sim/GAME --threads 1")]
 pub struct Args {
     /// Only cases whose name contains this.
     #[arg(long, default_value = "")]

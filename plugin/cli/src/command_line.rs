@@ -2,19 +2,20 @@
 
 use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use playbot_lab::{game::Game, games::Games};
 
 use crate::{
     bench, config, demo, doctor,
     error::{CliError, Outcome},
-    eval, eyes, interrupt, learn_skills, level, play, policy, quickstart, record, runs, study, trace, train, view,
+    eval, eyes, help, interrupt, learn_skills, level, play, policy, program, quickstart, record, runs, study, trace,
+    train, view,
 };
 
 /// Playtesting bots that learn from demonstrations.
 #[derive(Parser)]
-#[command(name = "playbot", version, after_help = EXAMPLES)]
-struct Cli {
+#[command(name = program::USUAL, version, after_help = EXAMPLES)]
+pub(crate) struct Cli {
     /// What to do; `quickstart` if nothing is given.
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -25,20 +26,19 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  playbot                                          learn, train and test on CoinRun in a few minutes
-  playbot level coinrun --mode hard --seed 7       show a level
-  playbot record coinrun --levels easy:0..9 --out my.demo
-  playbot play coinrun --seed 7 --record my.demo   play it yourself
-  playbot demo verify demos/coinrun
-  playbot doctor coinrun                           is the game the same every time?
-  playbot doctor coinrun                           is the game the same every time?
-  playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
-  playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
+  playbot   learn, train and test on GAME, and write a report
+  playbot level GAME --seed 7   show a level
+  playbot record GAME --levels MODE:0..9 --out my.demo
+  playbot play GAME --seed 7 --record my.demo   play it yourself
+  playbot demo verify my.demo   does it replay?
+  playbot doctor GAME   is the game the same every time?
+  playbot learn-skills --out skills.safetensors
+  playbot train --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
-  playbot policy export --run runs/first --out coinrun.policy
-  playbot config show --set ppo.lr=0.0003          an experiment with all its values
-  playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
-  playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
+  playbot policy export --run runs/first --out GAME.policy
+  playbot config show --set ppo.lr=0.0003   an experiment with all its values
+  playbot study --experiment my.ron --out study
+  playbot view GAME --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
@@ -107,7 +107,7 @@ where
 pub fn main(games: &[&dyn Game]) -> ExitCode {
     #[cfg(all(target_os = "linux", feature = "camera"))]
     crate::mesa::silence_warnings();
-    let cli = match Cli::try_parse() {
+    let cli = match read(games) {
         Ok(cli) => cli,
         Err(error) => {
             // Asking for help is no mistake; anything else is a wrong usage, which is 3 here.
@@ -131,7 +131,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            tell!("error: {error}");
+            tell!("error: {}", program::named(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
         Err(_) => {
@@ -139,6 +139,17 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// What the process was called with.
+fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
+    let mut command = help::named(Cli::command(), program::name(), games).name(program::name());
+    if program::name() != program::USUAL {
+        // The version is this crate's, and nobody here knows the game's.
+        command = command.version(concat!("(playbot_cli ", env!("CARGO_PKG_VERSION"), ")"));
+    }
+    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {

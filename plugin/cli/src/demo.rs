@@ -15,15 +15,15 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::resolve,
     number::counted,
-    progress,
+    program, progress,
 };
 
 /// Look at, check, repair and join recordings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot demo ls
-  playbot demo show demos/coinrun/easy.demo --episode 0
-  playbot demo verify demos/coinrun
+  playbot demo show my.demo --episode 0
+  playbot demo verify demos/GAME
   playbot demo verify a.demo b.demo --json
   playbot demo repair torn.demo --out whole.demo
   playbot demo merge --out all.demo alice.demo bob.demo")]
@@ -104,7 +104,7 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
         let summary = match DemoSummary::read(&file) {
             Ok(summary) => summary,
             Err(error) => {
-                tell!("{error}");
+                tell!("{}", program::named(&error.to_string()));
                 outcome = Outcome::Findings;
                 continue;
             }
@@ -227,7 +227,7 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
             outcome = Outcome::Findings;
         }
         if as_json {
-            let error = checked.as_ref().err().map(ToString::to_string);
+            let error = checked.as_ref().err().map(|error| program::named(&error.to_string()));
             print_line(json!({ "file": file, "report": checked.ok(), "error": error }))?;
         } else {
             print_report(file, checked)?;
@@ -254,7 +254,7 @@ fn in_file(file: &Path, error: &impl std::fmt::Display) -> CliError {
 fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<(), CliError> {
     let report = match checked {
         Ok(report) => report,
-        Err(error) => return print_line(error),
+        Err(error) => return print_line(program::named(&error.to_string())),
     };
     for (episode, divergence) in &report.divergences {
         print_line(format!("{}: episode {episode}: {divergence}", file.display()))?;

@@ -22,9 +22,9 @@ use super::{
 /// in one World against each alone, and the same level again after a restart. Exit code 1 if something was found.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot doctor coinrun
+  playbot doctor GAME
   playbot doctor maze2d --mode medium --ticks 1000 --json
-  playbot doctor coinrun --ignore HighScore")]
+  playbot doctor GAME --ignore HighScore")]
 pub struct Args {
     /// Name of the game.
     game: String,

@@ -13,19 +13,18 @@ use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
     held_out::HeldOut,
-    parallel::default_threads,
     report::to_text_table,
     split::LevelSplit,
     train::{Experiment, checkpoint::Which, run_dir::RunDir},
 };
-use playbot_learner::{DeviceKind, PolicyFile, SkillModel, SkillSource};
+use playbot_learner::{PolicyFile, SkillModel, SkillSource};
 
 use super::{
+    compute::Compute,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
     footprints::Footprints,
     methods,
-    number::at_least_one,
     player::Chosen,
 };
 
@@ -33,11 +32,11 @@ use super::{
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eval --run runs/first
-  playbot eval --bot right-jump --bot random --levels hard:0..63 --json
+  playbot eval --bot BOT --bot random --levels MODE:0..63 --json
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
-  playbot eval --run runs/first --bot right-jump --levels hard:64..66 --plot where.png
-  playbot eval --run runs/first --bot search --levels hard:64..127 --levels easy:500..599")]
+  playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
+  playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599")]
 pub struct Args {
     /// Folder of a run; may be given several times.
     #[arg(long)]
@@ -72,12 +71,8 @@ pub struct Args {
     /// Seed of the players' draws, instead of the experiment's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
-    threads: usize,
-    /// Where to compute: flex or ndarray.
-    #[arg(long, default_value_t)]
-    device: DeviceKind,
+    #[command(flatten)]
+    compute: Compute,
     /// Also draw where the players went, and how often they were where, into this .png or .svg.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -96,7 +91,6 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let experiment = read_experiment(&args, games)?;
     let game = games.get(&experiment.game)?;
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
-    let episodes = experiment.eval.episodes_per_level;
     if args.levels.is_empty() {
         let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
         experiment.check_test(game).map_err(or_levels)?;
@@ -107,10 +101,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut rows = Vec::new();
     for split in &splits {
         for Chosen { name, player, observation_config } in &players {
-            let plan = EvalPlan {
-                observation_config: *observation_config,
-                ..methods::plan(&experiment, split, episodes, args.threads)
-            };
+            let plan =
+                EvalPlan { observation_config: *observation_config, ..EvalPlan::of(&experiment, split, args.compute.threads()) };
             let measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = methods::follow(game, name, player, &plan)?;
@@ -157,7 +149,7 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
 /// The game of the first policy file, and levels of it, where nobody says which: the built-in experiment is CoinRun's.
 fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
-    let file = PolicyFile::load(path, args.device)?;
+    let file = PolicyFile::load(path, args.compute.device())?;
     let game = games.get(&file.card.game)?;
     if args.from.load(games, [])?.game == game.name() {
         return Ok(Vec::new());
@@ -172,17 +164,17 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
     for path in &args.run {
         let (run, own, info) = RunDir::open(path)?;
         check_run(path, game, &own, experiment, args)?;
-        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.device)?;
+        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.compute.device())?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
-        let model = SkillModel::load(path, args.device)?;
+        let model = SkillModel::load(path, args.compute.device())?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
         let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
         players.push(named(chosen, path, args.skills.len()));
     }
     for path in &args.policy {
-        let chosen = Chosen::policy_file(game, path, draw, args.device)?;
+        let chosen = Chosen::policy_file(game, path, draw, args.compute.device())?;
         players.push(named(chosen, path, args.policy.len()));
     }
     for name in &args.bot {

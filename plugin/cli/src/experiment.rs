@@ -7,6 +7,7 @@ use std::{
 };
 
 use playbot_lab::{
+    experiment_text::ExperimentText,
     games::Games,
     train::{
         Experiment,
@@ -41,8 +42,8 @@ impl ExperimentArgs {
         match &self.experiment {
             Some(path) => read_experiment_with(path, &sets),
             None => {
-                let (path, text) = default_experiment(games);
-                parse_experiment_with(&text, Path::new(&path), &sets)
+                let ExperimentText { origin, text } = default_experiment(games);
+                parse_experiment_with(&text, Path::new(&*origin), &sets)
             }
         }
     }

@@ -17,7 +17,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     output,
     player::Chosen,
-    progress,
+    program, progress,
     view::{film::to_png, screen::Screen},
 };
 
@@ -25,8 +25,8 @@ use super::{
 /// that it plays with the other.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot eyes coinrun
-  playbot eyes coinrun --levels hard:0..49 --frames 10 --out docs/eyes-coinrun --json
+  playbot eyes GAME
+  playbot eyes GAME --levels MODE:0..49 --frames 10 --out eyes --json
 
 Exit code 1 if the pictures are further apart than --most-mean and --least-close allow. Needs the feature `camera`.")]
 pub struct Args {
@@ -167,7 +167,7 @@ impl Looker {
     /// Plays a tick and returns the picture that it began with; `None` when all levels have been played.
     fn tick(&mut self) -> Result<Option<Seen>, CliError> {
         tick_world(&mut self.world)?;
-        if !self.world.get::<Control>(self.agent).is_some_and(|control| control.is_active()) {
+        if !Control::of(&self.world, self.agent).is_active() {
             return Ok(None);
         }
         let episode = self.world.get::<Episode>(self.agent).expect("required by Agent");
@@ -229,9 +229,10 @@ fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), Cli
     }
     let text = format!(
         "# Camera and raster, {}\n\n{}\n\nThe worst frame, by the raster, by the camera, and their difference times \
-         four:\n\n![the worst frame](worst.png)\n\n```sh\nplaybot eyes {} --levels {} --frames {} --out {}\n```\n",
+         four:\n\n![the worst frame](worst.png)\n\n```sh\n{} eyes {} --levels {} --frames {} --out {}\n```\n",
         summary.game,
         table(summary),
+        program::name(),
         summary.game,
         summary.levels,
         args.frames,

@@ -9,23 +9,24 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
     game::Game,
-    parallel::default_threads,
     train::Experiment,
 };
 use playbot_learner::{Dataset, DeviceKind, SkillMetrics, SkillModel, SkillTrainer};
 use serde_json::json;
 
 use super::{
+    compute::Compute,
     error::{CliError, Outcome, print_line},
     experiment::{self, ExperimentArgs, option},
     interrupt,
-    number::{at_least_one, counted},
+    number::counted,
     output::{beside, prepare},
     progress,
 };
 
 /// Learns the skill model (encoder, decoder, prior) from recordings.
 #[derive(clap::Args)]
+#[command(mut_arg("threads", |threads| threads.help("Threads that replay recordings; the result does not depend on it")))]
 #[command(after_help = "Examples:
   playbot learn-skills --out skills.safetensors
   playbot learn-skills --set observation=Raster --max-steps 30000 --out eyes.safetensors
@@ -53,12 +54,8 @@ pub struct Args {
     /// Go on where Ctrl-C or a crash stopped, from FILE.checkpoint.
     #[arg(long)]
     resume: bool,
-    /// Threads that replay recordings; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
-    threads: usize,
-    /// Where to compute: flex or ndarray.
-    #[arg(long, default_value_t)]
-    device: DeviceKind,
+    #[command(flatten)]
+    compute: Compute,
     /// Print the metrics of each epoch as a line of JSON.
     #[arg(long)]
     json: bool,
@@ -74,7 +71,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None => experiment::resolve(experiment.recordings()?),
     };
     prepare(&args.out)?;
-    let dataset = read_demos(game, &experiment, &demos, args.threads)?;
+    let dataset = read_demos(game, &experiment, &demos, args.compute.threads())?;
     if args.force {
         // Not earlier: what there is stays if there is nothing to learn from.
         remove(&checkpoint)?;
@@ -83,7 +80,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let report = |epoch, metrics: &SkillMetrics| {
         if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
     };
-    match learn(&experiment, dataset, args.device, Some(&checkpoint), report)? {
+    match learn(&experiment, dataset, args.compute.device(), Some(&checkpoint), report)? {
         None => {
             tell!("stopped and saved; no skill model is written yet: go on with the same command and --resume");
             return Ok(Outcome::Stopped);
@@ -148,11 +145,8 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 /// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_actions(game.actions())?;
+    let demos = Demonstrations::of(game, experiment, path)?;
     let observation_config = experiment.observation_config();
-    let mut demos = Demonstrations::read(game, &observation_config, path, Some(&experiment.test))?;
-    if let Some(steps) = experiment.demo_steps {
-        demos = demos.at_most(steps);
-    }
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
     begin_to_tell!(
         "{} in {} from {}",

@@ -17,9 +17,9 @@ use crate::{
 /// Shows the layout of a level.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot level coinrun --mode hard --seed 7
-  playbot level coinrun --mode easy --seed 0 --json
-  playbot level coinrun --seed 7 --png level.png
+  playbot level GAME --mode MODE --seed 7
+  playbot level GAME --seed 0 --json
+  playbot level GAME --seed 7 --png level.png
   playbot level antmaze --map large
   playbot level maze2d --seed 7 --json
   playbot level maze2d --map random+size=21x21+loops=0.2 --seed 7

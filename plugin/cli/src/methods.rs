@@ -5,8 +5,6 @@ use playbot_lab::{
     eval::{EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, evaluate, evaluate_with_trails, summarize},
     game::Game,
     report::ResultRow,
-    split::LevelSplit,
-    train::Experiment,
 };
 use serde_json::json;
 
@@ -34,19 +32,6 @@ pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
 /// Names of all bots of a game.
 pub fn bot_names(game: &dyn Game) -> Vec<&'static str> {
     game.blind_bots().into_iter().map(|(name, _)| name).chain(game.demonstrator()).collect()
-}
-
-/// The plan of an experiment for one split, for a player that sees as the experiment says.
-pub fn plan(experiment: &Experiment, split: &LevelSplit, episodes_per_level: u32, threads: usize) -> EvalPlan {
-    EvalPlan {
-        split: split.clone(),
-        observation_config: experiment.observation_config(),
-        episodes_per_level,
-        seed: experiment.seed,
-        arenas: experiment.arenas,
-        worlds: experiment.worlds,
-        threads,
-    }
 }
 
 /// A measured player: its row of the result table, its episodes and its speed.

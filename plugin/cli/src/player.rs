@@ -14,10 +14,11 @@ use playbot_lab::{
 };
 use playbot_learner::{DeviceKind, PolicyFile};
 
-use super::{error::CliError, methods};
+use super::{compute::Device, error::CliError, methods};
 
 /// A policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
+#[command(mut_arg("device", |device| device.help("Where the policy computes: flex or ndarray")))]
 pub struct PlayerArgs {
     /// Policy file, as written by `playbot policy export`.
     #[arg(long, value_name = "FILE", group = "player")]
@@ -34,9 +35,8 @@ pub struct PlayerArgs {
     /// The policy takes its most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
-    /// Where the policy computes: flex or ndarray.
-    #[arg(long, default_value_t)]
-    device: DeviceKind,
+    #[command(flatten)]
+    device: Device,
 }
 
 /// A player, its name and what it sees.
@@ -82,12 +82,8 @@ impl Chosen {
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
         let file = PolicyFile::load(path, device)?;
         check_policy(&game.card(), &file)?;
-        let (prior, observation_config) = (file.skills.as_ref().map(SkillPrior::from), policy_observation(&file)?);
-        Ok(Self {
-            name: file.card.algorithm,
-            player: Player::Policy { policy: file.policy, prior, draw },
-            observation_config,
-        })
+        let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
+        Ok(Self { name: file.card.algorithm, player, observation_config })
     }
 
     /// What a run has learned, under the name of its algorithm.
@@ -144,14 +140,14 @@ impl PlayerArgs {
             return Ok(Some(Chosen::bot(game, name)?));
         }
         if let Some(path) = &self.policy {
-            return Ok(Some(Chosen::policy_file(game, path, draw, self.device)?));
+            return Ok(Some(Chosen::policy_file(game, path, draw, self.device.device)?));
         }
         let Some(path) = &self.run else { return Ok(None) };
         let (run, experiment, info) = RunDir::open(path)?;
         if experiment.game != game.name() {
             return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
         }
-        let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, self.device)?;
+        let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, self.device.device)?;
         chosen.check_fit(game)?;
         Ok(Some(chosen))
     }

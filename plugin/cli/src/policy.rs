@@ -7,26 +7,28 @@ use bevy_playbot::policy_file::policy_observation;
 use playbot_lab::games::Games;
 use playbot_lab::{
     game::Game,
-    policy_export::{export_policy, policy_file},
+    policy_export::{Provenance, export_policy, policy_file},
     train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
 };
 use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
 use serde_json::json;
 
 use super::{
+    compute::Device,
     error::{CliError, Outcome, print_line},
     eval::{check_skills, cloning_skills},
     experiment::{ExperimentArgs, quoted},
     output::prepare,
+    program,
 };
 
 /// Make and look at the policy files that a game ships with.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot policy export --run runs/first --checkpoint best --out coinrun.policy
+  playbot policy export --run runs/first --checkpoint best --out GAME.policy
   playbot policy export --skills skills.safetensors --out clone.policy
-  playbot policy show coinrun.policy
-  playbot eval --policy coinrun.policy")]
+  playbot policy show GAME.policy
+  playbot eval --policy GAME.policy")]
 pub struct Args {
     #[command(subcommand)]
     verb: Verb,
@@ -40,9 +42,8 @@ enum Verb {
     Show {
         /// The file.
         file: PathBuf,
-        /// Where to compute: flex or ndarray.
-        #[arg(long, default_value_t)]
-        device: DeviceKind,
+        #[command(flatten)]
+        device: Device,
         /// Print it as a line of JSON.
         #[arg(long)]
         json: bool,
@@ -73,7 +74,7 @@ struct Export {
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Export(args) => export(&args, games),
-        Verb::Show { file, device, json } => show(&file, device, json),
+        Verb::Show { file, device, json } => show(&file, device.device, json),
     }
 }
 
@@ -90,7 +91,7 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
     check_policy(&game.card(), &file)?;
     export_policy(game, &file, &experiment.train, experiment.seed, &args.out)?;
     let out = args.out.display().to_string();
-    let mut command = format!("playbot eval --policy {}", quoted(&out));
+    let mut command = format!("{} eval --policy {}", program::name(), quoted(&out));
     if experiment.check_test(game).is_ok() {
         command += &format!(" --levels {}", quoted(&experiment.test.to_string()));
     }
@@ -109,7 +110,8 @@ fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<
         "{} of {} steps on {}, seed {}",
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed
     );
-    let about = (info.algorithm.name().to_owned(), training, code(&info.version, &info.revision));
+    let algorithm = info.algorithm.name().to_owned();
+    let about = Provenance { algorithm, training, code: code(&info.version, &info.revision) };
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
     file.card.game_version = info.game_version;
@@ -125,15 +127,16 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
         Some(demos) => format!("demonstrations in {}", demos.display()),
         None => "demonstrations".to_owned(),
     };
-    let about = ("bc".to_owned(), training, code);
+    let about = Provenance { algorithm: "bc".to_owned(), training, code };
     let observation_config = check_skills(path, &model, game, from, games)?;
     experiment.check_train(game)?;
     let file = policy_file(game, &observation_config, model.policy(), Some(cloning_skills(&model, &experiment)), about);
     Ok((game, experiment, file))
 }
 
+/// What trained a policy: playbot, whatever the game is, which has a version of its own in the card.
 fn code(version: &str, revision: &str) -> String {
-    format!("{version} ({revision})")
+    format!("playbot {version} ({revision})")
 }
 
 fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliError> {

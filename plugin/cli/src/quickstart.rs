@@ -10,9 +10,8 @@ use std::{
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::games::Games;
 use playbot_lab::{
-    eval::Player,
+    eval::{EvalPlan, Player},
     game::Game,
-    parallel::default_threads,
     report::to_text_table,
     train::{
         Algorithm, Experiment, Trainer,
@@ -26,11 +25,11 @@ use serde_json::json;
 use report::write_report;
 
 use super::{
+    compute::Threads,
     error::{CliError, Outcome, print_line},
     eval::cloning,
     experiment::{self, ExperimentArgs, option},
-    interrupt, learn_skills, methods,
-    number::at_least_one,
+    interrupt, learn_skills, methods, program,
     train::{create_run, drive},
 };
 
@@ -58,9 +57,8 @@ pub struct Args {
     /// Passes over the demonstrations, instead of the experiment's.
     #[arg(long)]
     epochs: Option<usize>,
-    /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
-    threads: usize,
+    #[command(flatten)]
+    threads: Threads,
     /// One line of JSON per method instead of a table.
     #[arg(long)]
     json: bool,
@@ -74,7 +72,7 @@ impl Default for Args {
             seed: None,
             steps: None,
             epochs: None,
-            threads: default_threads(),
+            threads: Threads::default(),
             json: false,
         }
     }
@@ -102,7 +100,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() }.check_memory(game)?;
     let _lock = take_folder(&args.run)?;
     let Some(skills) = skills(game, &experiment, &args)? else {
-        tell!("stopped while learning skills; nothing was saved, start again with `playbot quickstart`");
+        tell!("stopped while learning skills; nothing was saved, start again with `{} quickstart`", program::name());
         return Ok(Outcome::Stopped);
     };
     let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
@@ -120,7 +118,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let mut rows = Vec::new();
     for (name, player) in &players {
-        let plan = methods::plan(&experiment, &experiment.test, experiment.eval.episodes_per_level, args.threads);
+        let plan = EvalPlan::of(&experiment, &experiment.test, args.threads.threads);
         let measured = methods::measure(game, name, player, &plan)?;
         if args.json {
             methods::print_json(&measured.summary)?;
@@ -176,7 +174,7 @@ fn take_folder(path: &Path) -> Result<RunLock, CliError> {
 fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Option<SkillModel>, CliError> {
     interrupt::listen();
     let demos = experiment::resolve(experiment.recordings()?);
-    let dataset = learn_skills::read_demos(game, experiment, &demos, args.threads)?;
+    let dataset = learn_skills::read_demos(game, experiment, &demos, args.threads.threads)?;
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });
@@ -199,7 +197,7 @@ fn train_one(
 ) -> Result<Trained, CliError> {
     let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
-    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads)?;
+    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.threads)?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
     let run = create_run(&folder, game, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
     let (start, mut curve) = (Instant::now(), Vec::new());
@@ -219,9 +217,10 @@ fn train_one(
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     let run = args.run.join(algorithm.name());
     tell!(
-        "stopped and saved; there is no report yet: go on with this training alone, `playbot train --run {} --resume`, \
-         or start again with `playbot quickstart`",
-        run.display()
+        "stopped and saved; there is no report yet: go on with this training alone, `{program} train --run {} --resume`, \
+         or start again with `{program} quickstart`",
+        run.display(),
+        program = program::name()
     );
     Outcome::Stopped
 }

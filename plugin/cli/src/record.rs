@@ -19,8 +19,8 @@ use super::{
 /// Records the game's demonstrator: a bot that plans, with noise on its actions.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot record coinrun --levels hard:0..9 --out my.demo
-  playbot record coinrun --levels easy:0..499 --noise 0.2 --steps 100000 --out demos/coinrun/easy.demo
+  playbot record GAME --levels MODE:0..9 --out my.demo
+  playbot record GAME --levels MODE:128..499 --noise 0.2 --steps 100000 --out demos/GAME/noisy.demo
   playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
   playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo")]
 pub struct Args {
@@ -181,7 +181,7 @@ fn play(
         let recorder = world.resource::<Recorder>();
         let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
         bar.set_position(done);
-        let idle = !world.get::<Control>(agent).is_some_and(|control| control.is_active());
+        let idle = !Control::of(world, agent).is_active();
         if idle || steps.is_some_and(|steps| done >= steps) {
             break true;
         }

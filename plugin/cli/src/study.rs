@@ -6,7 +6,6 @@ use bevy_playbot::unknown_name::UnknownName;
 use indicatif::ProgressBar;
 use playbot_lab::games::Games;
 use playbot_lab::{
-    parallel::default_threads,
     report::StudyReport,
     train::{
         Experiment,
@@ -18,11 +17,10 @@ use playbot_learner::DeviceKind;
 use serde_json::json;
 
 use super::{
+    compute::Compute,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
-    interrupt,
-    number::at_least_one,
-    progress,
+    interrupt, program, progress,
     study_run::Runner,
 };
 
@@ -30,7 +28,7 @@ use super::{
 /// tables and the plot say nothing of the machine: the same study gives the same files.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot study --experiment assets/experiments/coinrun-ablation.ron --out docs/ablation-coinrun
+  playbot study --experiment my.ron --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
   playbot study --experiment my.ron --variant full --variant no-kl --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume")]
@@ -55,12 +53,8 @@ pub struct Args {
     /// Replace the runs that are there.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
-    /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
-    threads: usize,
-    /// Where to compute: flex or ndarray.
-    #[arg(long, default_value_t)]
-    device: DeviceKind,
+    #[command(flatten)]
+    compute: Compute,
     /// One line of JSON per run instead of the table.
     #[arg(long)]
     json: bool,
@@ -79,7 +73,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
     }
     interrupt::listen();
-    let mut runner = Runner::new(games, &folder, args.force, args.device, args.threads);
+    let mut runner = Runner::new(games, &folder, args.force, args.compute.device(), args.compute.threads());
     runner.check_folders(&runs)?;
     if args.force {
         runner.check_demos(&runs)?;
@@ -182,7 +176,7 @@ fn write(out: &Path, report: &StudyReport) -> Result<(), CliError> {
 
 /// The command that gives the same files: without what does not change them.
 fn command(args: &Args) -> String {
-    let mut words = vec!["playbot study".to_owned()];
+    let mut words = vec![format!("{} study", program::name())];
     let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
     if let Some(path) = &args.from.experiment {
         push("experiment", path.display().to_string());
@@ -196,8 +190,8 @@ fn command(args: &Args) -> String {
     if !args.seeds.is_empty() {
         push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
     }
-    if args.device != DeviceKind::default() {
-        push("device", args.device.to_string());
+    if args.compute.device() != DeviceKind::default() {
+        push("device", args.compute.device().to_string());
     }
     push("out", args.out.display().to_string());
     words.join(" ")

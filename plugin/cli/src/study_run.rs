@@ -9,7 +9,7 @@ use std::{
 use bevy_playbot::{policy::ActionDraw, vision::ObservationConfig};
 use playbot_lab::games::Games;
 use playbot_lab::{
-    eval::Player,
+    eval::{EvalPlan, Player},
     game::Game,
     report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
     runs::RunCurves,
@@ -91,7 +91,7 @@ impl<'a> Runner<'a> {
             return Ok(None);
         };
         let experiment = &run.experiment;
-        let plan = methods::plan(experiment, &experiment.test, experiment.eval.episodes_per_level, self.threads);
+        let plan = EvalPlan::of(experiment, &experiment.test, self.threads);
         let measured = methods::measure(game, &run.id(), &player, &plan)?;
         let result = StudyResult {
             variant: run.variant.clone(),
@@ -155,7 +155,7 @@ impl<'a> Runner<'a> {
         let revision = env!("PLAYBOT_REVISION");
         if info.revision != revision {
             let folder = folder.display();
-            tell!("warning: {folder} was made by revision {} of the code; this is {revision}", info.revision);
+            tell!("warning: {folder} was made by revision {} of playbot; this is {revision}", info.revision);
         }
         if info.device != self.device {
             tell!("warning: {} was made on {}, not on {}", folder.display(), info.device, self.device);

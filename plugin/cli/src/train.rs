@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use playbot_lab::games::Games;
 use playbot_lab::{
     game::Game,
-    parallel::default_threads,
     train::{
         Algorithm, Experiment, TrainError, Trainer, UpdateReport,
         checkpoint::Which,
@@ -16,11 +15,10 @@ use playbot_lab::{
 use playbot_learner::{DeviceKind, SkillModel};
 
 use super::{
+    compute::Compute,
     error::{CliError, Outcome},
     experiment::{ExperimentArgs, option},
-    interrupt,
-    number::at_least_one,
-    progress,
+    interrupt, program, progress,
 };
 
 /// Trains a policy, headless, over the experiment's training levels.
@@ -54,29 +52,26 @@ pub struct Args {
     /// Seed, instead of the experiment's.
     #[arg(long, conflicts_with = "resume")]
     seed: Option<u64>,
-    /// Threads; the result does not depend on it.
-    #[arg(long, default_value_t = default_threads(), value_parser = at_least_one)]
-    threads: usize,
+    #[command(flatten)]
+    compute: Compute,
     /// Save a checkpoint every so many updates, instead of the experiment's.
     #[arg(long)]
     checkpoint_every: Option<u64>,
-    /// Where to compute: flex or ndarray.
-    #[arg(long, default_value_t)]
-    device: DeviceKind,
 }
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let (run, mut trainer) = if args.resume { resume(&args, games)? } else { start(&args, games)? };
     let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
-        tell!("done: test it with `playbot eval --run {}`", args.run.display());
+        tell!("done: test it with `{} eval --run {}`", program::name(), args.run.display());
         Ok(Outcome::Pass)
     } else {
         let (steps, wanted) = (trainer.steps(), trainer.experiment().steps);
         let run = args.run.display();
         tell!(
             "stopped and saved after {steps} of {wanted} steps, so the training is incomplete: go on with \
-             `playbot train --run {run} --resume`"
+             `{} train --run {run} --resume`",
+            program::name()
         );
         Ok(Outcome::Stopped)
     }
@@ -94,11 +89,11 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     )?;
     let game = games.get(&experiment.game)?;
     let skills = match &args.skills {
-        Some(path) => Some(SkillModel::load(path, args.device)?),
+        Some(path) => Some(SkillModel::load(path, args.compute.device())?),
         None => None,
     };
-    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.device, args.threads)?;
-    let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.device, args.force)?;
+    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.compute.device(), args.compute.threads())?;
+    let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.compute.device(), args.force)?;
     Ok((run, trainer))
 }
 
@@ -108,7 +103,7 @@ fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
     let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
     experiment.check()?;
-    let trainer = run.resume(game, &experiment, args.device, args.threads)?;
+    let trainer = run.resume(game, &experiment, args.compute.device(), args.compute.threads())?;
     if experiment != saved {
         run.write_experiment(&experiment)?;
     }

@@ -10,7 +10,8 @@ use thiserror::Error;
 pub use bevy_playbot::episode::EpisodeResult;
 
 use crate::{
-    arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, worlds::build_observing_world,
+    arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, train::Experiment,
+    worlds::build_observing_world,
 };
 use bevy_playbot::{
     agent::Agent,
@@ -105,6 +106,21 @@ pub struct EvalPlan {
     pub worlds: u32,
     /// Threads: not part of the result.
     pub threads: usize,
+}
+
+impl EvalPlan {
+    /// How an experiment measures on these levels, for a player that sees as it says.
+    pub fn of(experiment: &Experiment, split: &LevelSplit, threads: usize) -> Self {
+        Self {
+            split: split.clone(),
+            observation_config: experiment.observation_config(),
+            episodes_per_level: experiment.eval.episodes_per_level,
+            seed: experiment.seed,
+            arenas: experiment.arenas,
+            worlds: experiment.worlds,
+            threads,
+        }
+    }
 }
 
 /// The summary of a measurement: one row of a result table.
@@ -237,7 +253,7 @@ fn play_out(
     let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
     let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
     let mut trails = Vec::new();
-    while everybody.iter().any(|agent| world.get::<Control>(*agent).is_some_and(|control| control.is_active())) {
+    while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) {
         tick_world(world)?;
         let ended = std::mem::take(&mut world.resource_mut::<Results>().0);
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {

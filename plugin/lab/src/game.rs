@@ -6,6 +6,7 @@ use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use crate::{
     benchmark::Benchmark,
+    experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
     mode::ModeError,
@@ -155,9 +156,8 @@ pub trait Game: Send + Sync {
     /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
     fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 
-    /// The experiment of the game that serves where none is named: the path it has below the game's sources, and its text.
-    /// `None` for the plainest one, see [`default_experiment`](crate::train::default_experiment::default_experiment).
-    fn experiment(&self) -> Option<(&'static str, &'static str)> {
+    /// The experiment of the game that serves where none is named; `None` for the plainest one, see [`default_experiment`](crate::train::default_experiment::default_experiment).
+    fn experiment(&self) -> Option<ExperimentText> {
         None
     }
 

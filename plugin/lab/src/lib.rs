@@ -16,6 +16,7 @@ pub mod doctor;
 pub mod drawing;
 mod escape;
 pub mod eval;
+pub mod experiment_text;
 pub mod floor_plan;
 pub mod foreign;
 pub mod game;

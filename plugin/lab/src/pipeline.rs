@@ -36,7 +36,7 @@ use crate::{
     eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
-    policy_export::policy_file,
+    policy_export::{Provenance, policy_file},
     split::LevelSplit,
     train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
     worlds::build_world,
@@ -91,7 +91,7 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
     world.insert_resource(Recorder::new(DemoWriter::create(path, header)?));
     let queue = LevelQueue::list(levels.levels().collect::<Vec<_>>());
     world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+    while Control::of(&world, agents[0]).is_active() {
         world.tick()?;
     }
     Ok(world.resource::<Recorder>().episodes())
@@ -109,17 +109,12 @@ pub fn learn_skills(
     threads: usize,
 ) -> Result<SkillModel, PipelineError> {
     experiment.check_actions(game.actions())?;
-    let observation_config = experiment.observation_config();
-    let mut demos = Demonstrations::read(game, &observation_config, experiment.recordings()?, Some(&experiment.test))?;
-    if let Some(steps) = experiment.demo_steps {
-        demos = demos.at_most(steps);
-    }
-    let dataset = demos.dataset(game, threads, |_| {})?;
+    let dataset = Demonstrations::of(game, experiment, experiment.recordings()?)?.dataset(game, threads, |_| {})?;
     let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?;
     while trainer.epochs_done() < experiment.skills.epochs as u64 {
         trainer.train_epoch(&mut |_| ControlFlow::Continue(()))?;
     }
-    Ok(trainer.into_model().with_picture(observation_config.card()))
+    Ok(trainer.into_model().with_picture(experiment.observation_config().card()))
 }
 
 /// Trains to the end of the experiment; `after_update` hears of each update. Nothing is written: a training that is to be
@@ -156,15 +151,7 @@ pub fn evaluate(
     threads: usize,
 ) -> Result<EvalSummary, PipelineError> {
     experiment.check_test(game)?;
-    let plan = EvalPlan {
-        split: experiment.test.clone(),
-        observation_config: experiment.observation_config(),
-        episodes_per_level: experiment.eval.episodes_per_level,
-        seed: experiment.seed,
-        arenas: experiment.arenas,
-        worlds: experiment.worlds,
-        threads,
-    };
+    let plan = EvalPlan::of(experiment, &experiment.test, threads);
     Ok(summarize(name, &plan.split, &eval::evaluate(game, player, &plan, |_| {})?))
 }
 
@@ -173,7 +160,10 @@ pub fn evaluate(
 /// [`install_policy`](bevy_playbot::policy_file::install_policy).
 pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
     let experiment = trainer.experiment();
-    let training = format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed);
-    let about = (experiment.algorithm.name().to_owned(), training, env!("CARGO_PKG_VERSION").to_owned());
-    policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), about)
+    let provenance = Provenance {
+        algorithm: experiment.algorithm.name().to_owned(),
+        training: format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed),
+        code: format!("playbot {}", env!("CARGO_PKG_VERSION")),
+    };
+    policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), provenance)
 }

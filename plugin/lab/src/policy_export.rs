@@ -36,14 +36,26 @@ pub enum ExportError {
     File(#[from] FileError),
 }
 
+/// How a policy came to be, in words for people.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Provenance {
+    /// Name of the algorithm.
+    pub algorithm: String,
+    /// What it was trained on, and for how long.
+    pub training: String,
+    /// Name, version and, where it is known, revision of the program that trained it.
+    pub code: String,
+}
+
 /// A policy for this game that sees it so, with the card filled in from both.
 pub fn policy_file(
     game: &dyn Game,
     observation_config: &ObservationConfig,
     policy: Policy,
     skills: Option<SkillSource>,
-    (algorithm, training, code): (String, String, String),
+    provenance: Provenance,
 ) -> PolicyFile {
+    let Provenance { algorithm, training, code } = provenance;
     let card = PolicyCard {
         game: game.name().to_owned(),
         game_version: game.version(),

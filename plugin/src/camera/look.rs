@@ -81,7 +81,7 @@ fn draw(world: &mut World, renderer: &mut Renderer, asked: &Asked) {
     world.resource_scope(|world, targets: Mut<BorrowedTargets>| {
         let loan = Loan::select(world, &targets);
         switch(world, !asked.following.is_empty());
-        renderer.scene.dress.run(world);
+        renderer.scene.prepare.run(world);
         open_eyes(world, asked);
         loan.point(world, &targets);
         renderer.draw_unseen(world);

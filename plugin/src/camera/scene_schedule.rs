@@ -53,7 +53,7 @@ pub(super) struct SceneSchedule {
     /// Loading of assets, from `PreUpdate`.
     pub(super) load: Schedule,
     /// Transforms, bounds, visibility, asset events, from `PostUpdate`.
-    pub(super) dress: Schedule,
+    pub(super) prepare: Schedule,
 }
 
 impl SceneSchedule {
@@ -70,6 +70,6 @@ impl SceneSchedule {
             schedule
         };
         use bevy::ecs::schedule::ScheduleLabel;
-        Self { load: take(PreUpdate.intern()), dress: take(PostUpdate.intern()) }
+        Self { load: take(PreUpdate.intern()), prepare: take(PostUpdate.intern()) }
     }
 }

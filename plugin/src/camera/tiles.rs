@@ -39,7 +39,7 @@ impl Plugin for TileLayerPlugin {
         app.init_resource::<TileBorder>()
             .init_resource::<Faults>()
             .add_plugins(Material2dPlugin::<TileMaterial>::default())
-            .add_systems(PostUpdate, dress_tiles.before(AssetEventSystems));
+            .add_systems(PostUpdate, update_tile_meshes.before(AssetEventSystems));
     }
 }
 
@@ -75,10 +75,10 @@ fn shader() -> ShaderRef {
 }
 
 /// Brings the drawing of changed layers up to date.
-fn dress_tiles(
+fn update_tile_meshes(
     border: Res<TileBorder>,
     layers: Query<(Entity, Ref<TileLayer>, &Transform)>,
-    dressed: Query<(&Mesh2d, &MeshMaterial2d<TileMaterial>)>,
+    drawn: Query<(&Mesh2d, &MeshMaterial2d<TileMaterial>)>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut images: ResMut<Assets<Image>>,
     mut materials: ResMut<Assets<TileMaterial>>,
@@ -99,7 +99,7 @@ fn dress_tiles(
         }
         let mesh = rectangle(&layer, border.0 / transform.scale.x.abs().max(f32::EPSILON));
         let grid = UVec4::new(layer.columns, layer.rows, layer.outside.into(), 0);
-        let before = dressed.get(entity).ok();
+        let before = drawn.get(entity).ok();
         let material = before.and_then(|(_, material)| materials.get_mut(&material.0));
         if let (Some((old_mesh, _)), Some(mut material)) = (before, material)
             && images.insert(&material.cells, cell_image(&layer)).is_ok()

@@ -65,8 +65,7 @@ pub(super) fn look(
         let Ok(((agent, _, episode), ..)) = eyes.get(eye) else { return };
         let name = error.entity().and_then(|entity| names.get(entity).ok());
         let name = name.map_or_else(String::new, |name| format!(" (`{name}`)"));
-        let Episode { level, tick, .. } = episode;
-        faults.report(format!("agent {}, level {level}, tick {tick}: {error}{name}", agent.index));
+        faults.report(format!("{}: {error}{name}", episode.moment(agent)));
     };
     let studio = &mut *studio;
     studio.textures.refresh(&stages.images);

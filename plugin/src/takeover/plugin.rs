@@ -55,7 +55,6 @@ impl Plugin for TakeoverPlugin {
         };
         app.insert_resource(self.game.clone())
             .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
-            .register_type::<GameIdentity>()
             // People who have just lost their seat press nothing.
             .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems).before(note_taps))
             .add_systems(

@@ -19,7 +19,7 @@ pub(super) struct Seat {
 /// Agents that somebody plays, lowest number first.
 pub(super) fn playing_agents(world: &World) -> Vec<Entity> {
     let agents = world.resource::<AgentOrder>().entities().iter().copied();
-    agents.filter(|&agent| world.get::<Control>(agent).is_some_and(|control| control.is_active())).collect()
+    agents.filter(|&agent| Control::of(world, agent).is_active()).collect()
 }
 
 impl Seat {

@@ -19,11 +19,9 @@ use bevy::{
 use super::{
     act,
     claims::check_claims,
-    component::VirtualInput,
     devices::VirtualDevices,
     direct::{self, DirectInput},
-    gamepad::{VirtualGamepad, connect_gamepads},
-    person::PressesForPeople,
+    gamepad::connect_gamepads,
 };
 use crate::{action::check_actions, fault::Faults, panics::note_actions, systems::PlaybotSystems};
 
@@ -53,10 +51,6 @@ impl Plugin for VirtualInputPlugin {
         add_what_is_written(app);
         app.init_resource::<VirtualDevices>()
             .init_resource::<DirectInput>()
-            .register_type::<VirtualInput>()
-            .register_type::<VirtualDevices>()
-            .register_type::<VirtualGamepad>()
-            .register_type::<PressesForPeople>()
             .add_observer(act::release_at_start)
             .add_observer(act::release_at_end)
             .add_systems(PreUpdate, connect_gamepads.before(InputSystems).before(act::send_messages));

@@ -14,9 +14,9 @@ pub(crate) fn check_images(
         let (expected, got) = (sensor.0.shape().numbers(), observation.image.len());
         if is_observed(control, episode) && got != expected {
             faults.report(format!(
-                "agent {}, level {}, tick {}: the observation's image has {got} bytes, its sensor makes {expected}; add \
-                 the sensor and its plugin, and leave the image to them",
-                agent.index, episode.level, episode.tick
+                "{}: the observation's image has {got} bytes, its sensor makes {expected}; add the sensor and its \
+                 plugin, and leave the image to them",
+                episode.moment(agent)
             ));
         }
     }

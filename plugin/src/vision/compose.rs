@@ -61,8 +61,7 @@ pub(super) fn compose(
             continue;
         }
         if let Err(error) = check(&sensor.0, frame, velocity, tick.0) {
-            let Episode { level, tick, .. } = episode;
-            faults.report(format!("agent {}, level {level}, tick {tick}: {error}", agent.index));
+            faults.report(format!("{}: {error}", episode.moment(agent)));
             continue;
         }
         blank.note(&frame.pixels, episode.tick == 0);

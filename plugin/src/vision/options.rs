@@ -60,7 +60,10 @@ pub enum VisionError {
     )]
     NoAdapter,
     /// The program was built without cameras.
-    #[error("this program was built without cameras; build it with `--features camera`, or use `observation: Raster`")]
+    #[error(
+        "this program was built without cameras: switch on the feature `camera` of `playbot_cli` or `playbot_lab` \
+         (`--features camera` in the program `playbot`), or use another `observation`"
+    )]
     NoCamera,
 }
 

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{BlankEpisodes, Frame, ImageSensor, PaintedVelocity, Stage, TileLayer, VisionSystems, blank, compose};
+use super::{VisionSystems, blank, compose};
 use crate::systems::ObserveSchedule;
 
 /// Makes observations of frames, whichever sensor filled them. The sensors' plugins bring it along.
@@ -20,12 +20,6 @@ impl VisionPlugin {
 
 impl Plugin for VisionPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<ImageSensor>()
-            .register_type::<Frame>()
-            .register_type::<Stage>()
-            .register_type::<TileLayer>()
-            .register_type::<BlankEpisodes>()
-            .register_type::<PaintedVelocity>();
         app.configure_sets(
             ObserveSchedule,
             (VisionSystems::Sync, VisionSystems::Render, VisionSystems::Compose).chain(),

@@ -3,3 +3,6 @@
 pub mod catch;
 pub mod rooms;
 pub mod stubborn;
+mod traces;
+
+pub use traces::traces;

@@ -1,14 +1,10 @@
 //! It is the same every time.
 
-use std::path::Path;
-
 use bevy::prelude::*;
-use bevy_playbot::{
-    demo::file::{DemoReader, DemoWriter},
-    test_app::PlaybotTestExt,
-};
+use bevy_playbot::{demo::file::DemoReader, test_app::PlaybotTestExt};
 use playbot_games::antmaze::AntMaze;
 use playbot_lab::{demo::verify::verify_file, parallel::on_threads, prelude::*, worlds::build_world};
+use playbot_tests::recording::record_random;
 
 use crate::arena::{act, world_with};
 
@@ -64,23 +60,12 @@ fn a_level_is_the_same_whatever_was_played_before_it() {
     assert_eq!(play(&[]), play(&[1, 2, 3]));
 }
 
-fn record(path: &Path, mode: &str, levels: Vec<u64>) {
-    let (mut world, agents) = build_world(&AntMaze, mode, 5, 0, 1);
-    let header = AntMaze.demo_header(mode);
-    world.insert_resource(Recorder::new(DemoWriter::create(path, header).expect("a fresh file")));
-    let bot = (Control::Bot, BlindBot::Uniform, Recording::default(), LevelQueue::list(levels));
-    world.entity_mut(agents[0]).insert(bot);
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
-        world.tick().expect("sound");
-    }
-}
-
 #[test]
 fn a_recording_replays_to_the_bit() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ant.demo");
     let mode = "medium+goals=demo+goal-noise=d4rl+random-start+limit=60";
-    record(&path, mode, vec![4, 9, 4]);
+    record_random(&AntMaze, mode, 5, &path, [4, 9, 4]);
     let report = verify_file(&AntMaze, &path, |_| {}).expect("readable");
     assert_eq!((report.episodes, report.divergences.len()), (3, 0));
     let episodes = DemoReader::open(&path).expect("readable").read_all().expect("whole");

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use bevy_playbot::{policy::ActionDraw, vision::ObservationConfig};
+use bevy_playbot::policy::ActionDraw;
 use playbot_games::{
     ant::{Ant, walk::Walker},
     antmaze::{AntMaze, DemonstratorBot},
@@ -14,6 +14,7 @@ use playbot_lab::{
     worlds::build_world,
 };
 use playbot_learner::{DeviceKind, PolicyFile};
+use playbot_tests::measuring::plan;
 
 use crate::arena::place;
 
@@ -66,15 +67,7 @@ fn keys_tell_the_walker_where_to_go() {
 #[test]
 fn the_demonstrator_walks_to_the_goal() {
     for (levels, least) in [("umaze:0..31", 0.9), ("medium:0..31", 0.8), ("random+goals=random:0..31", 0.8)] {
-        let plan = EvalPlan {
-            split: levels.parse().expect("a split"),
-            observation_config: ObservationConfig::default(),
-            episodes_per_level: 1,
-            seed: 1,
-            arenas: 32,
-            worlds: 2,
-            threads: 2,
-        };
+        let plan = EvalPlan { arenas: 32, ..plan(levels) };
         let episodes = evaluate(&AntMaze, &Player::Demonstrator, &plan, |_| {}).expect("sound");
         let summary = summarize("waypoints", &plan.split, &episodes);
         assert!(summary.success >= least, "{levels}: {summary:?}");
@@ -85,15 +78,7 @@ fn the_demonstrator_walks_to_the_goal() {
 fn the_shipped_walker_reaches_goals_in_all_directions() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/models/ant-walker.safetensors");
     let policy = PolicyFile::load(&file, DeviceKind::default()).expect("shipped").policy;
-    let plan = EvalPlan {
-        split: "goal:0..127".parse().expect("a split"),
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 64,
-        worlds: 2,
-        threads: 2,
-    };
+    let plan = EvalPlan { arenas: 64, ..plan("goal:0..127") };
     let player = Player::Policy { policy, prior: None, draw: ActionDraw::Greedy };
     let trials = evaluate(&Ant, &player, &plan, |_| {}).expect("sound");
     let fallen = trials.iter().filter(|trial| trial.end == EpisodeEnd::Terminated { success: false }).count();

@@ -45,5 +45,5 @@ pub fn look(world: &mut World) {
 }
 
 pub fn sprite(world: &World, entity: Entity) -> &Sprite {
-    world.get(entity).expect("dressed")
+    world.get(entity).expect("drawn")
 }

@@ -53,8 +53,8 @@ fn a_game_may_add_a_saw_and_move_a_crate() {
     let moved = world.query_filtered::<Entity, With<Crate>>().iter(world).next().expect("easy level 0 has crates");
     world.entity_mut(moved).insert(ArenaBody(Body::block([4, 7])));
     press(world, agent, NOTHING, 1);
-    assert_eq!(world.get::<Transform>(saw).expect("dressed").translation.truncate(), Vec2::new(3.5, 1.5));
-    assert_eq!(world.get::<Transform>(moved).expect("dressed").translation.truncate(), Vec2::new(4.5, 7.5));
+    assert_eq!(world.get::<Transform>(saw).expect("drawn").translation.truncate(), Vec2::new(3.5, 1.5));
+    assert_eq!(world.get::<Transform>(moved).expect("drawn").translation.truncate(), Vec2::new(4.5, 7.5));
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn check_arena(world: &mut World, agent: Entity, mode: Mode, seed: u32) {
         assert_eq!(tiles.tile(x, y), expected, "{mode} {seed} ({x}, {y})");
     }
     assert_eq!(tiles.tile(-5, 3), Art::tile(Tile::Wall).expect("drawn"));
-    depths.push(world.get::<Transform>(agent).expect("dressed").translation.z);
+    depths.push(world.get::<Transform>(agent).expect("drawn").translation.z);
     depths.sort_by(f32::total_cmp);
     assert!(depths.windows(2).all(|pair| pair[0] < pair[1]), "nothing is as deep as something else");
 }
@@ -78,11 +78,11 @@ fn a_player_stands_walks_jumps_and_turns() {
     assert_eq!(seen(world), (Pose::Stand, false));
     let feet = |world: &World| {
         let (body, at) =
-            (world.get::<PlayerBody>(agent).expect("a player").0, world.get::<Transform>(agent).expect("dressed"));
+            (world.get::<PlayerBody>(agent).expect("a player").0, world.get::<Transform>(agent).expect("drawn"));
         let size = sprite(world, agent).custom_size.expect("set");
         assert_eq!((size.x, at.translation.x), (1.0, body.x));
         assert!((size.y - 1.7415 * 1.1574).abs() < 1e-4, "taller than the body");
-        let anchor = world.get::<Anchor>(agent).expect("dressed").0;
+        let anchor = world.get::<Anchor>(agent).expect("drawn").0;
         let feet = at.translation.y - (anchor.y + 0.5) * size.y;
         assert_eq!(at.translation.y, body.y, "the eye is on the middle of the body");
         assert!((feet - (body.y - body.ry)).abs() < 1e-5, "the feet are on the ground");
@@ -90,7 +90,7 @@ fn a_player_stands_walks_jumps_and_turns() {
     feet(world);
     press(world, agent, RIGHT, 2);
     assert_eq!(seen(world), (Pose::Walk2, false), "tick 6");
-    let velocity = world.get::<PaintedVelocity>(agent).expect("dressed").0;
+    let velocity = world.get::<PaintedVelocity>(agent).expect("drawn").0;
     assert!((velocity.x - 0.18 / 0.5).abs() < 1e-6 && velocity.y == 0.0, "{velocity}");
     press(world, agent, LEFT, 5);
     assert_eq!(seen(world), (Pose::Walk1, true), "tick 11 is in the first step again");

@@ -9,3 +9,4 @@ mod links;
 mod runner;
 mod sources;
 mod tutorial;
+mod tutorial_learns;

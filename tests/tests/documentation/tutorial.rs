@@ -1,26 +1,17 @@
 //! What the tutorial promises of its game is true.
 
-use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
 use playbot_lab::{
     doctor::{DoctorOptions, examine},
-    eval::{EvalPlan, EvalSummary, Player, evaluate, summarize},
+    eval::{EvalSummary, Player, evaluate, summarize},
     prelude::*,
 };
+use playbot_tests::measuring::plan;
 
 use super::runner::runner;
 
 fn measure(player: &Player) -> EvalSummary {
-    let split: LevelSplit = "default:64..83".parse().expect("a split");
-    let plan = EvalPlan {
-        split: split.clone(),
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 1,
-        arenas: 4,
-        worlds: 2,
-        threads: 2,
-    };
-    summarize("player", &split, &evaluate(&runner(), player, &plan, |_| {}).expect("it can be played"))
+    let plan = plan("default:64..83");
+    summarize("player", &plan.split, &evaluate(&runner(), player, &plan, |_| {}).expect("it can be played"))
 }
 
 #[test]

@@ -6,15 +6,15 @@ use playbot_lab::{
     train::{Experiment, TrainError, Trainer, collect::Collector},
     worlds::build_observing_world,
 };
-use playbot_learner::{DeviceKind, Learner as _, ObsKind, Observations, PolicySpec, PpoLearner};
-use playbot_tests::{Corridor, PaintedCorridor};
+use playbot_learner::{DeviceKind, Observations};
+use playbot_tests::{Corridor, PaintedCorridor, training::untrained};
 
-use crate::corridor::{experiment, record, skills, untrained};
+use crate::corridor::{experiment, record, skills};
 
 #[test]
 fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {
     let (observation_config, levels) = (experiment().observation_config(), experiment().train);
-    let policy = untrained(&observation_config);
+    let policy = untrained(&PaintedCorridor, &observation_config, experiment().ppo);
     let play = |first, count| {
         let mut collector =
             Collector::new(&PaintedCorridor, &levels, &observation_config, 1, first, count, None).expect("fits");
@@ -72,8 +72,8 @@ fn eyes_that_do_not_fit_are_refused_with_a_way_out() {
 #[test]
 fn a_policy_says_which_eyes_it_needs() {
     let observation_config = experiment().observation_config();
-    let vectors = PolicySpec { obs: ObsKind::Vector(2), latent: 0, action_space: PaintedCorridor.actions() };
-    let vectors = PpoLearner::new(experiment().ppo, vectors, 1, DeviceKind::Flex).expect("valid").policy();
+    let untrained =
+        |observation_config: &ObservationConfig| untrained(&PaintedCorridor, observation_config, experiment().ppo);
     let colour = ObservationConfig {
         image: ImageOptions { grayscale: false, ..observation_config.image },
         ..observation_config
@@ -85,7 +85,7 @@ fn a_policy_says_which_eyes_it_needs() {
             ["images of 4 channels", "gives 2 observation values", "a sensor that makes"],
         ),
         (
-            vectors,
+            untrained(&ObservationConfig::default()),
             observation_config,
             ["made for 2 observation values", "gives images of 4 channels", "`VectorSensor`"],
         ),

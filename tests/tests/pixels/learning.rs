@@ -1,7 +1,5 @@
 //! Runs, their files and what they learn.
 
-use std::path::Path;
-
 use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
     policy_file::{PolicyMisfit, policy_observation},
@@ -9,16 +7,16 @@ use bevy_playbot::{
 };
 use playbot_lab::{
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
-    policy_export::{export_policy, policy_file},
+    policy_export::{Provenance, export_policy, policy_file},
     prelude::*,
-    train::{
-        Algorithm, Experiment, Learner, Trainer,
-        checkpoint::Which,
-        run_dir::{RunDir, RunInfo},
-    },
+    train::{Algorithm, Experiment, Learner, Trainer, checkpoint::Which, run_dir::RunDir},
 };
 use playbot_learner::{DeviceKind, Policy, PolicyFile, SkillModel};
-use playbot_tests::{Corridor, PaintedCorridor};
+use playbot_tests::{
+    Corridor, PaintedCorridor,
+    measuring::plan,
+    training::{train, written},
+};
 
 use crate::corridor::{experiment, record, skills};
 
@@ -28,35 +26,9 @@ fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer
     Trainer::new(&PaintedCorridor, &experiment, skills, DeviceKind::Flex, threads).expect("fits")
 }
 
-/// Trains in `folder` to the end or until so many updates are done, and saves.
-fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
-    let Experiment { algorithm, seed, .. } = *trainer.experiment();
-    let (version, revision) = ("test".to_owned(), "test".to_owned());
-    let device = DeviceKind::Flex;
-    let info = RunInfo { algorithm, seed, version, revision, game_version: 3, skills: None, device };
-    let run = match folder.exists() {
-        true => RunDir::open(folder).expect("a run").0,
-        false => RunDir::create(folder, trainer.experiment(), &info, false).expect("writable"),
-    };
-    while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
-        let report = trainer.update().expect("learns");
-        run.log(&report, trainer.experiment().steps_per_update()).expect("writable");
-    }
-    run.save(&mut trainer).expect("writable");
-    trainer
-}
-
-fn bytes(folder: &Path) -> Vec<Vec<u8>> {
-    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
-    [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
-        .into_iter()
-        .map(|path| std::fs::read(path).expect("written"))
-        .collect()
-}
-
 fn measure(policy: &Policy, prior: Option<SkillPrior>, threads: usize) -> Vec<EpisodeResult> {
-    let (split, observation_config) = ("plain:8..15".parse().expect("a split"), experiment().observation_config());
-    let plan = EvalPlan { split, observation_config, episodes_per_level: 3, seed: 7, arenas: 4, worlds: 2, threads };
+    let observation_config = experiment().observation_config();
+    let plan = EvalPlan { observation_config, episodes_per_level: 3, seed: 7, threads, ..plan("plain:8..15") };
     let player = Player::Policy { policy: policy.clone(), prior, draw: ActionDraw::Sample };
     evaluate(&PaintedCorridor, &player, &plan, |_| {}).expect("fits")
 }
@@ -77,7 +49,7 @@ fn what_is_learned_from_pictures_survives_its_files() {
     let (run, experiment, info) = RunDir::open(&run).expect("a run");
     let saved = run.checkpoint(Which::Last).expect("saved").learner_file();
     let learner = Learner::load(info.algorithm, &saved, DeviceKind::Flex).expect("as written");
-    let (path, about) = (folder.path().join("eyes.policy"), [(); 3].map(|()| "test".to_owned()).into());
+    let (path, about) = (folder.path().join("pixels.policy"), Provenance::default());
     let file =
         policy_file(&PaintedCorridor, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");
@@ -115,11 +87,11 @@ fn stopping_and_threads_change_nothing() {
         let (one, two, halved) = (run("1"), run("2"), run("halved"));
         train(&one, trainer(algorithm, &skills, 1), None);
         train(&two, trainer(algorithm, &skills, 2), None);
-        assert!(bytes(&one) == bytes(&two), "{algorithm}: one thread and two threads differ");
+        assert!(written(&one) == written(&two), "{algorithm}: one thread and two threads differ");
         train(&halved, trainer(algorithm, &skills, 2), Some(3));
         let (run, experiment, _) = RunDir::open(&halved).expect("readable");
         let resumed = run.resume(&PaintedCorridor, &experiment, DeviceKind::Flex, 2).expect("a checkpoint");
         train(&halved, resumed, None);
-        assert!(bytes(&one) == bytes(&halved), "{algorithm}: stopping in the middle changed the result");
+        assert!(written(&one) == written(&halved), "{algorithm}: stopping in the middle changed the result");
     }
 }

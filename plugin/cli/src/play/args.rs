@@ -18,10 +18,10 @@ use crate::{player::PlayerArgs, recording::Existing};
 A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
 
 Examples:
-  playbot play coinrun --seed 7
-  playbot play coinrun --levels 0..63 --record my.demo
-  playbot play coinrun --run runs/first --record mixed.demo
-  playbot play coinrun --mode easy --bot search")]
+  playbot play GAME --seed 7
+  playbot play GAME --levels 0..63 --record my.demo
+  playbot play GAME --run runs/first --record mixed.demo
+  playbot play GAME --mode MODE --bot BOT")]
 #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window only"))]
 pub struct Args {
     /// Name of the game.

@@ -16,6 +16,7 @@ use crate::{
     error::{CliError, Outcome},
     interrupt,
     player::Chosen,
+    program,
     window::{GameWindow, Partner, Playlist, WindowSetup},
 };
 
@@ -99,7 +100,8 @@ fn conclude(path: &Path) -> Result<Outcome, CliError> {
         summary.steps,
         deciders(&summary.steps_by_decider)
     );
-    tell!("  playbot demo verify {file}   proves that it replays");
-    tell!("  playbot learn-skills --set demos={file} --out skills.safetensors   learns from it");
+    let program = program::name();
+    tell!("  {program} demo verify {file}   proves that it replays");
+    tell!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
     Ok(Outcome::Pass)
 }

@@ -102,6 +102,7 @@ pub fn to_json(run: &RunRecord) -> Value {
         "steps_per_s": run.curves.steps_per_s(),
         "age_s": age_s(run),
         "checkpoints": run.checkpoints.iter().map(|checkpoint| checkpoint.summary).collect::<Vec<_>>(),
+        "game_version": run.info.game_version,
         "version": run.info.version,
         "revision": run.info.revision,
         "skills": run.info.skills,

@@ -82,10 +82,11 @@ fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurv
 fn print_head(run: &RunRecord) -> Result<(), CliError> {
     let (info, experiment) = (&run.info, &run.experiment);
     print_line(format!(
-        "{}: {} on {}, seed {}, by version {} ({}) on {}{}",
+        "{}: {} on {} with version {} of its rules, seed {}, by playbot {} ({}) on {}{}",
         run.path.display(),
         info.algorithm,
         experiment.game,
+        info.game_version,
         info.seed,
         info.version,
         info.revision,

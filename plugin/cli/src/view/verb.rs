@@ -29,11 +29,11 @@ use crate::{
 /// game that has a camera of its own it is what that sees; of one that cannot be drawn, the numbers, with a bar for each.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot view coinrun --seed 5
-  playbot view coinrun --seed 5 --tick 40 --bot right-jump --image stack=4
-  playbot view coinrun --seed 64 --run runs/first --episode --out episode.png
-  playbot view coinrun --demo demos/coinrun/easy.demo --episode-number 3 --episode --scale 4
-  playbot view coinrun --image width=84 --image height=84 --image grayscale --image paint_velocity
+  playbot view GAME --seed 5
+  playbot view GAME --seed 5 --tick 40 --bot BOT --image stack=4
+  playbot view GAME --seed 64 --run runs/first --episode --out episode.png
+  playbot view GAME --demo my.demo --episode-number 3 --episode --scale 4
+  playbot view GAME --image width=84 --image height=84 --image grayscale --image paint_velocity
 
 Animated PNGs play in browsers and in most viewers of pictures.")]
 pub struct Args {
@@ -130,6 +130,11 @@ fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig,
     ))
 }
 
+/// Whether this build has the sensor for the camera of a game.
+fn can_look_through_camera(game: &dyn Game) -> bool {
+    ObservationConfig { kind: ObservationKind::Camera, ..ObservationConfig::default() }.check(game).is_ok()
+}
+
 /// The pictures that are shown: those that the policy reads, or those that were asked for, or else those that the game
 /// has. Numbers for a game without any.
 fn observation_config(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
@@ -137,7 +142,7 @@ fn observation_config(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> 
     let is_asked_for = !args.image.is_empty();
     let kind = if game.picture().is_some() || is_asked_for && !game.has_camera() {
         ObservationKind::Raster
-    } else if game.has_camera() {
+    } else if game.has_camera() && (is_asked_for || can_look_through_camera(game)) {
         ObservationKind::Camera
     } else {
         ObservationKind::Vector

@@ -10,7 +10,7 @@ use bevy::{
 };
 use bevy_playbot::{
     action::Action, control::Control, episode::Episode, fault::Faults, key_bindings::KeyBindings,
-    placement::TickSchedules, system_errors,
+    placement::TickSchedules, system_errors, system_order,
 };
 use playbot_lab::prelude::*;
 
@@ -106,6 +106,7 @@ fn begin(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.set_executor(SingleThreadedExecutor::new());
     }
+    system_order::put_in_order(world);
     system_errors::listen(world);
 }
 

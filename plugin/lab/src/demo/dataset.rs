@@ -5,11 +5,11 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations, Streams, rng::shuffle};
 
 use super::{
-    replay_observations::{Watched, watch},
+    replay_observations::{ObservedEpisode, observe_replays},
     verify::VerifyError,
 };
 use crate::sensors::GameSensors;
-use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
+use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment};
 use bevy_playbot::demo::file::{DemoEpisode, DemoReader, EpisodeActions, find_demos};
 use bevy_playbot::vision::ObservationConfig;
 
@@ -80,6 +80,20 @@ impl Demonstrations {
         Ok(Self { observation_config: *observation_config, episodes })
     }
 
+    /// What an experiment learns skills from, of all recordings below a path: none of its held-out levels, and no more
+    /// steps than it asks for.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read).
+    pub fn of(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Self, VerifyError> {
+        let demos = Self::read(game, &experiment.observation_config(), path, Some(&experiment.test))?;
+        Ok(match experiment.demo_steps {
+            Some(steps) => demos.at_most(steps),
+            None => demos,
+        })
+    }
+
     /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
     /// recordings, always the same ones. More steps keep them and others.
     pub fn at_most(mut self, steps: u64) -> Self {
@@ -137,13 +151,13 @@ impl Demonstrations {
             return Err(VerifyError::TooLarge { steps, observation_config: self.observation_config, bytes });
         }
         let originals = self.originals();
-        let mut watched = self.watch(game, threads, &originals, &progress)?;
+        let mut observed = self.observe(game, threads, &originals, &progress)?;
         let mut episodes = Vec::new();
         for (i, demo) in self.episodes.iter().enumerate() {
             let observations = if demo.is_seen {
                 progress(demo.episode.len() as u64);
                 Observations::Vector(demo.episode.observations.clone())
-            } else if let Some(observations) = watched.remove(&i) {
+            } else if let Some(observations) = observed.remove(&i) {
                 observations
             } else {
                 // An earlier episode is the same.
@@ -169,7 +183,7 @@ impl Demonstrations {
     }
 
     /// Replays what no file keeps, mode by mode.
-    fn watch(
+    fn observe(
         &self,
         game: &dyn Game,
         threads: usize,
@@ -185,8 +199,8 @@ impl Demonstrations {
         let (mut all, kind) = (BTreeMap::new(), self.observation_config.obs_kind(game));
         all.extend(self.nothing_to_see().map(|i| (i, Observations::empty(&kind))));
         for (mode, jobs) in by_mode {
-            for Watched { id, observations, divergence } in
-                watch(game, &self.observation_config, mode, jobs, threads, progress)?
+            for ObservedEpisode { id, observations, divergence } in
+                observe_replays(game, &self.observation_config, mode, jobs, threads, progress)?
             {
                 if let Some(divergence) = divergence {
                     let Demonstration { file, index, .. } = &self.episodes[id];

@@ -1,4 +1,4 @@
-//! Watching recordings: they are played again, many at a time, and what the agents see is kept.
+//! Observations of recordings: they are played again, many at a time, and what the agents see is kept.
 
 use std::sync::Arc;
 
@@ -17,11 +17,11 @@ use bevy_playbot::{control::Control, headless::tick_world, observation::Observat
 /// Recordings that one World replays at the same time: shares the cost of a tick, and a camera's.
 const SIDE_BY_SIDE: usize = 16;
 
-/// An episode to be watched, with a number to know it by.
+/// An episode to be replayed, with a number to know it by.
 type Job = (usize, Arc<DemoEpisode>);
 
 /// What an agent saw in an episode.
-pub(super) struct Watched {
+pub(super) struct ObservedEpisode {
     /// Number of the job.
     pub id: usize,
     /// The observation before each action.
@@ -35,14 +35,14 @@ pub(super) struct Watched {
 /// # Errors
 ///
 /// [`VerifyError`] if the game breaks its contract or cannot be seen this way.
-pub(super) fn watch(
+pub(super) fn observe_replays(
     game: &dyn Game,
     observation_config: &ObservationConfig,
     mode: &str,
     jobs: Vec<Job>,
     threads: usize,
     progress: &(impl Fn(u64) + Sync),
-) -> Result<Vec<Watched>, VerifyError> {
+) -> Result<Vec<ObservedEpisode>, VerifyError> {
     let side_by_side = at_most(game, SIDE_BY_SIDE);
     let threads = threads.clamp(1, jobs.len().div_ceil(side_by_side).max(1));
     let mut shares: Vec<Vec<Job>> = vec![Vec::new(); threads];
@@ -51,7 +51,7 @@ pub(super) fn watch(
     }
     let parts = on_threads(&mut shares, threads, |share| {
         let jobs = std::mem::take(share);
-        Onlookers::new(game, observation_config, mode, jobs.len().min(side_by_side))?.watch(jobs, progress)
+        ReplayWorld::new(game, observation_config, mode, jobs.len().min(side_by_side))?.play(jobs, progress)
     });
     let mut all = Vec::new();
     for part in parts {
@@ -61,15 +61,15 @@ pub(super) fn watch(
 }
 
 /// A World whose agents replay one episode after the other.
-struct Onlookers {
+struct ReplayWorld {
     world: World,
     agents: Vec<Entity>,
     /// The episode that each agent replays.
-    watching: Vec<Option<Watched>>,
+    replaying: Vec<Option<ObservedEpisode>>,
     kind: ObsKind,
 }
 
-impl Onlookers {
+impl ReplayWorld {
     fn new(
         game: &dyn Game,
         observation_config: &ObservationConfig,
@@ -77,20 +77,20 @@ impl Onlookers {
         count: usize,
     ) -> Result<Self, VerifyError> {
         let (world, agents) = build_observing_world(game, mode, observation_config, 0, 0, count as u32)?;
-        let watching = agents.iter().map(|_| None).collect();
-        Ok(Self { world, agents, watching, kind: observation_config.obs_kind(game) })
+        let replaying = agents.iter().map(|_| None).collect();
+        Ok(Self { world, agents, replaying, kind: observation_config.obs_kind(game) })
     }
 
-    fn watch(mut self, jobs: Vec<Job>, progress: &impl Fn(u64)) -> Result<Vec<Watched>, VerifyError> {
+    fn play(mut self, jobs: Vec<Job>, progress: &impl Fn(u64)) -> Result<Vec<ObservedEpisode>, VerifyError> {
         let mut jobs = jobs.into_iter();
         let mut done = Vec::new();
         loop {
             for agent in 0..self.agents.len() {
-                if self.watching[agent].is_none() {
+                if self.replaying[agent].is_none() {
                     self.begin(agent, jobs.next());
                 }
             }
-            let busy = self.watching.iter().flatten().count();
+            let busy = self.replaying.iter().flatten().count();
             if busy == 0 {
                 return Ok(done);
             }
@@ -109,17 +109,17 @@ impl Onlookers {
         };
         let observations = Observations::with_capacity(&self.kind, episode.len());
         Replay::begin(episode, &mut entity);
-        self.watching[agent] = Some(Watched { id, observations, divergence: None });
+        self.replaying[agent] = Some(ObservedEpisode { id, observations, divergence: None });
     }
 
     /// Keeps what an agent saw in this tick; gives out the episode if that was its last.
-    fn note(&mut self, agent: usize) -> Option<Watched> {
-        let watched = self.watching[agent].as_mut()?;
+    fn note(&mut self, agent: usize) -> Option<ObservedEpisode> {
+        let observed = self.replaying[agent].as_mut()?;
         let entity = self.world.entity(self.agents[agent]);
         // What an agent carries after a tick is still what it acted on.
-        entity.get::<Observation>()?.push_to(&mut watched.observations);
+        entity.get::<Observation>()?.push_to(&mut observed.observations);
         let replay = entity.get::<Replay>().filter(|replay| replay.is_finished())?;
-        watched.divergence = replay.divergence().cloned();
-        self.watching[agent].take()
+        observed.divergence = replay.divergence().cloned();
+        self.replaying[agent].take()
     }
 }

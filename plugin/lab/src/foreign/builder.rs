@@ -129,9 +129,10 @@ impl ForeignGame {
     }
 
     /// Agents may see pictures (`observation: Camera` of an experiment) through the game's own camera: of several active
-    /// ones, the one that draws first. Needs the feature `camera`.
+    /// ones, the one that draws first. Needs the feature `camera` of this crate: without it a game that says nothing else of
+    /// what agents see is refused.
     pub fn camera(self) -> Self {
-        self.with(|description| description.has_camera = cfg!(feature = "camera"))
+        self.with(|description| description.has_camera = true)
     }
 
     /// Reward of each tick, on top of other rewards.

@@ -24,8 +24,8 @@ use bevy_playbot::{
 /// A game that knows nothing of this plugin, with what an agent does, sees and gets there: see the
 /// [module](crate::foreign).
 ///
-/// The game's one World has one arena with one agent, since its player and its resources are global. Its mode is called
-/// `default`.
+/// Its player and its resources are global, so that each World has one arena with one agent, however many arenas an
+/// experiment asks for: there are more Worlds instead. Its mode is called `default`.
 #[derive(Clone)]
 pub struct ForeignGame {
     pub(super) description: Arc<Description>,
@@ -86,6 +86,21 @@ impl ForeignGame {
     }
 }
 
+/// Why nothing is seen of a game whose agents are told no numbers. `has_feature` says whether this crate can look through
+/// cameras.
+fn nothing_seen(name: &str, has_camera: bool, has_feature: bool) -> Option<String> {
+    match (has_camera, has_feature) {
+        (true, true) => None,
+        (true, false) => Some(format!(
+            "the game `{name}` is seen through its camera alone, which needs the feature `camera` of `playbot_lab` (that of \
+             `playbot_cli` switches it on): build with it, or add `.observe` or `.observe_paths`"
+        )),
+        (false, _) => {
+            Some(format!("nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"))
+        }
+    }
+}
+
 impl Game for ForeignGame {
     fn name(&self) -> &'static str {
         self.description.name
@@ -132,10 +147,11 @@ impl Game for ForeignGame {
                 "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
             ));
         }
-        if observe.is_none() && paths.is_empty() && !has_camera {
-            return Some(format!(
-                "nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"
-            ));
+        if observe.is_none() && paths.is_empty() {
+            let unseen = nothing_seen(name, *has_camera, cfg!(feature = "camera"));
+            if unseen.is_some() {
+                return unseen;
+            }
         }
         if observe.is_some() && names.is_empty() {
             return Some(format!("`.observe` of the game `{name}` names no values"));
@@ -184,5 +200,32 @@ impl Game for ForeignGame {
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         Renewal::carry_component::<ForeignBot>(world);
         world.entity_mut(agent).insert(ForeignBot { noise });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A game with actions, and nothing else yet.
+    fn deaf() -> ForeignGame {
+        ForeignGame::new("mole", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]])
+    }
+
+    #[test]
+    fn a_camera_stays_said_and_names_the_feature_that_it_needs() {
+        let problem = deaf().camera().problem();
+        assert!(deaf().camera().has_camera());
+        assert_eq!(problem.is_none(), cfg!(feature = "camera"), "{problem:?}");
+        let missing = nothing_seen("mole", true, false).expect("cannot look");
+        assert!(missing.contains("`mole`") && missing.contains("the feature `camera` of `playbot_lab`"), "{missing}");
+        assert!(nothing_seen("mole", false, true).is_some_and(|text| text.contains("`.camera`")));
+        assert_eq!(nothing_seen("mole", true, true), None);
+    }
+
+    #[test]
+    fn a_game_that_tells_numbers_needs_no_camera_feature() {
+        let both = deaf().observe(["x"], || [0.0]).camera();
+        assert_eq!(both.problem(), None);
     }
 }

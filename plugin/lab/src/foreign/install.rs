@@ -33,8 +33,7 @@ impl Plugin for ForeignPlugin {
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }
-        app.register_type::<LevelSeed>()
-            .init_resource::<LevelSeed>()
+        app.init_resource::<LevelSeed>()
             .add_observer(restart::start)
             .add_observer(restart::announce)
             .init_schedule(BeforeGame)

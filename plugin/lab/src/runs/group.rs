@@ -28,7 +28,7 @@ impl RunGroup<'_> {
     }
 
     /// What makes the runs less comparable than they look: a seed that occurs twice, runs that are not finished, other
-    /// revisions of the code, devices or skill models.
+    /// revisions of playbot, devices or skill models.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         let first = &self.runs[0];
@@ -42,7 +42,7 @@ impl RunGroup<'_> {
             warnings.push(format!("{}: not finished", self.label));
         }
         if self.runs.iter().any(|run| run.info.revision != first.info.revision) {
-            warnings.push(format!("{}: made by different revisions of the code", self.label));
+            warnings.push(format!("{}: made by different revisions of playbot", self.label));
         }
         if self.runs.iter().any(|run| run.info.device != first.info.device) {
             warnings.push(format!("{}: made on different devices", self.label));

@@ -161,7 +161,7 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
 }
 
 /// One tick of all agents, before it becomes part of the rollout.
-struct Rows {
+struct AgentsTick {
     obs: Observations,
     z: Vec<f32>,
     actions: Actions,
@@ -172,7 +172,7 @@ struct Rows {
     truncated: Vec<bool>,
 }
 
-impl Rows {
+impl AgentsTick {
     fn new(policy: &Policy, kind: &ObsKind, agents: usize) -> Self {
         let empty = Vec::new;
         Self {
@@ -228,31 +228,36 @@ fn collect_tick(world: &mut World) {
     for (&row, &value) in cut.agents.iter().zip(&cut.values) {
         final_values[row] = value;
     }
-    let mut rows = Rows::new(&policy, &kind, entities.len());
+    let mut tick = AgentsTick::new(&policy, &kind, entities.len());
     for &entity in &entities {
         let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
             continue;
         };
-        observation.push_to(&mut rows.obs);
-        rows.z.extend_from_slice(&skill.z);
-        if let Err(error) = rows.actions.push(&action.0) {
+        observation.push_to(&mut tick.obs);
+        tick.z.extend_from_slice(&skill.z);
+        if let Err(error) = tick.actions.push(&action.0) {
             return world.resource_mut::<Faults>().report(error.to_string());
         }
-        rows.log_probs.push(decision.log_prob);
-        rows.values.push(decision.value);
-        rows.rewards.push(reward.get());
-        rows.terminated.push(matches!(episode.end(), Some(EpisodeEnd::Terminated { .. })));
-        rows.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
+        tick.log_probs.push(decision.log_prob);
+        tick.values.push(decision.value);
+        tick.rewards.push(reward.get());
+        tick.terminated.push(matches!(episode.end(), Some(EpisodeEnd::Terminated { .. })));
+        tick.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
         log.note(episode, &action.0);
     }
-    if let Err(error) = push_tick(&mut collecting.rollout, &rows, &final_values, &cut) {
+    if let Err(error) = push_tick(&mut collecting.rollout, &tick, &final_values, &cut) {
         world.resource_mut::<Faults>().report(error.to_string());
     }
     world.insert_resource(collecting);
 }
 
-fn push_tick(rollout: &mut Rollout, rows: &Rows, final_values: &[f32], cut: &CutEpisodes) -> Result<(), LearnError> {
-    rollout.push_step(rows.as_step(final_values))?;
+fn push_tick(
+    rollout: &mut Rollout,
+    tick: &AgentsTick,
+    final_values: &[f32],
+    cut: &CutEpisodes,
+) -> Result<(), LearnError> {
+    rollout.push_step(tick.as_step(final_values))?;
     let (width, latent) = (rollout.obs_kind.numbers(), rollout.latent);
     for (i, &row) in cut.agents.iter().enumerate() {
         let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();

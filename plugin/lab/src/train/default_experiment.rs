@@ -1,17 +1,18 @@
 //! The experiment that serves where none is named.
 
-use crate::{game::Game, games::Games};
+use crate::{experiment_text::ExperimentText, game::Game, games::Games};
 
 /// Levels to train on, and as many behind them to test on, of a game that names no experiment of its own.
 const LEVELS: u64 = 64;
 
-/// The experiment of a program's first game, as a path for messages and its text in RON. A game that has none of its own gets
-/// the plainest: SCORE-PPO in its first mode, from recordings in `demos/` and the game's name.
-pub fn default_experiment(games: &Games) -> (String, String) {
-    match games.first().experiment() {
-        Some((path, text)) => (path.to_owned(), text.to_owned()),
-        None => (format!("the experiment of {}", games.first().name()), plainest(games.first())),
-    }
+/// The experiment of a program's first game. A game that has none of its own gets the plainest: SCORE-PPO in its first mode,
+/// from recordings in `demos/` and the game's name.
+pub fn default_experiment(games: &Games) -> ExperimentText {
+    let game = games.first();
+    game.experiment().unwrap_or_else(|| ExperimentText {
+        origin: format!("the experiment of {}", game.name()).into(),
+        text: plainest(game).into(),
+    })
 }
 
 fn plainest(game: &dyn Game) -> String {

@@ -59,7 +59,8 @@ pub struct RunInfo {
     pub seed: u64,
     /// Version of this crate.
     pub version: String,
-    /// Revision of the code, where it is known.
+    /// Revision of playbot's own code, where it is known. Nobody asks which revision the game was at: its rules have a
+    /// version.
     pub revision: String,
     /// Version of the game's rules.
     pub game_version: u32,

@@ -1,0 +1,60 @@
+//! Starting the program, and reading what it says.
+
+#![allow(dead_code, reason = "no test needs all of it")]
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+pub fn command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
+    command.args(args).current_dir(folder);
+    command
+}
+
+pub fn playbot(folder: &Path, args: &[&str]) -> Output {
+    command(folder, args).output().expect("the program starts")
+}
+
+/// The program with a limit on the size of its files, in blocks of 512 bytes: a full disk.
+#[cfg(unix)]
+pub fn on_full_disk(folder: &Path, blocks: u32, args: &str) -> Output {
+    let line = format!("trap '' XFSZ; ulimit -f {blocks}; exec {} {args}", env!("CARGO_BIN_EXE_playbot"));
+    Command::new("sh").args(["-c", &line]).current_dir(folder).output().expect("a shell")
+}
+
+/// What a call says that works: data and messages.
+pub fn done(folder: &Path, args: &[&str]) -> (String, String) {
+    ended(folder, args, 0)
+}
+
+/// What a call says that ends with this exit code: data and messages.
+pub fn ended(folder: &Path, args: &[&str], wanted: i32) -> (String, String) {
+    let output = playbot(folder, args);
+    let (out, err) = (said(&output), errors(&output));
+    assert_eq!(code(&output), wanted, "{args:?}: {out}{err}");
+    (out, err)
+}
+
+pub fn code(output: &Output) -> i32 {
+    output.status.code().expect("not killed")
+}
+
+pub fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+pub fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+pub fn lines(output: &Output) -> Vec<Value> {
+    json_lines(&said(output))
+}
+
+pub fn json_lines(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+}

@@ -1,0 +1,47 @@
+//! What the program is called: as its file is, whatever games are in it.
+
+use std::{env, ffi::OsStr, path::Path, sync::OnceLock};
+
+/// The name that texts use which do not know what program they are part of, such as the errors of libraries.
+pub const USUAL: &str = "playbot";
+
+/// The program's name, for commands that people are told to call.
+pub fn name() -> &'static str {
+    static NAME: OnceLock<String> = OnceLock::new();
+    NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(USUAL).to_owned())
+}
+
+fn of_file(path: &OsStr) -> Option<&str> {
+    Path::new(path).file_name()?.to_str()?.strip_suffix(env::consts::EXE_SUFFIX)
+}
+
+/// A text with this program's name in the commands that it quotes.
+pub fn named(text: &str) -> String {
+    with_name(text, name())
+}
+
+/// A text with a program's name in the commands that it quotes.
+pub fn with_name(text: &str, program: &str) -> String {
+    text.replace(&format!("`{USUAL} "), &format!("`{program} "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_called_as_its_file() {
+        let called = |name: &str| of_file(OsStr::new(&format!("{name}{}", env::consts::EXE_SUFFIX))).map(str::to_owned);
+        assert_eq!(called("target/release/runner").as_deref(), Some("runner"));
+        assert_eq!(called("my.game").as_deref(), Some("my.game"));
+        assert_eq!(of_file(OsStr::new("..")), None);
+    }
+
+    #[test]
+    fn quoted_commands_get_the_name_and_other_words_keep_theirs() {
+        let text = "playbot 0.2 wrote it: `playbot eval --run a` and `playbot demo repair FILE`";
+        let own = "playbot 0.2 wrote it: `runner eval --run a` and `runner demo repair FILE`";
+        assert_eq!(with_name(text, "runner"), own);
+        assert_eq!(with_name(text, "playbot"), text);
+    }
+}

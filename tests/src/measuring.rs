@@ -1,0 +1,17 @@
+//! How players are measured in tests.
+
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::eval::EvalPlan;
+
+/// One episode on each of these levels, by four arenas in two Worlds on two threads.
+pub fn plan(levels: &str) -> EvalPlan {
+    EvalPlan {
+        split: levels.parse().expect("a split"),
+        observation_config: ObservationConfig::default(),
+        episodes_per_level: 1,
+        seed: 1,
+        arenas: 4,
+        worlds: 2,
+        threads: 2,
+    }
+}
