@@ -22,6 +22,13 @@ pub fn put_in_order(world: &mut World) {
     }
 }
 
+/// Leaves open what nobody has put in order, as in a game that runs by itself: for tests that look for such systems.
+pub fn leave_open(world: &mut World) {
+    for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
+        schedule.remove_build_pass::<InOrderOfAddition>();
+    }
+}
+
 /// Bevy adds its points of synchronisation in a pass before this one: they stay where they are needed.
 #[derive(Debug)]
 struct InOrderOfAddition;

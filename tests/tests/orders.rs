@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use bevy_playbot::{
     headless::set_tick_rate,
     headless_plugins::HeadlessPlugins,
+    system_order::leave_open,
     test_app::PlaybotTestExt,
     virtual_input::{
         InputRoute, VirtualInput, VirtualInputPlugin,
@@ -89,6 +90,7 @@ fn with_input_managers() {
 fn in_worlds_of_foreign_games() {
     for game in [catch_game(), rooms_game()] {
         let (mut world, agents) = build_world(&game, "default", 1, 0, 1);
+        leave_open(&mut world);
         world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
         world.ticks(5).expect("sound");
         assert_eq!(world.ambiguous_orders(&OURS), NONE, "{}", game.name());

@@ -1,16 +1,17 @@
 //! `playbot play` as a person uses it: a window, a keyboard, and what is left on disk.
 #![cfg(feature = "window")]
 
-mod desk;
 #[path = "../shared/program.rs"]
 mod program;
 
 use std::{collections::BTreeSet, path::Path, process::Command};
 
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader, EpisodeActions};
-use desk::Desk;
+use playbot_shell::Desk;
 use program::{code, command, errors, said};
 
+/// The program.
+const PLAYBOT: &str = env!("CARGO_BIN_EXE_playbot");
 /// Side of the window.
 const SIDE: usize = 704;
 /// CoinRun's action "right".
@@ -34,7 +35,7 @@ fn verified(folder: &Path, file: &str) -> String {
 
 #[test]
 fn a_person_wins_hands_over_and_takes_over() {
-    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let args = ["play", "coinrun", "--mode", "hard", "--levels", "0..2", "--bot", "search", "--record", "a.demo"];
     let mut seat = desk.open(folder.path(), &args);
     assert!(seat.title().contains("you play"), "{}", seat.title());
@@ -83,7 +84,7 @@ fn a_person_wins_hands_over_and_takes_over() {
 
 #[test]
 fn an_ant_on_the_open_floor_is_played_with_keys() {
-    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let mut seat = desk.open(folder.path(), &["play", "ant", "--mode", "goal", "--record", "a.demo"]);
     if cfg!(feature = "view3d") {
         // From above, as the bots see it.
@@ -111,7 +112,7 @@ fn an_ant_on_the_open_floor_is_played_with_keys() {
 
 #[test]
 fn a_crash_costs_the_running_episode_only() {
-    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let args = ["play", "coinrun", "--seed", "0", "--record", "a.demo"];
     let mut seat = desk.open(folder.path(), &args);
     seat.tap("Tab");
@@ -124,7 +125,7 @@ fn a_crash_costs_the_running_episode_only() {
     let before = episodes(folder.path(), "a.demo");
     assert!(before.last().is_some_and(DemoEpisode::is_success));
 
-    let again = desk.playbot(folder.path(), &args).output().expect("the program starts");
+    let again = desk.command(folder.path(), &args).output().expect("the program starts");
     assert_eq!(again.status.code(), Some(3));
     assert!(errors(&again).contains("exists already"), "{}", errors(&again));
 
@@ -145,7 +146,7 @@ fn a_crash_costs_the_running_episode_only() {
 
 #[test]
 fn what_is_missing_is_named() {
-    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let play = ["play", "coinrun", "--record", "a.demo"];
     let refuse = |command: &mut Command, words: &str| {
         let output = command.output().expect("the program starts");
@@ -153,10 +154,10 @@ fn what_is_missing_is_named() {
         assert!(errors(&output).contains(words), "{}", errors(&output));
         assert!(!folder.path().join("a.demo").exists(), "no recording without a window");
     };
-    refuse(desk.playbot(folder.path(), &play).env_remove("DISPLAY"), "DISPLAY is not set");
-    refuse(desk.playbot(folder.path(), &play).env("DISPLAY", ":9999"), "no X server answers at DISPLAY=:9999");
+    refuse(desk.command(folder.path(), &play).env_remove("DISPLAY"), "DISPLAY is not set");
+    refuse(desk.command(folder.path(), &play).env("DISPLAY", ":9999"), "no X server answers at DISPLAY=:9999");
     let no_driver = [("VK_DRIVER_FILES", "none"), ("VK_ICD_FILENAMES", "none"), ("WGPU_BACKEND", "vulkan")];
-    refuse(desk.playbot(folder.path(), &play).envs(no_driver), "mesa-vulkan-drivers");
+    refuse(desk.command(folder.path(), &play).envs(no_driver), "mesa-vulkan-drivers");
     for (args, words) in [
         (&["--mode", "hrad"][..], "did you mean `hard`?"),
         (&["--bot", "serch"], "did you mean `search`?"),
@@ -166,7 +167,7 @@ fn what_is_missing_is_named() {
         (&["--run", "not-there"], "not-there"),
         (&["--bot", "search", "--policy", "b"], "cannot be used with"),
     ] {
-        refuse(&mut desk.playbot(folder.path(), &[&play[..], args].concat()), words);
+        refuse(&mut desk.command(folder.path(), &[&play[..], args].concat()), words);
     }
 }
 
@@ -174,7 +175,7 @@ fn what_is_missing_is_named() {
 #[cfg(feature = "view3d")]
 #[test]
 fn an_ant_is_seen_in_space_and_from_above() {
-    let (desk, folder) = (Desk::new(), tempfile::tempdir().expect("a folder"));
+    let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let mut seat = desk.open(folder.path(), &["play", "antmaze", "--mode", "medium", "--bot", "waypoints"]);
     seat.tap("Tab");
     seat.read("waypoints plays");

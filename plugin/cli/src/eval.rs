@@ -101,8 +101,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut rows = Vec::new();
     for split in &splits {
         for Chosen { name, player, observation_config } in &players {
-            let plan =
-                EvalPlan { observation_config: *observation_config, ..EvalPlan::of(&experiment, split, args.compute.threads()) };
+            let plan = EvalPlan {
+                observation_config: *observation_config,
+                ..EvalPlan::of(&experiment, split, args.compute.threads())
+            };
             let measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = methods::follow(game, name, player, &plan)?;

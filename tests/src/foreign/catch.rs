@@ -72,8 +72,13 @@ fn catch(
     }
 }
 
-/// The adapter.
+/// The game with its adapter.
 pub fn catch_game() -> ForeignGame {
+    adapted(game)
+}
+
+/// The adapter, of the game or of a copy with something wrong in it.
+pub fn adapted(game: impl Fn(&mut App) + Send + Sync + 'static) -> ForeignGame {
     ForeignGame::new("catch", 1, game)
         .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])
         .observe(["paddle", "apple_x", "apple_y"], see)

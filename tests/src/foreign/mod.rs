@@ -1,6 +1,7 @@
 //! Games that know nothing of the plugin, for tests of the adapter. Each is small and complete.
 
 pub mod catch;
+pub mod faulty_catch;
 pub mod rooms;
 pub mod stubborn;
 mod traces;

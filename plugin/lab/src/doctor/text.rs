@@ -111,7 +111,7 @@ fn write_types(f: &mut Formatter<'_>, types: &TypesReport) -> fmt::Result {
             f,
             "  {hidden} types of the game are not reflected{names}; a difference in them shows only later, in observation, \
              reward, end and state hash. Derive `Reflect` with `#[reflect(Component)]` or `#[reflect(Resource)]` to have \
-             it named."
+             it named, or let the state hash depend on it (`StateHash`, or `.state_hash` of a `ForeignGame`)."
         )?;
     }
     if types.unnamed > 0 {

@@ -19,7 +19,10 @@ pub const CHOICES: usize = 15;
 
 /// So many samples of a case, in a few seconds.
 pub fn measured(samples: usize) -> Criterion {
-    Criterion::default().sample_size(samples).warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(4))
+    Criterion::default()
+        .sample_size(samples)
+        .warm_up_time(Duration::from_secs(1))
+        .measurement_time(Duration::from_secs(4))
 }
 
 /// Random numbers of a case.

@@ -50,7 +50,8 @@ pub fn images(criterion: &mut Criterion) {
         let config = PpoConfig { cnn: cnn.clone(), ..PpoConfig::default() };
         let spec = PolicySpec { obs: IMAGE.into(), latent: 0, action_space: SPACE };
         let ppo = PpoLearner::new(config.clone(), spec, 1, DEVICE).expect("fits");
-        let score = PpoLearner::with_skill(config, ScoreConfig::default(), &image_skills(cnn), 1, DEVICE).expect("fits");
+        let score =
+            PpoLearner::with_skill(config, ScoreConfig::default(), &image_skills(cnn), 1, DEVICE).expect("fits");
         for (algorithm, learner) in [("ppo", ppo), ("score-ppo", score)] {
             let (mut rng, steps) = (rng("rollout"), 32);
             let obs = seen(ENVS * steps, &mut rng);

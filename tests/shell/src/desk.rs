@@ -9,15 +9,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::program::command;
-
 /// Nothing takes longer, not even on a machine that draws in software and has other things to do.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(180);
 const NEEDS: &str = "this test opens a window on a display of its own and needs Xvfb, xdotool and a Vulkan driver: \
                      `apt-get install xvfb xdotool mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0`";
 
-/// An X server without a screen.
+/// An X server without a screen, for the windows of one program.
 pub struct Desk {
+    program: &'static str,
     server: Child,
     display: String,
     folder: tempfile::TempDir,
@@ -31,11 +30,11 @@ impl Drop for Desk {
 }
 
 impl Desk {
-    /// Starts a server with a free number. Its screen is a file.
-    pub fn new() -> Self {
+    /// Starts a server with a free number for the program at this path. Its screen is a file.
+    pub fn new(program: &'static str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-noreset", "-nolisten", "tcp", "-fbdir"])
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp", "-fbdir"])
             .arg(folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -44,21 +43,21 @@ impl Desk {
         let mut number = String::new();
         let said = BufReader::new(server.stdout.take().expect("piped")).read_line(&mut number);
         assert!(said.is_ok() && !number.is_empty(), "Xvfb does not start");
-        Self { server, display: format!(":{}", number.trim()), folder }
+        Self { program, server, display: format!(":{}", number.trim()), folder }
     }
 
     /// The program with these arguments, on this display.
-    pub fn playbot(&self, folder: &Path, args: &[&str]) -> Command {
-        let mut command = command(folder, args);
-        command.env("DISPLAY", &self.display);
+    pub fn command(&self, folder: &Path, args: &[&str]) -> Command {
+        let mut command = Command::new(self.program);
+        command.args(args).current_dir(folder).env("DISPLAY", &self.display);
         command
     }
 
-    /// Starts the program and waits for its window.
+    /// Starts the program with these arguments, of which the second names the game, and waits for its window.
     pub fn open(&self, folder: &Path, args: &[&str]) -> Seat<'_> {
         // Out of the way of the window, which would otherwise have the keyboard before it is given it.
-        self.xdotool(&["mousemove", "1000", "760"]);
-        let mut command = self.playbot(folder, args);
+        self.xdotool(&["mousemove", "1000", "790"]);
+        let mut command = self.command(folder, args);
         let program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
         let mut seat = Seat { desk: self, program, window: String::new() };
         seat.wait("a window", |seat| {

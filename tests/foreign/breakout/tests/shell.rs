@@ -1,0 +1,41 @@
+//! The verbs of the command line, as users call them.
+
+use playbot_shell::GameProgram;
+
+const GAME: GameProgram = GameProgram {
+    program: env!("CARGO_BIN_EXE_foreign_breakout"),
+    folder: env!("CARGO_MANIFEST_DIR"),
+    game: "breakout",
+    demonstrator: "follower",
+    key: "Left",
+};
+
+#[test]
+fn recordings_replay() {
+    GAME.recordings_replay();
+}
+
+#[test]
+fn moments_are_drawn() {
+    GAME.moments_are_drawn();
+}
+
+#[test]
+fn a_killed_training_goes_on_bit_for_bit() {
+    GAME.a_killed_training_goes_on_bit_for_bit();
+}
+
+#[test]
+fn a_policy_file_plays_as_its_run() {
+    GAME.a_policy_file_plays_as_its_run();
+}
+
+#[test]
+fn the_doctor_finds_nothing() {
+    GAME.the_doctor_finds_nothing();
+}
+
+#[test]
+fn what_a_window_records_replays() {
+    GAME.what_a_window_records_replays();
+}

@@ -1,0 +1,17 @@
+//! `doctor`.
+
+use crate::{game_program::GameProgram, shell::Shell};
+
+impl GameProgram {
+    /// `doctor` finds nothing: the game is safe to record, to resume and to play in a window.
+    pub fn the_doctor_finds_nothing(&self) {
+        let shell = Shell::new(self.program);
+        let report = shell.answer(&["doctor", self.game, "--ticks", "200", "--json"]);
+        assert_eq!((&report["game"], &report["ticks"]), (&self.game.into(), &200.into()));
+        assert_eq!(report["findings"].as_array().map(Vec::len), Some(0), "{}", report["findings"]);
+        for what in ["recording", "resume", "threads", "window"] {
+            assert_eq!(report["safety"][what]["safe"], true, "{what}: {}", report["safety"]);
+        }
+        assert!(report["ticks_per_second"].as_f64().is_some_and(|speed| speed > 0.0), "it was measured");
+    }
+}

@@ -1,0 +1,69 @@
+//! The program of a game that is not ours.
+
+use std::fs;
+
+use crate::shell::Shell;
+
+/// A program with one game that is not ours, and what tests of its verbs must know of it. Each of its other functions is
+/// a test, and says what is wrong by panicking.
+#[derive(Clone, Copy, Debug)]
+pub struct GameProgram {
+    /// The program: `env!("CARGO_BIN_EXE_…")`.
+    pub program: &'static str,
+    /// The folder of its `experiment.ron`: `env!("CARGO_MANIFEST_DIR")`.
+    pub folder: &'static str,
+    /// Name of the game.
+    pub game: &'static str,
+    /// Name of its demonstrator.
+    pub demonstrator: &'static str,
+    /// A key of the game, as xdotool calls it.
+    pub key: &'static str,
+}
+
+/// Levels that are recorded: those that its experiment's demonstrations begin with.
+const DEMO_LEVELS: &str = "default:1000..1002";
+/// Updates of a training.
+pub(crate) const UPDATES: usize = 40;
+/// Levels that policies are measured on.
+pub(crate) const TEST_LEVELS: &str = "default:100000..100001";
+
+/// What makes an experiment a matter of seconds.
+const SMALL: [&str; 11] = [
+    "demos=few.demo",
+    "arenas=2",
+    "worlds=2",
+    "skills.epochs=2",
+    "skills.hidden=[16]",
+    "skills.encoder_hidden=8",
+    "skills.gru_hidden=8",
+    "skills.latent=4",
+    "ppo.num_steps=64",
+    "ppo.minibatches=2",
+    "checkpoints.every=2",
+];
+
+impl GameProgram {
+    /// A shell in whose folder lies `few.demo`, of three levels.
+    pub(crate) fn with_recording(&self) -> Shell {
+        let shell = Shell::new(self.program);
+        let record = ["record", self.game, "--levels", DEMO_LEVELS, "--noise", "0.1", "--out", "few.demo"];
+        shell.done(&record);
+        shell
+    }
+
+    /// A shell in whose folder lie `few.demo`, `small.ron`, the game's own experiment made small, and what is learned from
+    /// both, `skills.safetensors`.
+    pub(crate) fn with_skills(&self) -> Shell {
+        let shell = self.with_recording();
+        let own = format!("{}/experiment.ron", self.folder);
+        let (steps, test) = (format!("steps={}", UPDATES * 2 * 64), format!("test={TEST_LEVELS}"));
+        let sets = SMALL.iter().copied().chain([steps.as_str(), &test]).flat_map(|set| ["--set", set]);
+        let show: Vec<&str> = ["config", "show", "--experiment", &own].into_iter().chain(sets).collect();
+        fs::write(shell.path("small.ron"), shell.done(&show)).expect("writable");
+        let learn = ["learn-skills", "--experiment", "small.ron", "--out", "skills.safetensors", "--json"];
+        let epochs = shell.answers(&learn);
+        assert_eq!(epochs.len(), 2, "one line for each epoch: {epochs:?}");
+        assert!(epochs.iter().all(|epoch| epoch["loss"].as_f64().is_some_and(f64::is_finite)), "{epochs:?}");
+        shell
+    }
+}

@@ -1,0 +1,48 @@
+//! `play`: a window, in which each frame is a tick of the game.
+
+use crate::{desk::Desk, game_program::GameProgram, shell::Shell};
+
+/// Ticks that the demonstrator plays of each level.
+const TICKS: u32 = 40;
+
+impl GameProgram {
+    /// `play --record`, and `demo verify` of it without a display: what a person and the demonstrator play in a window, on
+    /// several levels in one World, is to the bit what the same actions come to elsewhere.
+    pub fn what_a_window_records_replays(&self) {
+        let (desk, shell) = (Desk::new(self.program), Shell::new(self.program));
+        let args = ["play", self.game, "--levels", "0..1", "--bot", self.demonstrator, "--record", "seen.demo"];
+        let mut seat = desk.open(shell.folder(), &args);
+        assert!(seat.title().contains("you play"), "{}", seat.title());
+
+        seat.tap("Tab");
+        seat.read(&format!("{} plays", self.demonstrator));
+        seat.pass_ticks(TICKS);
+        seat.tap("n");
+        seat.read(&format!("{} default 1 · tick", self.game));
+        seat.pass_ticks(TICKS);
+        seat.tap("Tab");
+        seat.read("you play");
+        seat.hold(&[self.key]);
+        seat.pass_ticks(5);
+        seat.release(&[self.key]);
+        // The same level from its start: for the World it is the third episode at least.
+        seat.tap("r");
+        seat.pass_ticks(5);
+        seat.tap("Escape");
+        let (status, said) = seat.leave();
+        assert!(status.success(), "{said}");
+        assert!(said.contains("demo verify seen.demo"), "{said}");
+
+        let episodes = shell.answers(&["demo", "show", "seen.demo", "--json"]);
+        let count = |level: u64| episodes.iter().filter(|episode| episode["level"] == level).count();
+        assert!(count(0) >= 1 && count(1) >= 2, "{episodes:?}");
+        let decided = |who: &str| -> u64 {
+            episodes.iter().filter_map(|episode| episode["steps_by_decider"][who].as_u64()).sum()
+        };
+        let (bot, human) = (decided("Bot"), decided("Human"));
+        assert!(bot >= u64::from(TICKS) && human >= 5, "{bot} ticks by the bot, {human} by hand");
+        let verified = shell.answer(&["demo", "verify", "seen.demo", "--json"]);
+        assert_eq!(verified["report"]["episodes"], episodes.len(), "{verified}");
+        assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+    }
+}

@@ -1,0 +1,74 @@
+//! A program as a shell starts it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+};
+
+use serde_json::Value;
+
+/// A program, and a folder of its own in which it is started: empty at first, and gone with this.
+pub struct Shell {
+    program: &'static str,
+    folder: tempfile::TempDir,
+}
+
+impl Shell {
+    /// A shell for the program at this path.
+    pub fn new(program: &'static str) -> Self {
+        Self { program, folder: tempfile::tempdir().expect("a folder") }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// A path in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder().join(name)
+    }
+
+    /// The program with these arguments, without a display.
+    pub fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(self.program);
+        command.args(args).current_dir(self.folder()).env_remove("DISPLAY").stdin(Stdio::null());
+        command
+    }
+
+    /// Runs the program to its end, well or not.
+    pub fn run(&self, args: &[&str]) -> Output {
+        self.command(args).output().expect("the program starts")
+    }
+
+    /// Runs the program, which must find that all is well, and returns its standard output.
+    #[track_caller]
+    pub fn done(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        let [said, errors] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        assert_eq!(output.status.code(), Some(0), "{args:?}\n{said}{errors}");
+        said
+    }
+
+    /// Runs the program, which must find that all is well, and returns its lines of JSON.
+    #[track_caller]
+    pub fn answers(&self, args: &[&str]) -> Vec<Value> {
+        let said = self.done(args);
+        said.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()
+    }
+
+    /// Runs the program, which must find that all is well, and returns its only line of JSON.
+    #[track_caller]
+    pub fn answer(&self, args: &[&str]) -> Value {
+        let mut answers = self.answers(args);
+        assert_eq!(answers.len(), 1, "{args:?}: {answers:?}");
+        answers.remove(0)
+    }
+
+    /// What a file in the folder holds.
+    #[track_caller]
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("cannot read {name}: {error}"))
+    }
+}

@@ -1,0 +1,89 @@
+//! Verbs around policies.
+
+use std::{fs, process::Stdio, time::Duration};
+
+use serde_json::Value;
+
+use crate::{
+    game_program::{GameProgram, TEST_LEVELS, UPDATES},
+    shell::Shell,
+};
+
+const TRAIN: [&str; 5] = ["train", "--experiment", "small.ron", "--skills", "skills.safetensors"];
+
+/// Trains into the folder `run`.
+fn train(shell: &Shell, run: &str) {
+    shell.done(&[&TRAIN[..], &["--run", run]].concat());
+}
+
+/// Metrics, and weights and arenas of the last checkpoint.
+fn results(shell: &Shell, run: &str) -> [Vec<u8>; 3] {
+    let entries = fs::read_dir(shell.path(run).join("checkpoints")).expect("a run");
+    let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
+    let last = names.filter(|name| name.starts_with("step-")).max().expect("a checkpoint");
+    ["metrics.jsonl", &format!("checkpoints/{last}/learner.safetensors"), &format!("checkpoints/{last}/arenas.json")]
+        .map(|name| shell.read(&format!("{run}/{name}")))
+}
+
+/// Updates that a run has logged.
+fn logged(shell: &Shell, run: &str) -> usize {
+    fs::read_to_string(shell.path(run).join("metrics.jsonl")).unwrap_or_default().lines().count()
+}
+
+/// Starts a training and kills it in its midst, as a power cut would.
+fn train_and_kill(shell: &Shell, run: &str) {
+    let mut command = shell.command(&[&TRAIN[..], &["--run", run]].concat());
+    let mut child = command.stderr(Stdio::null()).spawn().expect("the program starts");
+    while logged(shell, run) < 7 {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
+        std::thread::park_timeout(Duration::from_millis(1));
+    }
+    // SIGKILL: no handler runs, whatever was being written stays as it is.
+    child.kill().expect("it runs");
+    child.wait().expect("a child");
+    assert!(logged(shell, run) < UPDATES, "it was killed too late to prove anything");
+}
+
+/// What `eval --json` says of one player.
+fn measured(shell: &Shell, who: &[&str]) -> Value {
+    let row = shell.answer(&[&["eval", "--json"], who].concat());
+    assert_eq!((&row["split"], &row["episodes"]), (&TEST_LEVELS.into(), &2.into()), "{row}");
+    for key in ["return_mean", "return_se", "success", "length_mean", "clipped"] {
+        assert!(row[key].as_f64().is_some_and(f64::is_finite), "{key}: {row}");
+    }
+    assert!(row["length_mean"].as_f64().is_some_and(|ticks| ticks >= 1.0), "{row}");
+    row
+}
+
+impl GameProgram {
+    /// `record`, `learn-skills`, `train`, and `train --resume` after a kill, which comes to the same bytes as a training
+    /// that nobody disturbed.
+    pub fn a_killed_training_goes_on_bit_for_bit(&self) {
+        let shell = self.with_skills();
+        train(&shell, "whole");
+        assert_eq!(logged(&shell, "whole"), UPDATES);
+        train_and_kill(&shell, "killed");
+        shell.done(&["train", "--resume", "--run", "killed"]);
+        let [metrics, weights, arenas] = results(&shell, "whole");
+        let resumed = results(&shell, "killed");
+        assert!(metrics == resumed[0], "killing it changed the metrics");
+        assert!(weights == resumed[1], "killing it changed the weights");
+        assert!(arenas == resumed[2], "killing it changed what its arenas do");
+    }
+
+    /// `eval` of the demonstrator, of a run and of the policy file that `policy export` makes of it, which plays the same.
+    pub fn a_policy_file_plays_as_its_run(&self) {
+        let shell = self.with_skills();
+        train(&shell, "run");
+        let of_bot = measured(&shell, &["--bot", self.demonstrator, "--experiment", "small.ron"]);
+        assert_eq!(of_bot["method"], self.demonstrator);
+        assert!(of_bot["return_mean"].as_f64().is_some_and(|sum| sum > 0.0), "the demonstrator earns: {of_bot}");
+        let of_run = measured(&shell, &["--run", "run"]);
+        assert_eq!(of_run["method"], "score-ppo");
+        shell.done(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
+        let card = &shell.answer(&["policy", "show", "bot.policy", "--json"])["card"];
+        assert_eq!((&card["game"], &card["algorithm"]), (&self.game.into(), &"score-ppo".into()), "{card}");
+        let of_file = measured(&shell, &["--policy", "bot.policy", "--experiment", "small.ron"]);
+        assert_eq!(of_file, of_run, "the file plays otherwise than the run it was made of");
+    }
+}

@@ -1,0 +1,105 @@
+//! The game of catching with a fault planted in it, of which its adapter knows nothing: what the doctor must find.
+
+use std::hash::{BuildHasher, Hasher, RandomState};
+
+use bevy::{prelude::*, time::Real};
+use playbot_lab::foreign::ForeignGame;
+
+use super::catch::{Apple, adapted, game};
+
+/// What is wrong with a copy of the game.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CatchFault {
+    /// The [`Wind`], which nobody seeds, blows the apple aside.
+    UnseededWind,
+    /// So does a gust that is written down nowhere.
+    UnseededGust,
+    /// Apples fall faster and faster with the [`Season`], which goes on from episode to episode.
+    EndlessSeason,
+    /// So they do with a number of frames that lies in a `Local`.
+    EndlessLocal,
+    /// Apples sink at the pace of `Time<Real>`.
+    WallClock,
+    /// A [`Mood`] is drawn without a seed. Reflection cannot see it, and nothing that is seen depends on it.
+    HiddenMood,
+}
+
+/// Blows apples aside.
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
+pub struct Wind {
+    force: f32,
+}
+
+/// How long apples have been ripening.
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
+pub struct Season {
+    frames: u32,
+}
+
+/// What the gardener feels.
+#[derive(Resource, Default)]
+pub struct Mood(pub u32);
+
+/// Something between 0 and 1 that no seed decides.
+fn unseeded() -> f32 {
+    f32::from(RandomState::new().build_hasher().finish() as u16) / f32::from(u16::MAX)
+}
+
+/// The game with this fault, and its usual adapter.
+pub fn faulty_catch(fault: CatchFault) -> ForeignGame {
+    adapted(move |app: &mut App| {
+        game(app);
+        plant(app, fault);
+    })
+}
+
+/// What is wrong happens before the game's own systems, so that no order is left open.
+fn plant(app: &mut App, fault: CatchFault) {
+    match fault {
+        CatchFault::UnseededWind => app.init_resource::<Wind>().add_systems(PreUpdate, blow),
+        CatchFault::UnseededGust => app.add_systems(PreUpdate, gust),
+        CatchFault::EndlessSeason => app.init_resource::<Season>().add_systems(PreUpdate, ripen),
+        CatchFault::EndlessLocal => app.add_systems(PreUpdate, ripen_unseen),
+        CatchFault::WallClock => app.add_systems(PreUpdate, sink),
+        CatchFault::HiddenMood => app.init_resource::<Mood>().add_systems(PreUpdate, feel),
+    };
+}
+
+fn blow(mut wind: ResMut<Wind>, mut apples: Query<&mut Transform, With<Apple>>) {
+    wind.force = unseeded();
+    for mut apple in &mut apples {
+        apple.translation.x += 0.01 * wind.force;
+    }
+}
+
+fn gust(mut apples: Query<&mut Transform, With<Apple>>) {
+    for mut apple in &mut apples {
+        apple.translation.x += 0.01 * unseeded();
+    }
+}
+
+fn ripen(mut season: ResMut<Season>, mut apples: Query<&mut Apple>) {
+    season.frames += 1;
+    for mut apple in &mut apples {
+        apple.speed = 10.0 + 0.01 * season.frames as f32;
+    }
+}
+
+fn ripen_unseen(mut frames: Local<u32>, mut apples: Query<&mut Apple>) {
+    *frames += 1;
+    for mut apple in &mut apples {
+        apple.speed = 10.0 + 0.01 * *frames as f32;
+    }
+}
+
+fn sink(real: Res<Time<Real>>, mut apples: Query<&mut Transform, With<Apple>>) {
+    for mut apple in &mut apples {
+        apple.translation.y -= real.delta_secs();
+    }
+}
+
+fn feel(mut mood: ResMut<Mood>) {
+    mood.0 = unseeded().to_bits();
+}

@@ -1,0 +1,107 @@
+//! The doctor and games that know nothing of the plugin: each planted fault is found and named as well as it can be.
+
+use bevy::prelude::*;
+use playbot_lab::{
+    doctor::{CauseKind, Comparison, Difference, DifferenceKind, DoctorOptions, DoctorReport, Finding, examine},
+    foreign::ForeignGame,
+};
+use playbot_tests::foreign::{
+    catch::catch_game,
+    faulty_catch::{CatchFault, Mood, faulty_catch},
+};
+
+fn examined(game: &ForeignGame) -> DoctorReport {
+    let options = DoctorOptions { ticks: 120, several_arenas: false, ..DoctorOptions::new("default") };
+    examine(game, &options, |_| {}).expect("the game has this mode")
+}
+
+/// What this comparison finds in a copy with this fault, and whether it is all that is found.
+fn found(fault: CatchFault, comparison: Comparison) -> (Finding, Difference, DoctorReport) {
+    let report = examined(&faulty_catch(fault));
+    let finding = report.findings.iter().find(|finding| finding.comparison == Some(comparison));
+    let finding = finding.unwrap_or_else(|| panic!("{fault:?}:\n{report}")).clone();
+    let difference = finding.difference.clone().unwrap_or_else(|| panic!("{fault:?}:\n{report}"));
+    (finding, difference, report)
+}
+
+/// Where apples are is reflected, whatever moves them.
+fn check_that_the_apple_is_named(difference: &Difference, report: &DoctorReport) {
+    assert_eq!(difference.kind, DifferenceKind::Component, "{report}");
+    assert!(difference.name.ends_with("Transform"), "{report}");
+    assert_eq!(difference.entity.as_deref(), Some("[Apple]"), "{report}");
+}
+
+#[test]
+fn a_healthy_foreign_game_has_no_findings() {
+    let report = examined(&catch_game());
+    assert!(report.is_healthy(), "{report}");
+    for comparison in [Comparison::Repeat, Comparison::Clock, Comparison::Threads, Comparison::Restart] {
+        let compared = report.of(comparison).expect("it was made");
+        assert_eq!((compared.same(), compared.ticks), (Some(true), 120), "{report}");
+    }
+}
+
+#[test]
+fn unseeded_randomness_is_found_in_the_resource_that_holds_it() {
+    let (finding, difference, report) = found(CatchFault::UnseededWind, Comparison::Repeat);
+    assert_eq!((difference.kind, difference.tick), (DifferenceKind::Resource, 0), "{report}");
+    assert!(difference.name.ends_with("::Wind") && difference.field == ".force", "{report}");
+    assert_eq!(finding.causes[0].kind, CauseKind::Randomness);
+    assert_eq!((report.findings.len(), report.safety.recording.safe), (1, Some(false)), "{report}");
+}
+
+#[test]
+fn unseeded_randomness_that_is_kept_nowhere_is_found_in_what_it_moves() {
+    let (finding, difference, report) = found(CatchFault::UnseededGust, Comparison::Repeat);
+    check_that_the_apple_is_named(&difference, &report);
+    assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::Randomness, 1), "{report}");
+    let effect = report.of(Comparison::Repeat).and_then(|repeat| repeat.effect.clone()).expect("it is seen");
+    assert_eq!((effect.kind, effect.name.as_str()), (DifferenceKind::Observation, "apple_x"), "{report}");
+}
+
+#[test]
+fn a_resource_that_survives_a_restart_is_named() {
+    let (finding, difference, report) = found(CatchFault::EndlessSeason, Comparison::Restart);
+    assert_eq!((difference.kind, difference.tick), (DifferenceKind::Resource, 0), "{report}");
+    assert!(difference.name.ends_with("::Season") && difference.field == ".frames", "{report}");
+    assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::SurvivesRestart, 1), "{report}");
+    assert_eq!((report.safety.resume.safe, report.safety.threads.safe), (Some(false), Some(true)), "{report}");
+}
+
+#[test]
+fn a_local_that_survives_a_restart_is_found_in_what_it_moves_and_is_a_usual_cause() {
+    let (finding, difference, report) = found(CatchFault::EndlessLocal, Comparison::Restart);
+    check_that_the_apple_is_named(&difference, &report);
+    assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::SurvivesRestart, 1), "{report}");
+    assert!(report.to_string().contains("a Local"), "{report}");
+}
+
+#[test]
+fn a_foreign_reader_of_the_wall_clock_is_found() {
+    let (finding, difference, report) = found(CatchFault::WallClock, Comparison::Clock);
+    check_that_the_apple_is_named(&difference, &report);
+    assert_eq!(finding.causes[0].kind, CauseKind::WallClock);
+    assert_eq!(report.of(Comparison::Repeat).and_then(|repeat| repeat.same()), Some(true), "{report}");
+    assert_eq!(report.safety.window.safe, Some(false), "{report}");
+}
+
+#[test]
+fn what_nobody_can_see_is_listed_with_what_to_do_about_it() {
+    let report = examined(&faulty_catch(CatchFault::HiddenMood));
+    assert!(report.is_healthy(), "{report}");
+    assert!(report.types.not_reflected.iter().any(|path| path.ends_with("::Mood")), "{:?}", report.types);
+    let text = report.to_string();
+    for words in ["::Mood`", "are not reflected", "Derive `Reflect`", "#[reflect(Resource)]", "`.state_hash`"] {
+        assert!(text.contains(words), "`{words}` is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn what_reflection_cannot_see_is_found_through_the_state_hash() {
+    let game = faulty_catch(CatchFault::HiddenMood).state_hash(|mood: Res<Mood>| u64::from(mood.0));
+    let report = examined(&game);
+    assert_eq!(report.findings.len(), 1, "{report}");
+    let difference = report.findings[0].difference.as_ref().expect("a difference");
+    assert_eq!((difference.kind, difference.tick), (DifferenceKind::StateHash, 0), "{report}");
+    assert_eq!(report.findings[0].causes[0].kind, CauseKind::Randomness, "{report}");
+}

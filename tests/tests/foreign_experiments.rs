@@ -1,0 +1,54 @@
+//! Experiments of games that are not ours can be read, and the commands in them can be called.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use playbot_lab::{split::LevelSplit, train::config_file::read_experiment};
+
+/// Every `experiment.ron` below `foreign`, with the name of its folder.
+fn experiments() -> Vec<(String, PathBuf)> {
+    let entries = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("foreign")).expect("it is there");
+    let folders = entries.map(|entry| entry.expect("readable"));
+    let files =
+        folders.map(|folder| (folder.file_name().to_string_lossy().into_owned(), folder.path().join("experiment.ron")));
+    let mut found: Vec<_> = files.filter(|(_, file)| file.exists()).collect();
+    found.sort();
+    found
+}
+
+/// What is written in comments, after `//`.
+fn comments(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| line.trim().strip_prefix("//")).map(str::trim)
+}
+
+#[test]
+fn every_experiment_of_a_foreign_game_makes_sense() {
+    let all = experiments();
+    assert_eq!(all.len(), 3, "{all:?}");
+    for (game, file) in all {
+        let experiment = read_experiment(&file).unwrap_or_else(|error| panic!("{error}"));
+        experiment.check().unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        assert_eq!(experiment.game, game, "{}", file.display());
+        let (train, test) = (&experiment.train, &experiment.test);
+        assert!(train.last < test.first || test.last < train.first, "{game} trains on what is held out");
+    }
+}
+
+#[test]
+fn the_demonstrations_of_an_experiment_are_made_as_it_says() {
+    for (game, file) in experiments() {
+        let text = fs::read_to_string(&file).expect("readable");
+        let program = format!("foreign_{game}");
+        let mut commands = comments(&text).filter(|line| line.starts_with(&program));
+        let words: Vec<&str> = commands.next().expect("a command that records").split_whitespace().collect();
+        playbot_cli::check_usage(&words).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        let after = |word: &str| words[words.iter().position(|other| *other == word).expect(word) + 1];
+        let experiment = read_experiment(&file).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((after("record"), Some(Path::new(after("--out")))), (game.as_str(), experiment.demos.as_deref()));
+        let levels: LevelSplit = after("--levels").parse().expect("levels");
+        let test = &experiment.test;
+        assert!(levels.last < test.first || test.last < levels.first, "{game} shows what is held out");
+    }
+}
