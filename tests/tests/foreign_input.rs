@@ -47,7 +47,7 @@ fn keys_and_buttons_come_in_any_order() {
     ] {
         let game = said.into_iter().fold(bare(), |game, say| say(game));
         assert_eq!(pressed(&game), expected);
-        assert_eq!(game.actions(), ActionSpace::Discrete(3));
+        assert_eq!(Game::actions(&game), ActionSpace::Discrete(3));
     }
     let twice = keys(bare().keys([vec![KeyCode::KeyA]]));
     assert_eq!(pressed(&twice), VirtualInput::keys(KEYS.map(<[_]>::to_vec)), "what was said last counts");

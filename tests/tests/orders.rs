@@ -108,6 +108,7 @@ fn in_worlds_of_all_games_with_pictures_and_without() {
             Err(_) if kind == ObservationKind::Raster => continue,
             Err(error) => panic!("{}: {error}", game.name()),
         };
+        leave_open(&mut world);
         world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
         world.ticks(3).expect("sound");
         assert_eq!(world.ambiguous_orders(&OURS), NONE, "{} {kind}", game.name());

@@ -109,15 +109,15 @@ mod tests {
             let pad = app.world().get::<Gamepad>(pad).expect("plugged in");
             (pad.pressed(GamepadButton::South), pad.get(GamepadAxis::LeftStickX).unwrap_or(0.0))
         };
-        [real, own].map(|pad| plug_in(app.world_mut(), pad));
+        [real, own].into_iter().for_each(|pad| plug_in(app.world_mut(), pad));
         app.update();
 
-        [real, own].map(|pad| press(app.world_mut(), pad, 1.0));
+        [real, own].into_iter().for_each(|pad| press(app.world_mut(), pad, 1.0));
         app.update();
         assert_eq!((held(&app, real), held(&app, own)), ((true, 1.0), (true, 1.0)));
 
         app.insert_resource(Devices::Kept);
-        [(real, 1.0), (own, 0.0)].map(|(pad, value)| press(app.world_mut(), pad, value));
+        [(real, 1.0), (own, 0.0)].into_iter().for_each(|(pad, value)| press(app.world_mut(), pad, value));
         app.update();
         assert_eq!((held(&app, real), held(&app, own)), ((false, 0.0), (false, 0.0)), "let go of, and kept");
 
