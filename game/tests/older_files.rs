@@ -1,0 +1,80 @@
+//! Recordings, skill models, checkpoints and policy files of an older program load, and come to what they came to then.
+//! `fixtures/older/README.md` says how they were made.
+
+#[path = "shared/program.rs"]
+mod program;
+
+use std::{fs, path::Path};
+
+use program::{done, json_lines};
+
+const OLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/older");
+const FILES: [&str; 6] = ["bot.policy", "few.demo", "policy.json", "run.json", "skills.safetensors", "small.ron"];
+
+/// A folder with copies, which may be written to.
+fn older() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for file in FILES {
+        fs::copy(Path::new(OLDER).join(file), folder.path().join(file)).expect("part of the repository");
+    }
+    copy_folder(&Path::new(OLDER).join("run"), &folder.path().join("run"));
+    folder
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir(to).expect("writable");
+    for entry in fs::read_dir(from).expect("part of the repository") {
+        let (path, to) = entry.map(|entry| (entry.path(), to.join(entry.file_name()))).expect("readable");
+        if path.is_dir() {
+            copy_folder(&path, &to);
+        } else {
+            fs::copy(path, to).expect("writable");
+        }
+    }
+}
+
+fn read(folder: &Path, file: &str) -> String {
+    fs::read_to_string(folder.join(file)).expect("a text")
+}
+
+/// That what `eval --json` says now is what it said then.
+fn measures_as_then(args: &[&str], then: &str) {
+    let folder = older();
+    let (said, _) = done(folder.path(), &[&["eval", "--json"], args].concat());
+    assert_eq!(json_lines(&said), json_lines(&read(folder.path(), then)));
+}
+
+#[test]
+fn a_recording_replays() {
+    let folder = older();
+    let (said, _) = done(folder.path(), &["demo", "verify", "few.demo"]);
+    assert!(said.contains("all as recorded"), "{said}");
+}
+
+#[test]
+fn a_run_plays_as_it_did() {
+    measures_as_then(&["--run", "run"], "run.json");
+}
+
+#[test]
+fn a_policy_file_plays_as_it_did() {
+    measures_as_then(&["--policy", "bot.policy", "--levels", "umaze:8..9"], "policy.json");
+}
+
+#[test]
+fn a_training_goes_on_from_its_checkpoint_as_it_went_on_then() {
+    let folder = older();
+    let then = read(folder.path(), "run/metrics.jsonl");
+    fs::remove_dir_all(folder.path().join("run/checkpoints/step-000000000256")).expect("the last of three");
+    done(folder.path(), &["train", "--resume", "--run", "run"]);
+    assert_eq!(read(folder.path(), "run/metrics.jsonl"), then);
+    assert!(folder.path().join("run/checkpoints/step-000000000256").is_dir(), "it has got as far again");
+}
+
+#[test]
+fn a_training_starts_from_a_skill_model() {
+    let folder = older();
+    let args = ["train", "--experiment", "small.ron", "--skills", "skills.safetensors", "--run", "again"];
+    done(folder.path(), &args);
+    assert_eq!(read(folder.path(), "again/metrics.jsonl"), read(folder.path(), "run/metrics.jsonl"));
+}
