@@ -1,5 +1,9 @@
 //! Takes the game out of the `bevy` package.
 
+// A link, not a dependency: packages may depend on nothing that is not published.
+#[path = "showcase/lib.rs"]
+mod showcase;
+
 fn main() {
-    foreign_showcase::write_game("alien_cake_addict", &[], None);
+    showcase::write_game("alien_cake_addict", &[], None);
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{find, rewrite::rewrite};
+use super::{find, rewrite};
 
 /// Writes `OUT_DIR/game.rs` from `examples/showcase/NAME.rs`, and the modules `parts` of the example beside it.
 ///
