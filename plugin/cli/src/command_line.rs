@@ -8,7 +8,7 @@ use playbot_lab::{game::Game, games::Games};
 use crate::{
     bench, config, demo, doctor,
     error::{CliError, Outcome},
-    eval, eyes, interrupt, learn_skills, level, play, policy, quickstart, record, runs, study, trace, train, view,
+    eval, eyes, interrupt, learn_skills, level, log, play, policy, quickstart, record, runs, study, trace, train, view,
 };
 
 /// Playtesting bots that learn from demonstrations.
@@ -30,7 +30,6 @@ Examples:
   playbot record coinrun --levels easy:0..9 --out my.demo
   playbot play coinrun --seed 7 --record my.demo   play it yourself
   playbot demo verify demos/coinrun
-  playbot doctor coinrun                           is the game the same every time?
   playbot doctor coinrun                           is the game the same every time?
   playbot learn-skills --experiment assets/experiments/coinrun.ron --out skills.safetensors
   playbot train --experiment assets/experiments/coinrun.ron --skills skills.safetensors --run runs/first
@@ -116,7 +115,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    init_tracing(cli.verbose);
+    log::init(cli.verbose);
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {
@@ -161,17 +160,4 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::View(args) => view::run(args, games),
         Verb::Bench(args) => bench::run(args, games),
     }
-}
-
-/// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
-/// to warn of.
-const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
-
-fn init_tracing(verbose: u8) {
-    let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
-    // What cannot be written is not worth a word, which could not be written either.
-    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
-    format.with_writer(std::io::stderr).init();
 }

@@ -18,6 +18,7 @@ mod footprints;
 mod interrupt;
 mod learn_skills;
 mod level;
+mod log;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;
 mod methods;
