@@ -116,6 +116,8 @@ fn the_two_eyes_are_compared_and_the_worst_frame_is_drawn() {
     let table = std::fs::read_to_string(folder.join("eyes/table.md")).expect("written");
     assert!(table.contains("--levels hard:0..3 --frames 4 --out eyes"), "{table}");
     assert!(folder.join("eyes/worst.png").is_file() && folder.join("eyes/results.json").is_file());
-    let strict = playbot(folder, &[&eyes[..], &["--least-close", "1.1"]].concat());
-    assert_eq!(strict.status.code(), Some(1), "no picture is that close");
+    for strict in ["--least-close=1.1", "--most-mean=-1"] {
+        let strict = playbot(folder, &[&eyes[..], &[strict]].concat());
+        assert_eq!(strict.status.code(), Some(1), "no picture is that close");
+    }
 }

@@ -79,7 +79,8 @@ fn no_adapter_needs_unsafe_code() {
 
 #[test]
 fn nothing_of_the_examples_of_bevy_is_kept_here() {
-    for (game, allowed) in [("alien_cake_addict", ["build.rs", "seeded.rs"]), ("breakout", ["build.rs", "silence.rs"])] {
+    for (game, allowed) in [("alien_cake_addict", ["build.rs", "seeded.rs"]), ("breakout", ["build.rs", "silence.rs"])]
+    {
         let folder = crate_of(game);
         for path in files(&folder).iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs")) {
             let name = path.strip_prefix(&folder).expect("it was found there").display().to_string();

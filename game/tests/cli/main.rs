@@ -2,6 +2,7 @@
 
 mod eval;
 mod program;
+mod switches;
 mod trace;
 mod usage;
 mod work;

@@ -52,20 +52,24 @@ impl Plugin for TakeoverPlugin {
         app.insert_resource(self.game.clone())
             .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
             .register_type::<GameIdentity>()
+            .register_type::<Takeover>()
             .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems))
             .add_systems(Last, finish.after(PlaybotSystems::Reset).run_if(on_message::<AppExit>));
     }
 }
 
 /// Who has taken over.
-#[derive(Resource, Debug)]
+#[derive(Resource, Debug, Reflect)]
+#[reflect(from_reflect = false)]
 pub struct Takeover {
     request: TakeoverRequest,
     key: Option<KeyCode>,
     /// Whether it shall be going on.
     is_wanted: bool,
     /// What is wrong with the request, until it was said.
+    #[reflect(ignore)]
     error: Option<RequestError>,
+    #[reflect(ignore)]
     running: Running,
 }
 
