@@ -6,9 +6,11 @@ use bevy::prelude::*;
 const COLUMNS: u32 = 8;
 
 /// Places for arenas side by side, so that no agent sees the arena of another. The first is at the origin.
-#[derive(Resource, Debug, Default)]
+#[derive(Resource, Debug, Default, Reflect)]
+#[reflect(Resource)]
 pub(crate) struct ArenaGrid {
-    /// Places that have been given away.
+    /// Places that have been given away. Not reflected: an arena is the same, however many others there are.
+    #[reflect(ignore)]
     taken: u32,
 }
 

@@ -103,6 +103,8 @@ fn the_two_eyes_are_compared_and_the_worst_frame_is_drawn() {
     let table = std::fs::read_to_string(folder.join("eyes/table.md")).expect("written");
     assert!(table.contains("--levels hard:0..3 --frames 4 --out eyes"), "{table}");
     assert!(folder.join("eyes/worst.png").is_file() && folder.join("eyes/results.json").is_file());
-    // No picture is that close.
-    ended(folder, &[&eyes[..], &["--least-close", "1.1"]].concat(), 1);
+    for strict in ["--least-close=1.1", "--most-mean=-1"] {
+        // No picture is that close.
+        ended(folder, &[&eyes[..], &[strict]].concat(), 1);
+    }
 }

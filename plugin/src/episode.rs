@@ -189,7 +189,7 @@ pub struct EpisodeResult {
 /// An episode has ended: triggered by the plugin after the tick was recorded and before the next level starts.
 ///
 /// The fields of its [`EpisodeResult`] can be read directly: `event.success`.
-#[derive(EntityEvent, Deref, Clone, Copy, Debug)]
+#[derive(EntityEvent, Deref, Clone, Copy, Debug, Reflect)]
 pub struct EpisodeEnded {
     /// The agent.
     pub entity: Entity,

@@ -3,7 +3,8 @@
 use bevy::prelude::*;
 
 /// The app has no screen, so that nothing needs to be drawn but what agents ask for.
-#[derive(Resource, Clone, Copy, Debug)]
+#[derive(Resource, Clone, Copy, Debug, Reflect)]
+#[reflect(Resource)]
 pub(crate) struct NoScreen;
 
 /// Marks an app with [`NoScreen`].

@@ -27,18 +27,23 @@ use crate::{
 
 /// Turns panics of the game into a [`Fault`] that [`tick_world`](crate::headless::tick_world) returns, with the running
 /// episodes of all agents kept in a file that replays to the panic.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug)]
 pub struct PanicReports {
     header: DemoHeader,
     folder: PathBuf,
 }
 
 /// What an agent has done in its running episode, kept for the report of a panic.
-#[derive(Component, Clone, Debug, Default)]
+#[derive(Component, Clone, Debug, Default, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct EpisodeTrace(Option<DemoEpisode>);
 
 /// The World has panicked, and what it holds may be half of something.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 struct Broken;
 
 impl PanicReports {

@@ -45,7 +45,9 @@ pub enum TickPlacement {
 
 /// The schedules in which the parts of a tick run. [`PlaybotPlugin`](crate::plugin::PlaybotPlugin) inserts it; whoever
 /// adds systems to a [`PlaybotSystems`](crate::systems::PlaybotSystems) set asks it where.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, PartialEq)]
 pub struct TickSchedules {
     /// What a tick is made of.
     pub placement: TickPlacement,
@@ -73,7 +75,8 @@ impl TickSchedules {
 
 /// Which frames are ticks, under [`TickPlacement::Frame`]: not the first, which only starts the clock, and none while an
 /// agent waits for its level.
-#[derive(Resource, Clone, Copy, Debug, Default)]
+#[derive(Resource, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Resource)]
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub struct FrameGate {

@@ -66,7 +66,9 @@ type MoveComponent = fn(&mut World, &mut World, Entity);
 /// Whoever adds more to such a World does it with [`set_up`](Self::set_up), and names what he stores there with
 /// [`carry_resource`](Self::carry_resource) and [`carry_component`](Self::carry_component). Queries that are kept from
 /// one tick to the next do not fit the new World.
-#[derive(Resource, Clone)]
+#[derive(Resource, Clone, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
 pub struct Renewal {
     build: Builder,
     set_up: Vec<Work>,

@@ -166,7 +166,16 @@ fn an_observation_that_never_changes_is_a_finding() {
 #[test]
 fn the_report_names_the_cause_and_what_to_do() {
     let text = finding(Fault::Survivor).1.to_string();
-    for words in ["again after a restart", "DIFFERS at tick 0", "second episode", "what to do", "1 finding."] {
+    for words in [
+        "again after a restart",
+        "DIFFERS at tick 0",
+        "second episode",
+        "usual cause: state that survives a restart: a resource, a Local, a static",
+        "what to do: set it back when an episode starts",
+        "`Restart::Rebuild`, which builds the World anew",
+        "a field with #[reflect(ignore)]",
+        "1 finding.",
+    ] {
         assert!(text.contains(words), "`{words}` is missing in:\n{text}");
     }
 }

@@ -184,6 +184,32 @@ fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
 }
 
 #[test]
+fn a_game_may_call_its_types_what_the_plugin_calls_its_own() {
+    #[derive(Resource, Reflect)]
+    #[reflect(Resource)]
+    struct Frame {
+        width: f32,
+    }
+    /// Not reflected, so that only its name is known.
+    #[derive(Component)]
+    struct Decision;
+    let named = ForeignGame::new("named", 1, |app: &mut App| {
+        game(app);
+        app.insert_resource(Frame { width: 3.5 });
+        app.add_systems(Startup, |mut commands: Commands| {
+            commands.spawn((Decision, Transform::from_xyz(0.0, 7.0, 0.0)));
+        });
+    });
+    let paths = ["Frame.width", "Decision.Transform.translation.y"];
+    let named = named.keys([vec![], vec![KeyCode::ArrowLeft]]).observe_paths(paths);
+    let (mut world, agents) = build_world(&named, "default", 0, 0, 1);
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::Always(3)));
+    world.tick().expect("the paths are found");
+    assert_eq!(world.get::<Observation>(agents[0]).expect("an agent").vector, [3.5, 7.0]);
+}
+
+#[test]
 fn numbers_are_observed_by_their_paths() {
     let see = |paths: &[&str]| {
         let paths = paths.iter().copied();

@@ -72,8 +72,19 @@ fn all_of_an_adapter_is_in_its_main() {
 }
 
 #[test]
+fn no_adapter_needs_unsafe_code() {
+    for game in GAMES {
+        for path in files(&crate_of(game)).iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs")) {
+            let is_unsafe = read(path).lines().any(|line| line.contains("unsafe {") && !line.trim().starts_with("//"));
+            assert!(!is_unsafe, "{}", path.display());
+        }
+    }
+}
+
+#[test]
 fn nothing_of_the_examples_of_bevy_is_kept_here() {
-    for (game, allowed) in [("alien_cake_addict", vec!["build.rs"]), ("breakout", vec!["build.rs", "silence.rs"])] {
+    for (game, allowed) in [("alien_cake_addict", ["build.rs", "seeded.rs"]), ("breakout", ["build.rs", "silence.rs"])]
+    {
         let folder = crate_of(game);
         for path in files(&folder).iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs")) {
             let name = path.strip_prefix(&folder).expect("it was found there").display().to_string();

@@ -128,7 +128,15 @@ fn a_game_with_hidden_state_says_at_resume_what_it_may_be() {
     let (run, experiment, _) = RunDir::open(&folder).expect("readable");
     let error = run.resume(&forgetful, &experiment, DeviceKind::Flex, 1).err().expect("the apple hangs elsewhere");
     let text = error.to_string();
-    for part in ["did not replay", "resources that a restart does not reset", "`Local`", "playbot doctor"] {
+    for part in [
+        "did not replay",
+        "resources that a restart does not reset",
+        "`Local`",
+        "`static`",
+        "playbot doctor",
+        "`#[reflect(ignore)]`",
+        "`Restart::Rebuild`",
+    ] {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
 }

@@ -24,7 +24,8 @@ const EFFORT_PRICE: f32 = 0.05;
 const MOST_EFFORT: f32 = 9.0;
 
 /// What is asked of the ant.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
 pub enum Task {
     /// One goal, 8 m away in any direction. Reaching it ends the episode with success.
     Goal,
@@ -85,13 +86,17 @@ struct Beginning {
 }
 
 /// An ant and the goal it is to reach.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
 pub struct Walker {
     /// The ant.
+    #[reflect(ignore)]
     pub body: AntBody,
     /// The goal, in metres.
     pub goal: Vec2,
     /// Draws the goals of this level.
+    #[reflect(ignore)]
     draws: ChaCha8Rng,
 }
 

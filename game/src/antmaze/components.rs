@@ -8,16 +8,21 @@ use super::{level::AntMazeLevel, mode::AntMazeMode};
 use crate::ant::{AntBody, AntState, steering::HoldsAnt};
 
 /// Mode in which levels are made.
-#[derive(Resource, Clone, Debug, PartialEq)]
+#[derive(Resource, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, PartialEq)]
 pub struct AntMazeRules(pub AntMazeMode);
 
 /// The level that an agent plays. Comes with its first episode.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct InMaze(pub Arc<AntMazeLevel>);
 
 /// An agent's ant with the floor and the walls around it: a physics world of its own. Comes with the first episode.
-#[derive(Component)]
-pub struct MazeAnt(pub AntBody);
+#[derive(Component, Reflect)]
+#[reflect(from_reflect = false)]
+pub struct MazeAnt(#[reflect(ignore)] pub AntBody);
 
 impl HoldsAnt for MazeAnt {
     fn state(&self) -> AntState {
@@ -26,5 +31,6 @@ impl HoldsAnt for MazeAnt {
 }
 
 /// The arena of an agent: what is drawn around it belongs to this entity.
-#[derive(Component, Clone, Copy, Debug)]
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
 pub struct PlaysIn(pub Entity);

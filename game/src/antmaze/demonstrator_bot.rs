@@ -15,9 +15,11 @@ use super::{
 use crate::ant::pilot::{Pilot, PilotInput};
 
 /// Walks to the goal: [`Waypoints`] followed by the shipped [`Pilot`].
-#[derive(Component, Debug)]
+#[derive(Component, Debug, Reflect)]
+#[reflect(Component)]
 pub struct DemonstratorBot {
     noise: f64,
+    #[reflect(ignore)]
     way: Option<(Arc<AntMazeLevel>, Waypoints)>,
 }
 

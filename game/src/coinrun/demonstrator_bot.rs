@@ -13,10 +13,13 @@ use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator, play:
 ///
 /// It plans in a copy of its level, which it steps along with the game; the state hashes of the two are compared each
 /// tick, so a game that adds to CoinRun's rules is told that this bot does not know them.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub struct DemonstratorBot {
     noise: f64,
+    #[reflect(ignore)]
     planner: Demonstrator,
+    #[reflect(ignore)]
     sim: Option<Sim>,
 }
 

@@ -20,7 +20,8 @@ use super::{
 pub struct CoinRunPhysicsPlugin;
 
 /// The ground of an arena, as a collider.
-#[derive(Component, Debug, Clone, Copy)]
+#[derive(Component, Debug, Clone, Copy, Reflect)]
+#[reflect(Component)]
 pub struct GroundCollider;
 
 impl Plugin for CoinRunPhysicsPlugin {

@@ -14,7 +14,8 @@ use super::{
 };
 
 /// Whether every arena has a physics context, even if the contact is not rapier's.
-#[derive(Resource, Clone, Copy, Debug)]
+#[derive(Resource, Clone, Copy, Debug, Reflect)]
+#[reflect(Resource)]
 pub(super) struct WithPhysics(pub bool);
 
 /// Makes the level that an episode asks for and puts it into the agent's arena.

@@ -7,22 +7,30 @@ use bevy::prelude::*;
 use super::{ball::Ball, level::Maze2dLevel, mode::Maze2dMode};
 
 /// Map and rules of all arenas.
-#[derive(Resource, Clone, Debug, PartialEq)]
+#[derive(Resource, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, PartialEq)]
 pub struct Maze2dRules(pub Maze2dMode);
 
 /// One running copy of a level. With a physics context it also has [`MazePhysics`](super::physics::MazePhysics).
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
 pub struct MazeArena {
     /// The level.
+    #[reflect(ignore)]
     pub level: Arc<Maze2dLevel>,
     /// Its agent.
     pub player: Entity,
 }
 
 /// The ball of an agent. Belongs to the entity with the [`Agent`](bevy_playbot::agent::Agent).
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub struct MazeBall(pub Ball);
 
 /// The arena of an agent.
-#[derive(Component, Clone, Copy, Debug)]
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
 pub struct PlaysIn(pub Entity);

@@ -10,10 +10,12 @@ use super::{
 };
 
 /// Plays by walking from waypoint to waypoint. See [`Demonstrator`].
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub struct DemonstratorBot {
     noise: f64,
     /// Made anew at the first tick of an episode.
+    #[reflect(ignore)]
     walker: Option<Demonstrator>,
 }
 

@@ -4,7 +4,7 @@
 //! thread. Under [`Contact::Rapier`](super::mode::Contact) it decides what the walls do to the ball; under
 //! [`Contact::Soft`](super::mode::Contact) the ball only shows it where it is, for sensors and rays of a game's own.
 
-use bevy::prelude::Component;
+use bevy::prelude::{Component, Reflect};
 use bevy_rapier2d::rapier::prelude::{
     ColliderBuilder, ColliderHandle, IVector, IntegrationParameters, PhysicsWorld, Real, RigidBodyBuilder,
     RigidBodyHandle, Vector,
@@ -19,11 +19,15 @@ use super::{
 const AHEAD: Real = 0.06;
 
 /// The context. Coordinates are those of the observation.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(from_reflect = false)]
 pub struct MazePhysics {
     /// Everything that rapier knows. Add bodies and sensors as you like; stepping is done by the game.
+    #[reflect(ignore)]
     pub world: PhysicsWorld,
+    #[reflect(ignore)]
     ball: RigidBodyHandle,
+    #[reflect(ignore)]
     walls: ColliderHandle,
 }
 

@@ -3,6 +3,7 @@
 mod eval;
 #[path = "../shared/program.rs"]
 mod program;
+mod switches;
 mod trace;
 mod usage;
 mod work;

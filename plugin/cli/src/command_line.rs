@@ -1,6 +1,6 @@
 //! What can be said on the command line, and who does it.
 
-use std::{ffi::OsString, io::IsTerminal, panic::AssertUnwindSafe, process::ExitCode};
+use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use playbot_lab::{game::Game, games::Games};
@@ -8,8 +8,8 @@ use playbot_lab::{game::Game, games::Games};
 use crate::{
     bench, config, demo, doctor,
     error::{CliError, Outcome},
-    eval, eyes, help, interrupt, learn_skills, level, play, policy, program, quickstart, record, runs, study, trace,
-    train, view,
+    eval, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, runs, study,
+    trace, train, view,
 };
 
 /// Playtesting bots that learn from demonstrations.
@@ -116,7 +116,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    init_tracing(cli.verbose);
+    log::init(cli.verbose);
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {
@@ -172,19 +172,4 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::View(args) => view::run(args, games),
         Verb::Bench(args) => bench::run(args, games),
     }
-}
-
-/// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
-/// to warn of.
-const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
-
-fn init_tracing(verbose: u8) {
-    let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
-    // Colours are for people.
-    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    // What cannot be written is not worth a word, which could not be written either.
-    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
-    format.with_ansi(colours).with_writer(std::io::stderr).init();
 }

@@ -20,6 +20,7 @@ mod help;
 mod interrupt;
 mod learn_skills;
 mod level;
+mod log;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;
 mod methods;

@@ -154,7 +154,8 @@ pub struct Trail {
     pub places: Vec<Vec2>,
 }
 
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 struct Results(Vec<(Entity, EpisodeResult)>);
 
 fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {

@@ -3,5 +3,6 @@
 use bevy::prelude::*;
 
 /// On an agent: the entity that a camera in space follows.
-#[derive(Component, Clone, Copy, Debug)]
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
 pub struct CameraFocus(pub Entity);

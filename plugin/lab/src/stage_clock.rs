@@ -7,7 +7,8 @@ use bevy::prelude::*;
 use bevy_playbot::{placement::TickSchedules, systems::PlaybotSystems};
 
 /// Seconds spent in the parts of a tick. Insert it to measure; without it no clock is read.
-#[derive(Resource, Debug, Clone)]
+#[derive(Resource, Debug, Clone, Reflect)]
+#[reflect(Resource)]
 pub struct StageClock {
     last: Instant,
     /// Building levels and the game's own step, seconds.

@@ -14,7 +14,7 @@ use super::CameraError;
 const COLUMNS: u32 = 64;
 
 /// Cells in rows, from the top left.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Reflect)]
 pub(super) struct Layout {
     pub(super) size: UVec2,
     pub(super) cells: Vec<URect>,

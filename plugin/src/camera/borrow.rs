@@ -11,9 +11,11 @@ use super::{
 };
 
 /// The textures that cameras of the game draw on for sensors.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct BorrowedTargets(Vec<BorrowedTarget>);
 
+#[derive(Reflect)]
 pub(super) struct BorrowedTarget {
     pub(super) camera: Entity,
     pub(super) size: UVec2,

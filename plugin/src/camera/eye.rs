@@ -44,14 +44,15 @@ pub(super) fn spawn_camera(world: &mut World) -> Entity {
 }
 
 /// Which picture this is: numbers are never used twice, though a tick may be looked at twice.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Stamp {
     pub(super) look: u64,
     pub(super) tick: u64,
 }
 
 /// What one agent sees, and where it is drawn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Reflect)]
 pub(super) struct Eye {
     /// Pixels of the common texture.
     pub(super) cell: URect,
@@ -75,7 +76,8 @@ impl Eye {
 }
 
 /// All eyes of this tick, and what there is to see.
-#[derive(Resource, Clone, Debug, Default)]
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Eyes {
     pub(super) camera: Option<Entity>,
     pub(super) eyes: Vec<Eye>,

@@ -35,23 +35,31 @@ use super::eye::{Eyes, Stamp};
 pub(super) struct DrawEyes;
 
 /// The eyes in the render World. Their phases and entities are used again and again.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(from_reflect = false)]
 struct RenderEyes {
+    #[reflect(ignore)]
     scene: Eyes,
+    #[reflect(ignore)]
     entities: Vec<Entity>,
     /// Empty phases between two pictures.
+    #[reflect(ignore)]
     phases: Vec<SortedRenderPhase<Transparent2d>>,
     /// The shared camera's own phase, while the eyes' ones stand in for it.
+    #[reflect(ignore)]
     whole: Option<SortedRenderPhase<Transparent2d>>,
+    #[reflect(ignore)]
     bounds: EntityHashMap<Rect>,
 }
 
 /// The stamp of the scene that was extracted last.
-#[derive(Resource, Clone, Copy, Default)]
+#[derive(Resource, Clone, Copy, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct ExtractedStamp(pub(super) Stamp);
 
 /// The stamp of the scene that the eyes were drawn from last.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct DrawnStamp {
     look: AtomicU64,
     tick: AtomicU64,

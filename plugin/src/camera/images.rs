@@ -9,7 +9,8 @@ use super::error::NoImage;
 use crate::vision::{NO_IMAGE, TileLayer, lacks_image};
 
 /// Sprites and tile layers whose image was missing when they were last looked at.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct MissingImages(Vec<Entity>);
 
 /// Looks at what has changed. All is looked at again once an image is removed.

@@ -8,12 +8,13 @@ use bevy::{
 use super::{
     ReadbackDelay, TileLayerPlugin, adapter,
     borrow::BorrowedTargets,
-    eye::{Eyes, Stamp},
+    eye::{Eyes, SensorCamera, Stamp},
     eye_draw, images, look,
     prepare::Atlas,
     readback::Readback,
     renderer::{self, Renderer},
     scene_schedule::add_renderer,
+    sensor::CameraSensor,
 };
 use crate::{
     no_screen::NoScreen,
@@ -33,7 +34,8 @@ pub struct CameraSensorPlugin {
 }
 
 /// The app has a renderer of its own, and windows that it draws.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 struct ShowsWindows;
 
 impl CameraSensorPlugin {
@@ -70,7 +72,10 @@ impl Plugin for CameraSensorPlugin {
         }
         VisionPlugin::add_to(app);
         eye_draw::add_eyes(app);
-        app.init_resource::<ReadbackDelay>()
+        app.register_type::<CameraSensor>()
+            .register_type::<SensorCamera>()
+            .register_type::<ReadbackDelay>()
+            .init_resource::<ReadbackDelay>()
             .init_resource::<Atlas>()
             .init_resource::<BorrowedTargets>()
             .init_resource::<Eyes>()

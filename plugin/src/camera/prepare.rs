@@ -11,7 +11,8 @@ use super::{
 };
 
 /// The common texture and how it is divided.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Atlas {
     /// Sizes of the pictures it was made for.
     sizes: Vec<UVec2>,

@@ -52,9 +52,12 @@ struct Copied {
 }
 
 /// The buffers, of which there is one as long as nothing is delayed.
-#[derive(Default, Resource)]
+#[derive(Default, Resource, Reflect)]
+#[reflect(from_reflect = false)]
 pub(super) struct Readback {
+    #[reflect(ignore)]
     on_the_way: VecDeque<Copied>,
+    #[reflect(ignore)]
     spare: Vec<Buffer>,
 }
 

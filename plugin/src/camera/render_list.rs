@@ -8,8 +8,9 @@ use bevy::{
 };
 
 /// Who would draw, and takes what is on the list.
-#[derive(Resource)]
-struct NoRenderer(SyncCell<SubApp>);
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
+struct NoRenderer(#[reflect(ignore)] SyncCell<SubApp>);
 
 /// Sprites, meshes and cameras are noted for the renderer as they come and go, and Bevy fails where nobody keeps the list.
 /// Keeps it and empties it.

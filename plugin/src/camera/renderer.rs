@@ -11,9 +11,12 @@ use bevy::{
 use super::scene_schedule::SceneSchedule;
 
 /// The renderer and the schedules that feed it.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
 pub(super) struct Renderer {
+    #[reflect(ignore)]
     app: SyncCell<SubApp>,
+    #[reflect(ignore)]
     pub(super) scene: SceneSchedule,
     /// Whether the app has windows to draw, besides what sensors see.
     pub(super) shows_windows: bool,

@@ -66,14 +66,17 @@ impl Plugin for TakeoverPlugin {
 }
 
 /// Who has taken over.
-#[derive(Resource, Debug)]
+#[derive(Resource, Debug, Reflect)]
+#[reflect(from_reflect = false)]
 pub struct Takeover {
     request: TakeoverRequest,
     key: Option<KeyCode>,
     /// Whether it shall be going on.
     is_wanted: bool,
     /// What is wrong with the request, until it was said.
+    #[reflect(ignore)]
     error: Option<RequestError>,
+    #[reflect(ignore)]
     running: Running,
 }
 

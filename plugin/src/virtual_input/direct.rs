@@ -16,7 +16,8 @@ use super::{
 use crate::agent::AgentOrder;
 
 /// Marks and motions of this tick and of this frame.
-#[derive(Resource, Clone, Debug, Default)]
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct DirectInput {
     tick: Marks,
     frame: Marks,
@@ -29,14 +30,14 @@ pub(super) struct DirectInput {
 }
 
 /// What happened in a span of time.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Reflect)]
 struct Marks {
     down: Vec<Line>,
     up: Vec<Line>,
     motion: Motion,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
 struct Motion {
     mouse: Vec2,
     wheel: Vec2,

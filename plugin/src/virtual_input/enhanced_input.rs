@@ -3,9 +3,9 @@
 //! A [`VirtualInput`](super::VirtualInput) drives them through their bindings, and needs none of this. Use it where actions
 //! have no bindings that a bot can press, or where conditions such as `Hold` are not to be played out.
 
-use std::{marker::PhantomData, sync::Arc};
+use std::{any::type_name, marker::PhantomData, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{prelude::*, reflect::utility::GenericTypePathCell};
 use bevy_enhanced_input::prelude::{
     Action as InputActionOf, ActionMock, ActionValue as InputValue, EnhancedInputSystems, InputAction, MockSpan,
     TriggerState,
@@ -39,12 +39,31 @@ use crate::{
 /// let walk = EnhancedAction::<Walk>::per_action([Vec2::ZERO, Vec2::NEG_X, Vec2::X]);
 /// # let _ = walk;
 /// ```
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(from_reflect = false, type_path = false)]
+#[reflect(Component)]
 pub struct EnhancedAction<A: InputAction> {
+    #[reflect(ignore)]
     value: Arc<dyn Fn(&ActionValue) -> InputValue + Send + Sync>,
     target: Option<Entity>,
     is_mocked: bool,
+    #[reflect(ignore)]
     marker: PhantomData<fn() -> A>,
+}
+
+/// The path of the input action's type is not known to reflection: games need not derive it.
+impl<A: InputAction> TypePath for EnhancedAction<A> {
+    fn type_path() -> &'static str {
+        static PATHS: GenericTypePathCell = GenericTypePathCell::new();
+        PATHS.get_or_insert::<Self, _>(|| format!("{}::EnhancedAction<{}>", module_path!(), type_name::<A>()))
+    }
+
+    fn short_type_path() -> &'static str {
+        static PATHS: GenericTypePathCell = GenericTypePathCell::new();
+        PATHS.get_or_insert::<Self, _>(|| {
+            format!("EnhancedAction<{}>", type_name::<A>().rsplit("::").next().unwrap_or("?"))
+        })
+    }
 }
 
 impl<A: InputAction> EnhancedAction<A> {
@@ -106,6 +125,7 @@ impl<A: InputAction> Plugin for EnhancedActionPlugin<A> {
             InputRoute::Messages => app.add_systems(PreUpdate, system),
             InputRoute::Direct => app.add_systems(FixedPreUpdate, system),
         };
+        app.register_type::<EnhancedAction<A>>();
         app.add_observer(|event: On<StartEpisode>, agents: Agents<A>, mocks: Mocks<A>| {
             let_go(event.entity, agents, mocks);
         })

@@ -41,7 +41,9 @@ use crate::{
 /// let actions = LeafwingActions::default().press(Move::Left, [1]).press(Move::Right, [2, 3]).press(Move::Jump, [3]);
 /// # let _ = actions;
 /// ```
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub struct LeafwingActions<A: Actionlike> {
     drives: Vec<(A, Drive)>,
     target: Option<Entity>,
@@ -128,6 +130,7 @@ impl<A: Actionlike> Plugin for LeafwingActionsPlugin<A> {
             }
             InputRoute::Direct => app.add_systems(FixedPreUpdate, drive::<A>.in_set(PlaybotSystems::Act)),
         };
+        app.register_type::<LeafwingActions<A>>();
         app.add_observer(|event: On<StartEpisode>, agents: Agents<A>, states: States<A>| {
             let_go(event.entity, agents, states);
         })

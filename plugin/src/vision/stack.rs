@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 /// The state of the game that a picture shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 pub(super) struct Moment {
     /// Number of the episode of this agent.
     pub episode: u64,
@@ -14,7 +14,8 @@ pub(super) struct Moment {
 }
 
 /// The last pictures of an agent's episode, in a ring. A state that is looked at twice counts once.
-#[derive(Component, Clone, Debug, Default)]
+#[derive(Component, Clone, Debug, Default, Reflect)]
+#[reflect(Component)]
 pub(crate) struct PictureStack {
     ring: Vec<u8>,
     /// Bytes of a picture.

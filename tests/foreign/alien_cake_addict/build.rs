@@ -5,5 +5,5 @@
 mod showcase;
 
 fn main() {
-    showcase::write_game("alien_cake_addict", &[], None);
+    showcase::write_game("alien_cake_addict", &[], Some(include_str!("seeded.rs")));
 }

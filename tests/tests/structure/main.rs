@@ -1,8 +1,9 @@
 //! How the workspace is built, read from its sources as text: no circles, short files, few public items, an example for each
-//! concept.
+//! concept, components and resources that are reflected.
 //!
-//! Nothing here is compiled but the reader itself, so it sees every feature and every platform at once. Code for tests
-//! (`#[cfg(test)]`, `tests/`, `examples/`) may import what it likes; only the length of its files is looked at.
+//! The sources are read and not compiled, so that every feature and every platform is seen at once; only what is registered
+//! is asked of Bevy. Code for tests (`#[cfg(test)]`, `tests/`, `examples/`) may import what it likes; only the length of its
+//! files is looked at.
 
 mod circles;
 mod doctests;
@@ -13,6 +14,7 @@ mod modules;
 mod packages;
 mod planted;
 mod public;
+mod reflected;
 mod resolve;
 mod rules;
 mod tokens;

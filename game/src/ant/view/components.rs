@@ -9,11 +9,14 @@ use crate::ant::{
 
 /// The torso and the limbs of an agent's ant, in the coordinates of its arena, as
 /// [`AntBody::parts`](crate::ant::AntBody::parts) has them.
-#[derive(Component, Clone, Debug, PartialEq)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub struct AntPose(pub [Part; PARTS]);
 
 /// Where an agent's ant should go.
-#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component)]
 pub struct GoalMark {
     /// `[x, y]` in metres.
     pub at: [f32; 2],
@@ -22,11 +25,14 @@ pub struct GoalMark {
 }
 
 /// The arena in which an agent's ant walks: an entity with a [`Ground`].
-#[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
 pub struct OnGround(pub Entity);
 
 /// Floor and walls of an arena, in square cells.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
 pub struct Ground {
     /// Side of a cell, metres.
     pub cell: f32,

@@ -85,7 +85,8 @@ pub enum Pose {
 }
 
 /// Handles of all drawings.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(Resource)]
 pub struct Art {
     /// The sheet of everything that lives in a level.
     pub figures: Handle<Image>,

@@ -13,7 +13,8 @@ pub const STEP: f32 = 1.0 / 1024.0;
 pub const PLAYER_HEIGHT: f32 = 1.7415;
 
 /// What belongs to the picture of an arena, and the tick that it shows.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub struct Scenery {
     pub backdrop: Entity,
     pub ground: Entity,

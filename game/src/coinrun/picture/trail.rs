@@ -27,7 +27,8 @@ const NEXT: f32 = 1.0 / 16384.0;
 const ALIKE: f32 = 1e-3;
 
 /// Where an enemy was, and what is drawn there.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub(super) struct Trail {
     /// Where new puffs were: that of tick t is number t % [`PUFFS`].
     places: [Vec2; PUFFS],

@@ -30,7 +30,8 @@ fn decode(png: &[u8]) -> Image {
 }
 
 /// Handles of all drawings.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Art {
     pub tiles: Handle<Image>,
     pub ball: Handle<Image>,

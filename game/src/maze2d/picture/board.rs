@@ -28,7 +28,8 @@ const BALL_SIZES: ([f32; 2], f32) = ([0.55, 0.9], 0.75);
 const SPACING: f32 = 4.0 * VIEW;
 
 /// The picture of an arena: the tiles, which the figures lie on.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub(super) struct Board {
     tiles: Entity,
     goal: Entity,

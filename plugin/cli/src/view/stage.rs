@@ -42,7 +42,8 @@ pub struct Stage {
     over: bool,
 }
 
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 struct End(Option<EpisodeEnded>);
 
 impl Stage {

@@ -25,7 +25,8 @@ pub(super) fn build(app: &mut App, width: f32) {
 }
 
 /// How much is seen.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Zoom {
     /// World units that bots see from left to right.
     width: f32,
@@ -60,7 +61,8 @@ impl Zoom {
     }
 }
 
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 struct Eye;
 
 fn spawn_camera(zoom: Res<Zoom>, mut commands: Commands) {

@@ -15,7 +15,8 @@ use bevy::{
 use super::own_keys::OwnKeys;
 
 /// Whether the game sees the person's devices.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
 pub(super) enum Devices {
     /// It sees them as they are.
     Open,
@@ -24,8 +25,9 @@ pub(super) enum Devices {
 }
 
 /// The messages that do not count at the moment: between frames the game's, in frames nobody's.
-#[derive(Resource)]
-struct Aside<M: Message>(Messages<M>);
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
+struct Aside<M: Message>(#[reflect(ignore)] Messages<M>);
 
 pub(super) fn build(app: &mut App) {
     app.init_resource::<OwnKeys>();
@@ -38,8 +40,8 @@ pub(super) fn build(app: &mut App) {
     put_aside::<WindowEvent>(app);
 }
 
-fn put_aside<M: Message>(app: &mut App) {
-    app.add_message::<M>().insert_resource(Aside::<M>(Messages::default()));
+fn put_aside<M: Message + TypePath>(app: &mut App) {
+    app.add_message::<M>().insert_resource(Aside::<M>(Messages::default())).register_type::<Aside<M>>();
 }
 
 /// At the start of a frame: reads the person's keys, and hands on what the game may see.

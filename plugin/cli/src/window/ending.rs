@@ -23,10 +23,12 @@ pub(super) fn listen_in(app: &mut App, schedule: impl ScheduleLabel) {
 }
 
 /// Whether the window is to end.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
 pub(super) struct Ending {
     asked: bool,
     ended: bool,
+    #[reflect(ignore)]
     stop: fn() -> bool,
 }
 
@@ -38,7 +40,9 @@ impl Ending {
 }
 
 /// Why the window ended, if not because somebody wished so. Outlives the World.
-#[derive(Resource, Clone, Default)]
+#[derive(Resource, Clone, Default, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
 pub(super) struct Verdict(Arc<Mutex<Option<WindowError>>>);
 
 impl Verdict {

@@ -40,7 +40,8 @@ struct WindowEnd;
 struct StandStill;
 
 /// Frames of the game in a second of its time.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 struct FrameRate(f64);
 
 /// Runs the game of an app, with `hz` frames a second, one in each frame of the window.

@@ -3,7 +3,8 @@
 use bevy::{input::InputSystems, prelude::*};
 
 /// What is held and was pressed on the person's keyboard, as of this frame of the window.
-#[derive(Resource, Clone, Default, Deref, DerefMut)]
+#[derive(Resource, Clone, Default, Deref, DerefMut, Reflect)]
+#[reflect(Resource)]
 pub(super) struct OwnKeys(pub(super) ButtonInput<KeyCode>);
 
 /// The set in which they are read, in `PreUpdate`, where the game sees the same keyboard.

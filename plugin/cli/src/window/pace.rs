@@ -23,7 +23,8 @@ pub(super) fn build(app: &mut App) {
 }
 
 /// Whether game time stands still.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Pace {
     paused: bool,
     /// Time since start at which the rest after an episode is over.
@@ -87,7 +88,8 @@ fn keep_pace(
 }
 
 /// Set while the picture is brought up to date for people only.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 struct OnlySync(bool);
 
 fn only_syncing(only: Res<OnlySync>) -> bool {

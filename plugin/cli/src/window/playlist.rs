@@ -4,7 +4,9 @@ use bevy::prelude::*;
 use playbot_lab::prelude::*;
 
 /// The levels of a session: won ones are followed by the next, lost ones come again, and after the last comes the first.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug)]
 pub struct Playlist {
     levels: LevelSplit,
     current: u64,

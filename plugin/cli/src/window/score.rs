@@ -11,7 +11,8 @@ pub(super) fn build(app: &mut App) {
 }
 
 /// The last finished episode.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct LastEpisode(Option<EpisodeResult>);
 
 impl LastEpisode {

@@ -13,7 +13,8 @@ pub struct Partner {
 }
 
 /// The agent of the window and those who play it.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Seats {
     /// The agent.
     pub agent: Entity,

@@ -26,11 +26,13 @@ pub(super) fn build(app: &mut App, game: &dyn Game) {
 }
 
 /// Whether the view is the one in space.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 struct Solid(bool);
 
 /// The eye in space, and the place it looks at.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 struct SolidEye(Option<Vec3>);
 
 fn spawn_camera(mut commands: Commands) {

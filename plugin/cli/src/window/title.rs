@@ -17,11 +17,13 @@ pub(super) fn build(app: &mut App, game: &'static str, schedule: impl ScheduleLa
         .add_systems(schedule, (age_notice, write_title).chain());
 }
 
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 struct GameName(&'static str);
 
 /// Something the person should know now.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 pub(super) struct Notice {
     words: Option<&'static str>,
     age: Duration,

@@ -34,7 +34,7 @@ impl CauseKind {
             Self::ThreadState => "a static, a thread_local! or a task on another thread",
             Self::SharedByArenas => "a resource, static or query that all arenas of a World share",
             Self::SurvivesRestart => {
-                "state that survives a restart: a resource, a Local or an entity that is not reset"
+                "state that survives a restart: a resource, a Local, a static or an entity that is not reset"
             }
             Self::Loading => "assets that are still loading when the game begins",
         }
@@ -65,7 +65,9 @@ impl CauseKind {
             Self::SurvivesRestart => {
                 "set it back when an episode starts: insert the resource anew, despawn what the level spawned, keep no \
                  state of the simulation in a Local; what is meant to last, such as a high score, can be left out with \
-                 --ignore"
+                 --ignore. For what a foreign game cannot set back there is `Restart::Rebuild`, which builds the World anew \
+                 for each episode. State that this comparison does not see, but agents may: a Local, a static, an asset, a \
+                 type that does not derive Reflect, and a field with #[reflect(ignore)]"
             }
             Self::Loading => {
                 "wait for the files before an episode starts, with a `ready` that says when they are there"
@@ -126,6 +128,14 @@ mod tests {
         assert_eq!(kinds(Comparison::Arenas, &[]), [CauseKind::SharedByArenas]);
         assert_eq!(kinds(Comparison::Restart, &[]), [CauseKind::SurvivesRestart]);
         assert_eq!(kinds(Comparison::Repeat, &[])[0], CauseKind::Randomness);
+    }
+
+    #[test]
+    fn what_survives_a_restart_has_a_remedy_and_what_hides_it_is_named() {
+        let advice = CauseKind::SurvivesRestart.advice();
+        for words in ["insert the resource anew", "--ignore", "`Restart::Rebuild`", "a Local", "a static", "Reflect"] {
+            assert!(advice.contains(words), "`{words}` is missing in: {advice}");
+        }
     }
 
     #[test]

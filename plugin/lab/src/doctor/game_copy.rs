@@ -26,7 +26,8 @@ use super::census::{Census, types_of};
 use crate::{game::Game, worlds::build_world};
 
 /// Ends of episodes in this tick.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 struct Ends(Vec<(Entity, EpisodeEnd)>);
 
 /// What an agent saw, got and came to in a tick.

@@ -8,7 +8,8 @@ use bevy::{
 use bevy_playbot::renewal::Renewal;
 
 /// `Time<Real>` as it was before this frame.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 struct Before(Time<Real>);
 
 /// Lets `Time<Real>` of a World run slower than its ticks say, by a little more in some frames than in others.

@@ -10,10 +10,6 @@ use bevy::{
     prelude::{ReflectComponent, World},
     reflect::{TypeInfo, TypeRegistration},
 };
-use bevy_playbot::{
-    agent::AgentLimit,
-    panics::{EpisodeTrace, PanicReports},
-};
 use serde::Serialize;
 
 use super::{cause::CauseKind, game_copy::GameCopy, scope};
@@ -68,9 +64,7 @@ impl TypeBook {
     /// Starts with a World without a game, in which only the engine's and the plugin's types are.
     pub fn new(bare: &World) -> Self {
         let engine = bare.components().iter_registered().filter_map(ComponentInfo::type_id);
-        // What the lab adds to every World.
-        let ours = [TypeId::of::<AgentLimit>(), TypeId::of::<EpisodeTrace>(), TypeId::of::<PanicReports>()];
-        Self { known: BTreeMap::new(), bare: engine.chain(ours).collect() }
+        Self { known: BTreeMap::new(), bare: engine.collect() }
     }
 
     /// Looks at types that are new in a World.

@@ -13,7 +13,8 @@ use bevy_playbot::{
 };
 
 /// The agent is played by the game's demonstrator while its control is [`Control::Bot`].
-#[derive(Component, Clone, Copy, Debug)]
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
 pub(super) struct ForeignBot {
     /// Probability of a random action, or standard deviation of the noise.
     pub(super) noise: f64,

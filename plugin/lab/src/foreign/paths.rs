@@ -1,11 +1,9 @@
 //! Observations by their paths.
 
-use std::any::TypeId;
-
 use bevy::{
     ecs::component::ComponentId,
     prelude::*,
-    reflect::{PartialReflect, ReflectRef},
+    reflect::{PartialReflect, ReflectRef, TypeRegistration, TypeRegistry},
 };
 use thiserror::Error;
 
@@ -113,20 +111,37 @@ impl Found {
 fn reflected(world: &mut World, name: &str) -> Option<(ComponentId, ReflectComponent)> {
     let registry = world.get_resource::<AppTypeRegistry>()?.clone();
     let registry = registry.read();
-    let reflect = registry.get_with_short_type_path(name)?.data::<ReflectComponent>()?.clone();
+    let reflect = registered(&registry, name)?.data::<ReflectComponent>()?.clone();
     Some((reflect.register_component(world), reflect))
 }
 
 /// A component by its short name: from the type registry, or by the name that Bevy keeps with its feature `debug`.
 fn component_of(world: &World, name: &str) -> Option<ComponentId> {
-    let registered = || -> Option<TypeId> {
+    let components = world.components();
+    let by_type = |may_be_ours: bool| {
         let registry = world.get_resource::<AppTypeRegistry>()?.read();
-        Some(registry.get_with_short_type_path(name)?.type_id())
+        let known =
+            registered(&registry, name).filter(|known| may_be_ours || !is_ours(known.type_info().type_path()))?;
+        components.get_id(known.type_id())
     };
-    let by_type = registered().and_then(|id| world.components().get_id(id));
-    let is_named = |full: &str| full.rsplit("::").next() == Some(name);
-    let by_name = || world.components().iter_registered().find(|info| is_named(&info.name())).map(|info| info.id());
-    by_type.or_else(by_name)
+    let is_named = |full: &str| full.rsplit("::").next() == Some(name) && !is_ours(full);
+    let by_name = || components.iter_registered().find(|info| is_named(&info.name())).map(|info| info.id());
+    by_type(false).or_else(by_name).or_else(|| by_type(true))
+}
+
+/// A type by its short name. Of several the game's is meant, which need not know what the plugin calls its own.
+fn registered<'a>(registry: &'a TypeRegistry, name: &str) -> Option<&'a TypeRegistration> {
+    registry.get_with_short_type_path(name).or_else(|| {
+        let named = registry.iter().filter(|known| known.type_info().type_path_table().short_path() == name);
+        let mut of_game = named.filter(|known| !is_ours(known.type_info().type_path()));
+        let first = of_game.next()?;
+        of_game.next().is_none().then_some(first)
+    })
+}
+
+/// Whether a type belongs to the plugin.
+fn is_ours(path: &str) -> bool {
+    ["bevy_playbot::", "playbot_cli::", "playbot_lab::"].iter().any(|of| path.starts_with(of))
 }
 
 /// A number of any kind, or a truth value as 0 or 1.

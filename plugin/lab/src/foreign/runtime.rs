@@ -40,7 +40,9 @@ pub(super) struct RewardPart {
 }
 
 /// The one [`Foreign`] of a World. Shared, so that it can be worked with while its systems have the whole World.
-#[derive(Resource, Clone)]
+#[derive(Resource, Clone, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
 pub(super) struct ForeignCell(Arc<Mutex<Foreign>>);
 
 impl ForeignCell {

@@ -61,8 +61,10 @@ pub enum RestoreError {
     #[error(
         "arena {0} did not replay to its saved state: the checkpoint was made with other rules of the game, or the game \
          keeps something that a new World does not have: resources that a restart does not reset, the time that has passed \
-         (`Time`), a `Local` of a system, a random generator that is not seeded from the level, or the order in which \
-         entities are stored; `playbot doctor` finds what it is"
+         (`Time`), a `Local` of a system, a `static`, a random generator that is not seeded from the level, or the order in \
+         which entities are stored; `playbot doctor` names it, unless it hides in a `Local`, a `static`, an asset, a type \
+         that does not derive `Reflect` or a field with `#[reflect(ignore)]`: of those it sees only what agents notice. \
+         For what a foreign game cannot set back there is `Restart::Rebuild`, which builds the World anew for each episode"
     )]
     Diverged(usize),
     /// The checkpoint has another number of arenas.

@@ -34,14 +34,18 @@ pub struct Collector {
 }
 
 /// Rows of the rollout that is being filled.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
 struct Collecting {
+    #[reflect(ignore)]
     rollout: Rollout,
+    #[reflect(ignore)]
     kind: ObsKind,
 }
 
 /// Episodes that ended during the rollout, in the order of ticks and agents.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
 struct Finished(Vec<EpisodeEnded>);
 
 fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {

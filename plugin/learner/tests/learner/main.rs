@@ -18,4 +18,5 @@ mod sac;
 mod score;
 mod score_sac;
 mod skill;
+mod switches;
 mod toy;

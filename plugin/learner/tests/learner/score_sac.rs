@@ -6,8 +6,8 @@ use crate::toy::{Driver, OBS};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
     Action, ActionSpace, Actions, ConfidenceKind, Dataset, DemoEpisode, DeviceKind, EndStates, EntropyCoef,
-    KlDirection, LearnError, Learner, ObsKind, Observations, PriorKind, Rollout, SacConfig, SacLearner, ScoreConfig,
-    SkillModel, SkillTrainer,
+    KlDirection, LearnError, Learner, ObsKind, Observations, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
+    SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -60,28 +60,6 @@ fn the_penalty_keeps_a_discrete_actor_near() {
         let held = divergence(&model, ScoreConfig { kl_coef: 10.0, kl_direction, ..ScoreConfig::default() });
         assert!(held < 0.3 * free, "with one it stays: {held} of {free}, {kl_direction:?}");
     }
-}
-
-#[test]
-fn every_switch_works() {
-    let model = model(1);
-    let base = ScoreConfig::default;
-    for score in [
-        ScoreConfig { condition: false, init_from_decoder: false, ..base() },
-        ScoreConfig { kl: false, ..base() },
-        ScoreConfig { prior: PriorKind::StandardNormal, ..base() },
-        ScoreConfig { confidence: ConfidenceKind::PolicyAction, ..base() },
-        ScoreConfig { confidence: ConfidenceKind::Off, ..base() },
-    ] {
-        let mut learner = learner(SacConfig { learning_starts: 1, ..config() }, score.clone(), &model);
-        let rollout = Driver::new(4, 1).rollout(&learner, 4);
-        assert_eq!((rollout.latent, learner.spec().latent), (2, if score.condition { 2 } else { 0 }));
-        let metrics = learner.update(&rollout).expect("finite");
-        assert_eq!(metrics.decoder_kl.is_some(), score.kl);
-    }
-    let bad = SacConfig { norm_obs: true, ..config() };
-    let error = SacLearner::with_skill(bad, base(), &model, 1, DeviceKind::Flex).expect_err("raw observations");
-    assert!(error.to_string().contains("norm_obs"), "{error}");
 }
 
 /// Players that move by (0.5 x, -x).

@@ -2,14 +2,15 @@
 
 /// Turns `main` into `pub fn game(app: &mut App)`: without `DefaultPlugins`, which belong to whoever makes the app, and
 /// without `run`. Comments on the whole file become ordinary ones, since `include!` takes no inner ones. The text of
-/// `stand_ins` is put below, and its plugin function of that name is added first.
+/// `stand_ins` is put below, and its plugin function of that name is added first, if it has one.
 ///
 /// # Errors
 ///
 /// The example does not look as expected: something to be changed is missing, or is there twice.
 pub fn rewrite(example: &str, stand_ins: Option<&str>) -> Result<String, String> {
     let mut text: String = example.lines().map(|line| line.replacen("//!", "//", 1) + "\n").collect();
-    let plugin = if stand_ins.is_some() { "        .add_plugins(stand_ins)\n" } else { "" };
+    let has_plugin = stand_ins.is_some_and(|text| text.contains("fn stand_ins("));
+    let plugin = if has_plugin { "        .add_plugins(stand_ins)\n" } else { "" };
     for (from, to) in [
         ("fn main() {\n    App::new()\n", "pub fn game(app: &mut App) {\n    app\n"),
         ("        .add_plugins(DefaultPlugins)\n", plugin),
@@ -61,6 +62,13 @@ pub fn game(app: &mut App) {
         let game = rewrite(EXAMPLE, Some("fn stand_ins(_: &mut App) {}\n")).expect("it is as examples are");
         assert!(game.contains("    app\n        .add_plugins(stand_ins)\n        .add_systems"), "{game}");
         assert!(game.ends_with("}\n\nfn stand_ins(_: &mut App) {}\n"), "{game}");
+    }
+
+    #[test]
+    fn stand_ins_without_a_plugin_only_stand_below() {
+        let game = rewrite(EXAMPLE, Some("mod rand {}\n")).expect("it is as examples are");
+        assert!(!game.contains("stand_ins"), "{game}");
+        assert!(game.ends_with("}\n\nmod rand {}\n"), "{game}");
     }
 
     #[test]

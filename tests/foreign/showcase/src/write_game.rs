@@ -9,8 +9,8 @@ use super::{find, rewrite};
 
 /// Writes `OUT_DIR/game.rs` from `examples/showcase/NAME.rs`, and the modules `parts` of the example beside it.
 ///
-/// Where Bevy is built without something that the example uses, `stand_ins` is put below it: items in its place, and a
-/// plugin function `stand_ins` that registers them.
+/// In place of something that the example uses and cannot have, such as a part of Bevy that is not built, `stand_ins` is
+/// put below it: items of the same names and, if they have to be registered, a plugin function `stand_ins`.
 ///
 /// Call it as the last expression of a build script's `main`: what goes wrong becomes the build's error.
 pub fn write_game(name: &str, parts: &[&str], stand_ins: Option<&str>) {

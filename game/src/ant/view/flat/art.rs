@@ -14,7 +14,8 @@ pub const WALL: u16 = 1;
 type Texel = [u8; 4];
 
 /// Handles of all drawings.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(Resource)]
 pub struct Art {
     /// A white disc.
     pub disc: Handle<Image>,

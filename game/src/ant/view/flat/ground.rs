@@ -17,7 +17,8 @@ use crate::{
 const SPACING: f32 = 512.0;
 
 /// The tiles of an arena.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub struct Tiling(Entity);
 
 /// Makes new arenas into stages.

@@ -24,7 +24,8 @@ const LIMBS_OF_A_LEG: usize = 3;
 const NEARER: f32 = 0.1;
 
 /// The sprites of an ant: limbs in the order of its parts, without the torso, which is the agent itself; then the goal.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub struct Sprites {
     limbs: Vec<Entity>,
     goal: Entity,

@@ -14,12 +14,16 @@ use crate::ant::{
 const BEAM: f32 = 3.0;
 
 /// The meshes of an agent's ant.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
 pub struct SolidAnt {
     limbs: [Entity; PARTS],
     goal: Entity,
     /// Pose before and after the last tick.
+    #[reflect(ignore)]
     from: [Part; PARTS],
+    #[reflect(ignore)]
     to: [Part; PARTS],
 }
 

@@ -16,14 +16,16 @@ const MARGIN: f32 = 20.0;
 const WALLS: Color = Color::srgb(0.42, 0.45, 0.55);
 
 /// Materials that many things share.
-#[derive(Resource)]
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
 pub struct Paints {
     wall: Handle<StandardMaterial>,
     floor: Handle<Image>,
 }
 
 /// What was built on a ground.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component)]
 pub struct Built(Vec<Entity>);
 
 /// One light, whose shadows are sharp around the camera.

@@ -1,0 +1,240 @@
+//! Each switch changes what it says: the file, the number, or who plays.
+
+use std::{fs, path::Path, time::Instant};
+
+use serde_json::{Value, json};
+
+use crate::program::{code, errors, lines, playbot, said};
+
+/// Standard output, line by line as JSON, of a call that passes.
+fn rows(folder: &Path, args: &[&str]) -> Vec<Value> {
+    let output = playbot(folder, args);
+    assert_eq!(code(&output), 0, "{args:?}: {}", errors(&output));
+    lines(&output)
+}
+
+/// A call that passes.
+fn done(folder: &Path, args: &[&str]) -> (String, String) {
+    let output = playbot(folder, args);
+    assert_eq!(code(&output), 0, "{args:?}: {}", errors(&output));
+    (said(&output), errors(&output))
+}
+
+fn bytes(folder: &Path, file: &str) -> Vec<u8> {
+    fs::read(folder.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
+/// PPO on two levels, updates of 128 steps, and skills that are learned in no time.
+fn write_experiment(folder: &Path) {
+    let text = r#"(
+        game: "coinrun", train: "easy:0..3", test: "easy:64..65", demos: "few.demo", steps: 256, arenas: 8, worlds: 2,
+        skills: (window: 5, epochs: 1, batch: 16, hidden: [8], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+        ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8], lr: 0.05), eval: (episodes_per_level: 1),
+    )"#;
+    fs::write(folder.join("small.ron"), text).expect("writable");
+}
+
+#[test]
+fn a_recording_holds_what_the_switches_of_record_say() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let record = |file: &str, more: &[&str]| {
+        done(folder, &[&["record", "coinrun", "--out", file], more].concat());
+        rows(folder, &["demo", "ls", file, "--json"]).remove(0)
+    };
+    let levels = |file: &str| -> Vec<u64> {
+        let shown = rows(folder, &["demo", "show", file, "--json"]);
+        shown.iter().map(|episode| episode["level"].as_u64().expect("a number")).collect()
+    };
+    let actions = |file: &str| -> Vec<Value> {
+        let shown = rows(folder, &["demo", "show", file, "--episode", "0", "--json"]);
+        shown.iter().map(|tick| tick["action"].clone()).collect()
+    };
+    let three = ["--levels", "easy:4..6"];
+    let plain = record("plain.demo", &three);
+    assert_eq!((levels("plain.demo"), &plain["header"]["action_noise"]), (vec![4, 5, 6], &json!(0.0)));
+    record("held.demo", &["--levels", "easy:4..6", "--hold-out", "easy:5..5"]);
+    assert_eq!(levels("held.demo"), [4, 6]);
+    assert_eq!(record("short.demo", &["--levels", "easy:4..6", "--steps", "30"])["steps"], 30);
+
+    let noisy = |file: &str, seed: &str| record(file, &[&three[..], &["--noise", "0.5", "--seed", seed]].concat());
+    assert_eq!(noisy("one.demo", "1")["header"]["action_noise"], 0.5);
+    noisy("again.demo", "1");
+    noisy("two.demo", "2");
+    assert_ne!(actions("one.demo"), actions("plain.demo"), "--noise");
+    assert_ne!(actions("one.demo"), actions("two.demo"), "--seed");
+    assert!(bytes(folder, "one.demo") == bytes(folder, "again.demo"), "the same seed, the same bytes");
+
+    let seen = record("seen.demo", &[&three[..], &["--observations"]].concat());
+    assert_eq!(plain["header"]["observation_names"], json!([]));
+    let names = seen["header"]["observation_names"].as_array().map_or(0, Vec::len) as u64;
+    let (more, steps) = (seen["bytes"].as_u64(), seen["steps"].as_u64().expect("a number"));
+    assert!(names > 0 && more > plain["bytes"].as_u64().map(|bytes| bytes + steps * names), "{seen}");
+
+    record("plain.demo", &["--levels", "easy:9..9", "--append"]);
+    assert_eq!(levels("plain.demo"), [4, 5, 6, 9]);
+    record("plain.demo", &["--levels", "easy:9..9", "--force"]);
+    assert_eq!(levels("plain.demo"), [9]);
+}
+
+#[test]
+fn a_run_is_what_the_switches_of_train_say() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    write_experiment(folder);
+    let train = |run: &str, more: &[&str]| {
+        let args = ["train", "--experiment", "small.ron", "--algorithm", "ppo", "--run", run];
+        done(folder, &[&args[..], more].concat());
+        let info: Value = serde_json::from_slice(&bytes(folder, &format!("{run}/run.json"))).expect("JSON");
+        let metrics = String::from_utf8(bytes(folder, &format!("{run}/metrics.jsonl"))).expect("Unicode");
+        (info, metrics)
+    };
+    let checkpoints = |run: &str| -> Vec<String> {
+        let entries = fs::read_dir(folder.join(run).join("checkpoints")).expect("there");
+        let mut names: Vec<_> = entries.map(|entry| entry.expect("listed").file_name()).collect();
+        names.sort();
+        names.into_iter().map(|name| name.to_string_lossy().trim_start_matches("step-0000000").to_owned()).collect()
+    };
+    let (info, metrics) = train("a", &["--threads", "1", "--set", "checkpoints.keep=9"]);
+    assert_eq!((&info["algorithm"], &info["device"], metrics.lines().count()), (&json!("ppo"), &json!("flex"), 2));
+    let saved = checkpoints("a");
+    assert_eq!(saved, ["00000", "00256"], "before the first update and at the end");
+
+    let (_, on_two) = train("b", &["--threads", "2"]);
+    assert_eq!(on_two, metrics, "--threads changes nothing but the time");
+    let (other, seeded) = train("c", &["--seed", "7"]);
+    assert_eq!(other["seed"], 7);
+    assert_ne!(seeded, metrics, "--seed");
+    let (_, long) = train("d", &["--steps", "384", "--checkpoint-every", "1", "--set", "checkpoints.keep=9"]);
+    assert_eq!(long.lines().count(), 3, "--steps");
+    assert_eq!(checkpoints("d"), ["00000", "00128", "00256", "00384"], "--checkpoint-every");
+    let (elsewhere, computed) = train("e", &["--device", "ndarray"]);
+    assert_eq!(elsewhere["device"], "ndarray");
+    assert_eq!(computed.lines().count(), 2);
+}
+
+#[test]
+fn a_measurement_is_of_what_the_switches_of_eval_say() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    write_experiment(folder);
+    let train = ["train", "--experiment", "small.ron", "--algorithm", "ppo", "--run", "run", "--checkpoint-every", "1"];
+    done(folder, &[&train[..], &["--set", "checkpoints.keep=9"]].concat());
+    let eval = |more: &[&str]| {
+        let args = ["eval", "--levels", "easy:64..67", "--json"];
+        let rows = rows(folder, &[&args[..], more].concat());
+        assert_eq!(rows.len(), 1, "{rows:?}");
+        rows.into_iter().next().expect("one")
+    };
+    let last = eval(&["--run", "run"]);
+    assert_eq!((&last["method"], &last["split"], &last["episodes"]), (&json!("ppo"), &json!("easy:64..67"), &json!(4)));
+    assert_eq!(eval(&["--run", "run", "--checkpoint", "last"]), last);
+    assert_eq!(eval(&["--run", "run", "--checkpoint", "256"]), last);
+    assert_ne!(eval(&["--run", "run", "--checkpoint", "0"]), last, "--checkpoint: the policy before it learned");
+    assert_ne!(eval(&["--run", "run", "--greedy"]), last, "--greedy");
+    assert_ne!(eval(&["--run", "run", "--seed", "9"]), last, "--seed");
+    for threads in ["1", "2"] {
+        assert_eq!(eval(&["--run", "run", "--threads", threads]), last, "--threads changes nothing but the time");
+    }
+    assert_eq!(eval(&["--run", "run", "--episodes-per-level", "3"])["episodes"], 12);
+    assert_eq!(eval(&["--bot", "random"])["method"], "random");
+    let near = eval(&["--run", "run", "--device", "ndarray", "--greedy"]);
+    assert_eq!(near["episodes"], 4, "{near}");
+
+    let missing = playbot(folder, &["eval", "--run", "run", "--checkpoint", "100"]);
+    assert_eq!(code(&missing), 3);
+    assert!(errors(&missing).contains("0, 128, 256"), "{}", errors(&missing));
+    let unknown = playbot(folder, &["eval", "--run", "run", "--device", "cuda"]);
+    assert_eq!(code(&unknown), 3);
+    assert!(errors(&unknown).contains("flex") && errors(&unknown).contains("ndarray"), "{}", errors(&unknown));
+}
+
+#[test]
+fn skills_and_quickstarts_are_as_long_as_their_switches_say() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    write_experiment(folder);
+    done(folder, &["record", "coinrun", "--levels", "easy:0..3", "--out", "few.demo"]);
+    done(folder, &["record", "coinrun", "--levels", "easy:4..4", "--out", "one.demo"]);
+    let learn = |out: &str, more: &[&str]| {
+        done(folder, &[&["learn-skills", "--experiment", "small.ron", "--out", out, "--json"], more].concat())
+    };
+    let (one, told) = learn("a", &[]);
+    assert!(one.lines().count() == 1 && told.contains("4 episodes from few.demo"), "{one}{told}");
+    let (three, _) = learn("b", &["--epochs", "3"]);
+    let epochs: Vec<Value> = three.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    assert_eq!(epochs.iter().map(|epoch| epoch["epoch"].as_u64()).collect::<Vec<_>>(), [Some(1), Some(2), Some(3)]);
+    assert_eq!(three.lines().next(), one.lines().next(), "the first epoch is the same");
+    assert!(learn("c", &["--demos", "one.demo"]).1.contains("1 episode from one.demo"));
+    assert!(learn("d", &["--max-steps", "1"]).1.contains("1 episode from few.demo"));
+    learn("e", &["--threads", "1"]);
+    assert!(bytes(folder, "a") == bytes(folder, "e"), "--threads changes nothing but the time");
+
+    let quick = ["quickstart", "--experiment", "small.ron", "--run", "quick", "--json"];
+    let measured = rows(folder, &[&quick[..], &["--seed", "5", "--steps", "128", "--epochs", "2"]].concat());
+    assert!(measured.iter().all(|row| row["split"] == "easy:64..65"), "{measured:?}");
+    assert_eq!(String::from_utf8_lossy(&bytes(folder, "quick/skills.jsonl")).lines().count(), 2, "--epochs");
+    for run in ["quick/ppo", "quick/score-ppo"] {
+        let metrics = bytes(folder, &format!("{run}/metrics.jsonl"));
+        assert_eq!(String::from_utf8_lossy(&metrics).lines().count(), 1, "--steps");
+        let info: Value = serde_json::from_slice(&bytes(folder, &format!("{run}/run.json"))).expect("JSON");
+        assert_eq!(info["seed"], 5, "--seed");
+    }
+}
+
+#[test]
+fn speed_is_measured_of_the_case_and_for_the_time_that_bench_is_told() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let bench = |more: &[&str]| {
+        let args = ["bench", "--case", "sim/maze2d", "--arenas", "4", "--threads", "2", "--json"];
+        let begun = Instant::now();
+        (rows(temporary.path(), &[&args[..], more].concat()), begun.elapsed().as_secs_f64())
+    };
+    let (cases, _) = bench(&["--seconds", "0.01"]);
+    let names: Vec<_> = cases.iter().filter_map(|case| case["case"].as_str()).collect();
+    assert!(!names.is_empty() && names.iter().all(|name| name.contains("sim/maze2d")), "--case: {names:?}");
+    for case in &cases {
+        assert_eq!((&case["arenas"], &case["threads"]), (&json!(4), &json!(2)), "{case}");
+        assert!(case["steps_per_s"].as_f64().is_some_and(|speed| speed > 0.0), "{case}");
+    }
+    let (_, took) = bench(&["--seconds", "0.5"]);
+    assert!(took >= 0.5 * cases.len() as f64, "--seconds: {took} for {names:?}");
+}
+
+#[test]
+fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let level = |more: &[&str]| done(folder, &[&["level", "coinrun"], more].concat()).0;
+    let plain = level(&["--seed", "3"]);
+    assert_ne!(level(&["--seed", "4"]), plain);
+    assert_ne!(level(&["--seed", "3", "--mode", "easy"]), plain);
+    assert_eq!(level(&["--seed", "3", "--mode", "hard"]), plain, "that is the default");
+    let described: Value = serde_json::from_str(&level(&["--seed", "3", "--json"])).expect("one line of JSON");
+    assert!(described.is_object(), "{described}");
+
+    let trace = |more: &[&str]| done(folder, &[&["trace", "coinrun", "--actions", "7,7,7,8,7,7"], more].concat()).0;
+    let here = trace(&["--mode", "hard", "--seed", "2", "--json"]);
+    assert!(here.lines().all(|step| serde_json::from_str::<Value>(step).is_ok_and(|step| step.is_array())), "{here}");
+    assert_eq!(trace(&["--seed", "2", "--json"]), here, "hard is the default");
+    assert_ne!(trace(&["--mode", "easy", "--seed", "2", "--json"]), here);
+    let table = trace(&["--seed", "2"]);
+    assert!(table.lines().count() > here.lines().count(), "a head, and a line for each step: {table}");
+    assert!(table.lines().all(|line| serde_json::from_str::<Value>(line).is_err()), "{table}");
+}
+
+#[test]
+fn what_happens_inside_is_told_to_those_who_ask() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let told = |more: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_playbot"));
+        command.args(["doctor", "maze2d", "--ticks", "2", "--seed", "6", "--json"]).args(more);
+        let output = command.current_dir(temporary.path()).env_remove("RUST_LOG").output().expect("the program starts");
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        let report = lines(&output).remove(0);
+        assert_eq!((&report["ticks"], &report["seed"], &report["mode"]), (&json!(2), &json!(6), &json!("umaze")));
+        errors(&output)
+    };
+    assert!(!told(&[]).contains("DEBUG"));
+    assert!(told(&["-vv"]).contains("DEBUG"));
+}

@@ -1,0 +1,125 @@
+//! What is logged, to standard error.
+
+use std::{
+    collections::BTreeSet,
+    fmt,
+    io::IsTerminal,
+    sync::{Mutex, PoisonError},
+};
+
+use tracing::{
+    Event, Level, Subscriber,
+    field::{Field, Visit},
+};
+use tracing_subscriber::{
+    EnvFilter, Layer,
+    fmt::MakeWriter,
+    layer::{Context, SubscriberExt},
+    util::SubscriberInitExt,
+};
+
+/// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
+/// to warn of.
+const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
+
+/// Logs what `RUST_LOG` asks for, or else warnings, and more with each `-v`.
+pub fn init(verbose: u8) {
+    let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    // Colours are for people.
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    subscriber(filter, colours, std::io::stderr).init();
+}
+
+fn subscriber<W>(filter: EnvFilter, colours: bool, writer: W) -> impl Subscriber + Send + Sync
+where
+    W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
+{
+    // What cannot be written is not worth a word, which could not be written either.
+    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
+    format.with_ansi(colours).with_writer(writer).finish().with(FilesOnce::default())
+}
+
+/// Lets each error about an asset through once. Every World loads the files of its game, and each would say the same of
+/// one that is not there.
+#[derive(Default)]
+struct FilesOnce {
+    said: Mutex<BTreeSet<String>>,
+}
+
+impl<S: Subscriber> Layer<S> for FilesOnce {
+    fn event_enabled(&self, event: &Event<'_>, _: Context<'_, S>) -> bool {
+        let metadata = event.metadata();
+        if *metadata.level() != Level::ERROR || !metadata.target().starts_with("bevy_asset") {
+            return true;
+        }
+        let mut message = Message::default();
+        event.record(&mut message);
+        self.said.lock().unwrap_or_else(PoisonError::into_inner).insert(message.0)
+    }
+}
+
+/// The words of an event.
+#[derive(Default)]
+struct Message(String);
+
+impl Visit for Message {
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        if field.name() == "message" {
+            self.0 = format!("{value:?}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{io, sync::Arc};
+
+    use super::*;
+
+    #[derive(Clone, Default)]
+    struct Page(Arc<Mutex<Vec<u8>>>);
+
+    impl io::Write for Page {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().expect("nobody panics").extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn logged(say: impl FnOnce()) -> String {
+        let page = Page::default();
+        let writer = page.clone();
+        tracing::subscriber::with_default(subscriber(EnvFilter::new(QUIET), false, move || writer.clone()), say);
+        String::from_utf8(page.0.lock().expect("nobody panics").clone()).expect("Unicode")
+    }
+
+    #[test]
+    fn a_missing_file_is_named_once_however_many_worlds_miss_it() {
+        let text = logged(|| {
+            for _world in 0..16 {
+                for file in ["cake.glb", "alien.glb"] {
+                    tracing::error!(target: "bevy_asset::server", "Path not found: {file}");
+                }
+            }
+        });
+        assert_eq!(text.lines().count(), 2, "{text}");
+        assert!(text.contains("cake.glb") && text.contains("alien.glb"), "{text}");
+    }
+
+    #[test]
+    fn everything_else_is_said_as_often_as_it_happens() {
+        let text = logged(|| {
+            for _ in 0..2 {
+                tracing::error!("the game has a fault");
+                tracing::warn!(target: "bevy_asset::server", "a loader is there twice");
+            }
+        });
+        assert_eq!(text.matches("the game has a fault").count(), 2, "{text}");
+        assert_eq!(text.matches("a loader is there twice").count(), 2, "{text}");
+    }
+}

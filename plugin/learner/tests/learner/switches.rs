@@ -1,0 +1,216 @@
+//! Each switch of SCORE changes what it says, under PPO and under SAC.
+
+use crate::corridor;
+use crate::score::model;
+use crate::toy::{Driver, OBS};
+use playbot_learner::{
+    Action, ConfidenceKind, DeviceKind, KlDirection, LearnError, Learner, PenaltyForm, Policy, PpoConfig, PpoLearner,
+    PriorKind, Rollout, SacConfig, SacLearner, SacMetrics, ScoreConfig, SkillDraw, SkillModel, UpdateMetrics,
+};
+
+const CHOICES: u32 = 3;
+
+/// One gradient step over all rows in each update, and a long one: the policy leaves the decoder at once.
+fn ppo(score: ScoreConfig, model: &SkillModel) -> PpoLearner {
+    let config = PpoConfig { epochs: 1, minibatches: 1, lr: 0.05, ..corridor::config() };
+    PpoLearner::with_skill(config, score, model, 1, DeviceKind::Flex).expect("good settings")
+}
+
+fn sac(score: ScoreConfig, model: &SkillModel) -> SacLearner {
+    let config = SacConfig { learning_starts: 1, ..crate::sac::config() };
+    SacLearner::with_skill(config, score, model, 1, DeviceKind::Flex).expect("good settings")
+}
+
+/// What the decoder does, which is where each policy starts.
+fn rollout(model: &SkillModel) -> Rollout {
+    Driver::new(4, 1).rollout(&ppo(ScoreConfig::default(), model), 16)
+}
+
+/// Probabilities of all choices in each row.
+fn probabilities(policy: &Policy, rollout: &Rollout) -> Vec<Vec<f64>> {
+    let output = policy.forward(&rollout.z, &rollout.obs, rollout.rows()).expect("finite");
+    let of = |row, choice| f64::from(output.log_prob(row, &Action::Discrete(choice)).expect("a choice")).exp();
+    (0..rollout.rows()).map(|row| (0..CHOICES).map(|choice| of(row, choice)).collect()).collect()
+}
+
+fn mean(numbers: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = numbers.len() as f64;
+    numbers.sum::<f64>() / n
+}
+
+/// The mean of KL(p ‖ q) over all rows.
+fn kl(p: &[Vec<f64>], q: &[Vec<f64>]) -> f64 {
+    mean(p.iter().zip(q).map(|(p, q)| p.iter().zip(q).map(|(p, q)| p * (p / q).ln()).sum()))
+}
+
+fn assert_near(got: f64, want: f64, what: &str) {
+    assert!((got - want).abs() < 1e-4 * want.abs().max(0.1), "{what}: {got}, expected {want}");
+}
+
+/// Metrics of two updates with the same rollout, and the policy after them.
+fn two_updates(score: ScoreConfig, model: &SkillModel, rollout: &Rollout) -> ([UpdateMetrics; 2], Policy) {
+    let mut learner = ppo(score, model);
+    let metrics = [0, 1].map(|_| learner.update(rollout).expect("finite"));
+    (metrics, learner.policy())
+}
+
+fn sac_update(score: ScoreConfig, model: &SkillModel, rollout: &Rollout) -> SacMetrics {
+    sac(score, model).update(rollout).expect("finite")
+}
+
+#[test]
+fn the_policy_reads_the_skill_only_if_it_is_conditioned() {
+    let model = model(1);
+    let unconditioned = ScoreConfig { condition: false, init_from_decoder: false, ..ScoreConfig::default() };
+    for (score, reads) in [(ScoreConfig::default(), true), (unconditioned, false)] {
+        let (one, other) = (ppo(score.clone(), &model), sac(score, &model));
+        assert_eq!((one.rollout_latent(), other.rollout_latent()), (2, 2), "the decoder reads it all the same");
+        for policy in [one.policy(), other.policy()] {
+            assert_eq!(policy.latent(), if reads { 2 } else { 0 });
+            let head = |z: [f32; 2]| policy.forward(&z, &[0.5; OBS], 1).expect("finite").head;
+            assert_eq!(head([0.9, -0.9]) != head([-0.9, 0.9]), reads);
+        }
+    }
+}
+
+#[test]
+fn skills_come_from_the_prior_that_is_chosen() {
+    let model = model(1);
+    for (prior, sees) in [(PriorKind::Learned, true), (PriorKind::StandardNormal, false)] {
+        let score = ScoreConfig { prior, ..ScoreConfig::default() };
+        for prior in [ppo(score.clone(), &model).prior(), sac(score, &model).prior()] {
+            let prior = prior.expect("a skill model");
+            let draw = |obs: f32, how| prior.sample(&[obs; OBS], 1, how, &mut |_| 0.7).expect("a skill");
+            assert_eq!(draw(-1.0, SkillDraw::Sample) != draw(1.0, SkillDraw::Sample), sees);
+            assert_eq!(draw(1.0, SkillDraw::Mean) != [0.0, 0.0], sees, "a standard normal has mean 0");
+            assert_ne!(draw(1.0, SkillDraw::Mean), draw(1.0, SkillDraw::Sample));
+        }
+    }
+}
+
+#[test]
+fn skills_are_held_and_drawn_as_they_say() {
+    let model = model(1);
+    for (horizon, skill_draw) in [(3, SkillDraw::Mean), (11, SkillDraw::Sample)] {
+        let score = ScoreConfig { horizon, skill_draw, ..ScoreConfig::default() };
+        for source in [ppo(score.clone(), &model).skills(), sac(score, &model).skills()] {
+            let source = source.expect("a skill model");
+            assert_eq!((source.horizon, source.draw), (horizon, skill_draw));
+        }
+    }
+}
+
+#[test]
+fn without_kl_nothing_holds_the_policy() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    let score = |kl| ScoreConfig { kl, kl_coef: 10.0, ..ScoreConfig::default() };
+    let (free, freed) = two_updates(score(false), &model, &rollout);
+    let (held, kept) = two_updates(score(true), &model, &rollout);
+    assert_eq!((free[1].decoder_kl, free[1].confidence), (None, None));
+    assert!(held[1].decoder_kl.is_some() && held[1].confidence.is_some());
+    assert_ne!(probabilities(&freed, &rollout), probabilities(&kept, &rollout), "it is part of the loss");
+    let (free, held) = (sac_update(score(false), &model, &rollout), sac_update(score(true), &model, &rollout));
+    assert_eq!((free.decoder_kl, free.confidence), (None, None));
+    assert!(held.decoder_kl.is_some() && held.confidence.is_some());
+    assert_ne!(free.actor_grad_norm, held.actor_grad_norm, "it is part of the loss");
+}
+
+#[test]
+fn the_divergence_is_that_of_its_direction() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    let decoder = probabilities(&model.policy(), &rollout);
+    let mut measured = Vec::new();
+    for kl_direction in [KlDirection::DecoderPolicy, KlDirection::PolicyDecoder] {
+        let score = ScoreConfig { kl_direction, ..ScoreConfig::default() };
+        let mut learner = ppo(score.clone(), &model);
+        assert_eq!(learner.update(&rollout).expect("finite").decoder_kl, Some(0.0), "a copy, before the first step");
+        let policy = probabilities(&learner.policy(), &rollout);
+        let expected = match kl_direction {
+            KlDirection::DecoderPolicy => kl(&decoder, &policy),
+            KlDirection::PolicyDecoder => kl(&policy, &decoder),
+        };
+        let got = learner.update(&rollout).expect("finite").decoder_kl.expect("penalised");
+        assert_near(f64::from(got), expected, "the mean over all rows, before the second step");
+        measured.push((got, sac_update(score, &model, &rollout).decoder_kl.expect("penalised")));
+    }
+    let [(one, other_one), (two, other_two)] = measured[..] else { panic!("two directions") };
+    assert!((one - two).abs() > 1e-3 * one, "the directions differ: {one} and {two}");
+    assert_ne!(other_one, other_two);
+}
+
+#[test]
+fn the_confidence_is_that_of_its_kind() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    let decoder = probabilities(&model.policy(), &rollout);
+    let chosen = |row: usize| match rollout.actions.get(row) {
+        Some(Action::Discrete(choice)) => decoder[row][choice as usize],
+        other => panic!("a choice, not {other:?}"),
+    };
+    let largest = |row: usize| decoder[row].iter().copied().fold(0.0, f64::max);
+    let by_ppo = |confidence| {
+        let score = ScoreConfig { confidence, ..ScoreConfig::default() };
+        f64::from(two_updates(score, &model, &rollout).0[0].confidence.expect("penalised"))
+    };
+    let (rows, policys) = (rollout.rows(), by_ppo(ConfidenceKind::PolicyAction));
+    assert_eq!(by_ppo(ConfidenceKind::Off), 1.0);
+    assert_near(policys, mean((0..rows).map(chosen)), "p(a)");
+    assert_near(by_ppo(ConfidenceKind::Density), policys, "the same where actions are discrete");
+    let bounded = by_ppo(ConfidenceKind::BoundedDensity);
+    assert_near(bounded, mean((0..rows).map(|row| chosen(row) / largest(row))), "p(a) / max p");
+    let own = by_ppo(ConfidenceKind::OwnSample);
+    assert!((0.3..1.0).contains(&own) && own != policys, "p of the decoder's own choices: {own}, {policys}");
+
+    // Whatever rows SAC draws from its buffer, it draws the same ones.
+    let by_sac = |confidence| {
+        let score = ScoreConfig { confidence, ..ScoreConfig::default() };
+        sac_update(score, &model, &rollout).confidence.expect("penalised")
+    };
+    let [policys, bounded, off] =
+        [ConfidenceKind::PolicyAction, ConfidenceKind::BoundedDensity, ConfidenceKind::Off].map(by_sac);
+    assert!(policys < bounded && bounded < off && off == 1.0, "{policys}, {bounded}, {off}");
+    assert_ne!(by_sac(ConfidenceKind::OwnSample), policys);
+}
+
+#[test]
+fn the_released_penalty_for_coinrun_is_a_sum_over_rows_of_weighted_divergences() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    let (penalty, kl_coef) = (PenaltyForm::LegacyCoinrun, 5.0 / rollout.rows() as f64);
+    let legacy = ScoreConfig { penalty, kl_coef, ..ScoreConfig::default() };
+    let (kl_direction, confidence) = (KlDirection::PolicyDecoder, ConfidenceKind::PolicyAction);
+    let same = ScoreConfig { kl_direction, confidence, kl_coef: 5.0, ..ScoreConfig::default() };
+    let after = |score: &ScoreConfig| {
+        let (metrics, policy) = two_updates(score.clone(), &model, &rollout);
+        (metrics[1].confidence.expect("penalised"), probabilities(&policy, &rollout).concat())
+    };
+    let ((weight, sum), (same_weight, mean)) = (after(&legacy), after(&same));
+    assert_eq!(weight, same_weight);
+    for (sum, mean) in sum.iter().zip(&mean) {
+        assert!((sum - mean).abs() < 1e-3, "{sum} and {mean}");
+    }
+    let (_, other) = after(&ScoreConfig { kl_coef, ..same });
+    assert!(sum.iter().zip(&other).any(|(sum, other)| (sum - other).abs() > 1e-3), "a mean of that weight is less");
+}
+
+#[test]
+fn switches_that_do_not_go_together_are_refused() {
+    let model = model(1);
+    let base = ScoreConfig::default;
+    let refused = |config: PpoConfig, score| {
+        let error = PpoLearner::with_skill(config, score, &model, 1, DeviceKind::Flex).expect_err("it cannot work");
+        assert!(matches!(error, LearnError::Config(_)), "{error:?}");
+        error.to_string()
+    };
+    let text = refused(corridor::config(), ScoreConfig { penalty: PenaltyForm::LegacyD4rl, ..base() });
+    assert!(text.contains("LegacyD4rl is for continuous actions"), "{text}");
+    let text = refused(corridor::config(), ScoreConfig { condition: false, ..base() });
+    assert!(text.contains("init_from_decoder needs condition"), "{text}");
+    let text = refused(PpoConfig { norm_obs: true, ..corridor::config() }, base());
+    assert!(text.contains("norm_obs"), "{text}");
+    let bad = SacConfig { norm_obs: true, ..crate::sac::config() };
+    let error = SacLearner::with_skill(bad, base(), &model, 1, DeviceKind::Flex).expect_err("raw observations");
+    assert!(error.to_string().contains("norm_obs"), "{error}");
+}

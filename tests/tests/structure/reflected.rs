@@ -1,0 +1,114 @@
+//! Components and resources are known to Bevy's type registry: inspectors show them, and `playbot doctor` names them.
+
+use std::{fs, slice};
+
+use bevy::{prelude::*, reflect::TypeRegistry};
+use bevy_playbot::headless::headless_app;
+// Linked, so that what they register is there.
+use playbot_cli as _;
+use playbot_games as _;
+use playbot_lab as _;
+
+use crate::{
+    files::{files, shown},
+    items::Item,
+    modules::Modules,
+    packages::{Package, packages, workspace},
+};
+
+/// The crates that are looked at. Types of tests, and of games that are not ours, are their own affair.
+const CRATES: [&str; 4] = ["bevy_playbot", "playbot_cli", "playbot_games", "playbot_lab"];
+
+/// A component or resource.
+#[derive(Debug, PartialEq, Eq)]
+struct Kept {
+    /// As the registry calls it.
+    path: String,
+    name: String,
+    is_reflected: bool,
+    /// A generic type is registered for each type that it is used with, by name.
+    is_generic: bool,
+}
+
+fn derives(item: &Item, name: &str) -> bool {
+    let lists = item.attributes.iter().filter_map(|attribute| attribute.strip_prefix("derive(")?.strip_suffix(")"));
+    lists.flat_map(|list| list.split(',')).any(|derived| derived.rsplit("::").next() == Some(name))
+}
+
+/// All components and resources of a crate.
+fn kept(krate: &str, modules: &Modules) -> Vec<Kept> {
+    let mut found = Vec::new();
+    for (module, contents) in &modules.0 {
+        for item in &contents.items {
+            if derives(item, "Component") || derives(item, "Resource") {
+                let krate = krate.to_owned();
+                let parts = [slice::from_ref(&krate), module.as_slice(), slice::from_ref(&item.name)].concat();
+                let is_generic = item.body.get(1).is_some_and(|token| token.text == "<");
+                let (path, name, is_reflected) = (parts.join("::"), item.name.clone(), derives(item, "Reflect"));
+                found.push(Kept { path, name, is_reflected, is_generic });
+            }
+        }
+    }
+    found
+}
+
+/// Whether some source of the package registers a generic type.
+fn registers(package: &Package, name: &str) -> bool {
+    let words = format!("register_type::<{name}<");
+    files(&package.folder.join("src"), ".rs")
+        .iter()
+        .any(|file| fs::read_to_string(file).unwrap_or_else(|e| panic!("{}: {e}", file.display())).contains(&words))
+}
+
+fn fault(kept: &Kept, package: &Package, registry: &TypeRegistry) -> Option<&'static str> {
+    if !kept.is_reflected {
+        return Some("does not derive `Reflect`");
+    }
+    let is_registered = if kept.is_generic {
+        registers(package, &kept.name)
+    } else {
+        registry.get_with_type_path(&kept.path).is_some()
+    };
+    (!is_registered).then_some("is not registered")
+}
+
+/// What does not implement `Reflect` itself is left out with `#[reflect(ignore)]`, or the whole is `#[reflect(opaque)]`.
+#[test]
+fn components_and_resources_are_reflected_and_registered() {
+    let app = headless_app();
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let (mut faults, mut count) = (Vec::new(), 0);
+    for package in packages(&workspace()).iter().filter(|package| CRATES.contains(&package.name.as_str())) {
+        let root = package.root().expect("a library");
+        for kept in kept(&package.name, &Modules::read(&root)) {
+            count += 1;
+            if let Some(why) = fault(&kept, package, &registry) {
+                faults.push(format!("{}: {} {why}", shown(&workspace(), &package.folder), kept.path));
+            }
+        }
+    }
+    assert!(count > 100, "only {count} components and resources were found: does the reader still see them?");
+    assert!(faults.is_empty(), "{} to mend\n{}\n", faults.len(), faults.join("\n"));
+}
+
+#[test]
+fn what_is_not_reflected_or_not_registered_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = "#[derive(Component, Clone)] #[require(Transform)] pub struct Bare;
+        pub mod inner {
+            #[derive(Clone, Resource, bevy::reflect::Reflect)] #[reflect(Resource)] struct Seen(u8);
+            #[derive(Resource, Reflect)] struct Many<T: Send>(T);
+        }
+        #[derive(Reflect)] struct Plain; #[cfg(test)] mod tests { #[derive(Component)] struct Tested; }";
+    fs::create_dir(folder.path().join("src")).expect("writable");
+    fs::write(folder.path().join("src/lib.rs"), source).expect("writable");
+    let kept = kept("planted", &Modules::read(&folder.path().join("src/lib.rs")));
+    let shown: Vec<_> = kept.iter().map(|kept| (kept.path.as_str(), kept.is_reflected, kept.is_generic)).collect();
+    let expected =
+        [("planted::Bare", false, false), ("planted::inner::Seen", true, false), ("planted::inner::Many", true, true)];
+    assert_eq!(shown, expected);
+    let (name, manifest) = ("planted".to_owned(), String::new());
+    let package = Package { name, folder: folder.path().to_owned(), is_published: false, manifest };
+    let faults: Vec<_> = kept.iter().map(|kept| fault(kept, &package, &TypeRegistry::new())).collect();
+    assert_eq!(faults, [Some("does not derive `Reflect`"), Some("is not registered"), Some("is not registered")]);
+}
