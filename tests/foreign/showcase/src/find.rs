@@ -1,6 +1,10 @@
 //! Where cargo keeps the sources of the `bevy` package.
 
-use std::{env, path::PathBuf, process::Command};
+use std::{
+    env,
+    path::PathBuf,
+    process::{Command, Stdio},
+};
 
 use serde_json::Value;
 
@@ -13,7 +17,8 @@ pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
     if let Ok(target) = env::var("TARGET") {
         command.args(["--filter-platform", &target]);
     }
-    let output = command.output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
+    // It asks the compiler, which reads what it is given there.
+    let output = command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
     if !output.status.success() {
         let why = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
         return Err(format!("cargo metadata cannot tell where it is ({why}); `cargo fetch` may help"));
