@@ -18,7 +18,8 @@ pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
         command.args(["--filter-platform", &target]);
     }
     // It asks the compiler, which reads what it is given there.
-    let output = command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
+    let output =
+        command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
     if !output.status.success() {
         let why = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
         return Err(format!("cargo metadata cannot tell where it is ({why}); `cargo fetch` may help"));
