@@ -85,8 +85,6 @@ fn sets_of_buttons_for_continuous_actions_are_a_fault() {
     let mixed =
         VirtualInput::axes([ActionAxis::stick(GamepadAxis::LeftStickX)]).gamepad_buttons([vec![GamepadButton::South]]);
     let (mut world, agents) = build_world(&bare().input(mixed), "default", 0, 0, 1);
-    world.entity_mut(agents[0]).insert(Control::Human);
-    assert!(world.tick().is_ok(), "nothing is pressed for people");
     world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
     let text = world.tick().expect_err("they mean nothing").to_string();
     assert!(text.contains("agent 0") && text.contains("`ActionAxis::buttons`"), "{text}");

@@ -33,7 +33,8 @@ impl Plugin for CoinRunPlugin {
             .add_systems(
                 FixedPreUpdate,
                 (
-                    demonstrator_bot::decide.in_set(PlaybotSystems::Decide),
+                    // An agent is decided for by one alone, so it does not matter who decides for which agent first.
+                    demonstrator_bot::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
                     demonstrator_bot::follow.after(PlaybotSystems::Act),
                 ),
             )

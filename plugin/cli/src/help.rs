@@ -68,8 +68,9 @@ fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> Stri
 
 /// An example with the names in it, and its explanation, if it has one, in the usual column.
 fn own_example(example: &str, program: &str, names: &[(&str, &str)]) -> String {
+    let own = |text: &str| names.iter().fold(text.to_owned(), |text, (word, name)| text.replace(word, name));
     let (command, explanation) = example.split_once("   ").unwrap_or((example, ""));
-    let command = names.iter().fold(command.replacen(USUAL, program, 1), |text, (word, name)| text.replace(word, name));
+    let (command, explanation) = (own(&command.replacen(USUAL, program, 1)), own(explanation));
     format!("  {command:<COLUMN$} {}", explanation.trim_start()).trim_end().to_owned()
 }
 

@@ -26,7 +26,7 @@ use lander_rules::rules::{Capsule, OBSERVATION, TICK_HZ, add_rules, capsule};
 
 /// What is learned, on which levels, how, and how long.
 pub const EXPERIMENT: &str = r#"(
-    game: "lander", train: "moon:0..63", test: "moon:64..127", steps: 100000, arenas: 16, worlds: 2,
+    game: "lander", train: "moon:0..63", test: "moon:64..127", steps: 400000, arenas: 16, worlds: 2,
     skills: (window: 5, latent: 4, epochs: 20, hidden: [32, 32], encoder_hidden: 32, gru_hidden: 32),
     ppo: (num_steps: 64, minibatches: 4, hidden: [32, 32]),
     score: (horizon: 5),

@@ -49,11 +49,14 @@ pub(crate) fn add_readings(app: &mut App) {
             after_observation.after(PlaybotSystems::Observe).before(PlaybotSystems::Decide),
             after_decision.after(PlaybotSystems::Act),
         )
+            // Nobody else looks at this clock.
+            .ambiguous_with_all()
             .run_if(measuring),
     )
     .add_systems(
         judge,
         (after_simulation.before(PlaybotSystems::Judge), after_recording.after(PlaybotSystems::Reset))
+            .ambiguous_with_all()
             .run_if(measuring),
     );
 }

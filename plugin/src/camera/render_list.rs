@@ -24,7 +24,8 @@ impl Plugin for RenderListPlugin {
         app.add_plugins(ExtractPlugin::default());
         // Taken out at once, before anybody takes it for a renderer.
         if let Some(renderer) = app.remove_sub_app(RenderApp) {
-            app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list);
+            // Nobody else looks at the list.
+            app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list.ambiguous_with_all());
         }
     }
 }

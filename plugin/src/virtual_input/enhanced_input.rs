@@ -11,7 +11,10 @@ use bevy_enhanced_input::prelude::{
     TriggerState,
 };
 
-use super::{claims::is_virtual, plugin::InputRoute};
+use super::{
+    claims::{check_claims, is_virtual},
+    plugin::InputRoute,
+};
 use crate::{
     action::{Action, ActionValue},
     agent::Agent,
@@ -120,7 +123,12 @@ impl<A> Default for EnhancedActionPlugin<A> {
 
 impl<A: InputAction> Plugin for EnhancedActionPlugin<A> {
     fn build(&self, app: &mut App) {
-        let system = drive::<A>.in_set(PlaybotSystems::Act).before(EnhancedInputSystems::Update);
+        let system = drive::<A>
+            .in_set(PlaybotSystems::Act)
+            .after(check_claims)
+            // Other managers have actions of their own.
+            .ambiguous_with(PlaybotSystems::Act)
+            .before(EnhancedInputSystems::Update);
         match self.route {
             InputRoute::Messages => app.add_systems(PreUpdate, system),
             InputRoute::Direct => app.add_systems(FixedPreUpdate, system),

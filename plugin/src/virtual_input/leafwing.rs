@@ -9,7 +9,10 @@ use leafwing_input_manager::{
     Actionlike, InputControlKind, action_state::ActionState, buttonlike::ButtonState, plugin::InputManagerSystem,
 };
 
-use super::{claims::is_virtual, plugin::InputRoute};
+use super::{
+    claims::{check_claims, is_virtual},
+    plugin::InputRoute,
+};
 use crate::{
     action::{Action, ActionValue},
     agent::Agent,
@@ -128,7 +131,11 @@ impl<A: Actionlike> Plugin for LeafwingActionsPlugin<A> {
             InputRoute::Messages => {
                 app.add_systems(PreUpdate, drive::<A>.in_set(InputManagerSystem::ManualControl).run_if(is_tick))
             }
-            InputRoute::Direct => app.add_systems(FixedPreUpdate, drive::<A>.in_set(PlaybotSystems::Act)),
+            // Other managers have actions of their own.
+            InputRoute::Direct => app.add_systems(
+                FixedPreUpdate,
+                drive::<A>.in_set(PlaybotSystems::Act).after(check_claims).ambiguous_with(PlaybotSystems::Act),
+            ),
         };
         app.register_type::<LeafwingActions<A>>();
         app.add_observer(|event: On<StartEpisode>, agents: Agents<A>, states: States<A>| {

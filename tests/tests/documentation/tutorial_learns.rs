@@ -12,7 +12,7 @@ use super::runner::runner;
 
 const SMALL: &str = r#"(
     game: "runner", train: "default:0..63", test: "default:64..95", steps: 8192, arenas: 8, worlds: 2,
-    skills: (window: 5, latent: 2, epochs: 10, batch: 64, hidden: [32, 32], encoder_hidden: 32, gru_hidden: 32),
+    skills: (window: 5, latent: 2, epochs: 20, batch: 64, norm_obs: true, action_noise: 0.1, hidden: [32, 32], encoder_hidden: 32, gru_hidden: 32),
     ppo: (num_steps: 128, minibatches: 4, hidden: [32, 32]),
     score: (horizon: 5), eval: (episodes_per_level: 2),
 )"#;

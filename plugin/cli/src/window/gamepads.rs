@@ -80,13 +80,19 @@ mod tests {
 
     use super::*;
 
-    fn press(world: &mut World, gamepad: Entity, value: f32) {
-        let south = RawGamepadButtonChangedEvent { gamepad, button: GamepadButton::South, value };
-        let stick = RawGamepadAxisChangedEvent { gamepad, axis: GamepadAxis::LeftStickX, value };
-        world.write_message(RawGamepadEvent::Button(south));
-        world.write_message(RawGamepadEvent::Axis(stick));
-        world.write_message(south);
-        world.write_message(stick);
+    /// What is done in the next frame, as a plugin would tell it: gamepad and value.
+    #[derive(Resource, Default)]
+    struct Next(Vec<(Entity, f32)>);
+
+    fn press(world: &mut World) {
+        for (gamepad, value) in std::mem::take(&mut world.resource_mut::<Next>().0) {
+            let south = RawGamepadButtonChangedEvent { gamepad, button: GamepadButton::South, value };
+            let stick = RawGamepadAxisChangedEvent { gamepad, axis: GamepadAxis::LeftStickX, value };
+            world.write_message(RawGamepadEvent::Button(south));
+            world.write_message(RawGamepadEvent::Axis(stick));
+            world.write_message(south);
+            world.write_message(stick);
+        }
     }
 
     fn plug_in(world: &mut World, pad: Entity) {
@@ -99,31 +105,28 @@ mod tests {
     #[test]
     fn a_persons_gamepad_rests_while_it_is_kept_and_virtual_ones_play() {
         let mut app = App::new();
-        app.add_plugins(InputPlugin).insert_resource(Devices::Open);
+        app.add_plugins(InputPlugin).insert_resource(Devices::Open).init_resource::<Next>();
+        app.add_systems(PreUpdate, press.before(InputSystems));
         build(&mut app);
         let world = app.world_mut();
         let real = world.spawn_empty().id();
         let agent = world.spawn_empty().id();
         let own = world.spawn(VirtualGamepad { agent }).id();
-        let held = |app: &App, pad: Entity| {
-            let pad = app.world().get::<Gamepad>(pad).expect("plugged in");
-            (pad.pressed(GamepadButton::South), pad.get(GamepadAxis::LeftStickX).unwrap_or(0.0))
+        [real, own].into_iter().for_each(|pad| plug_in(world, pad));
+        app.update();
+        let play = |app: &mut App, devices: Devices, pressed: &[(Entity, f32)]| {
+            app.insert_resource(devices);
+            app.world_mut().resource_mut::<Next>().0 = pressed.to_vec();
+            app.update();
+            [real, own].map(|pad| {
+                let pad = app.world().get::<Gamepad>(pad).expect("plugged in");
+                (pad.pressed(GamepadButton::South), pad.get(GamepadAxis::LeftStickX).unwrap_or(0.0))
+            })
         };
-        [real, own].into_iter().for_each(|pad| plug_in(app.world_mut(), pad));
-        app.update();
 
-        [real, own].into_iter().for_each(|pad| press(app.world_mut(), pad, 1.0));
-        app.update();
-        assert_eq!((held(&app, real), held(&app, own)), ((true, 1.0), (true, 1.0)));
-
-        app.insert_resource(Devices::Kept);
-        [(real, 1.0), (own, 0.0)].into_iter().for_each(|(pad, value)| press(app.world_mut(), pad, value));
-        app.update();
-        assert_eq!((held(&app, real), held(&app, own)), ((false, 0.0), (false, 0.0)), "let go of, and kept");
-
-        app.insert_resource(Devices::Open);
-        press(app.world_mut(), real, 1.0);
-        app.update();
-        assert_eq!(held(&app, real), (true, 1.0));
+        assert_eq!(play(&mut app, Devices::Open, &[(real, 1.0), (own, 1.0)]), [(true, 1.0), (true, 1.0)]);
+        assert_eq!(play(&mut app, Devices::Kept, &[]), [(false, 0.0), (true, 1.0)], "let go of");
+        assert_eq!(play(&mut app, Devices::Kept, &[(real, 1.0), (own, 0.0)]), [(false, 0.0), (false, 0.0)], "kept");
+        assert_eq!(play(&mut app, Devices::Open, &[(real, 1.0)]), [(true, 1.0), (false, 0.0)]);
     }
 }

@@ -45,7 +45,12 @@ impl Plugin for ForeignPlugin {
                 ready::check.in_set(PlaybotSystems::Load),
                 // An agent is decided for by one alone, so it does not matter who decides for which agent first.
                 demonstrator::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
-                input::act.in_set(PlaybotSystems::Act).after(check_actions).after(note_actions),
+                // What the game's own system does is pressed by nobody else.
+                input::act
+                    .in_set(PlaybotSystems::Act)
+                    .after(check_actions)
+                    .after(note_actions)
+                    .ambiguous_with(PlaybotSystems::Act),
             ),
         )
         .add_systems(judge, outcome::judge.before(PlaybotSystems::Judge).run_if(is_tick));

@@ -45,6 +45,7 @@ mod writer;
 pub use episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions};
 pub use episode_fault::EpisodeFault;
 pub use error::{DemoFault, DemoFileError};
+#[doc(hidden)]
 pub use find::find_demos;
 pub use header::{DemoActions, DemoHeader};
 pub use merge::{MergeReport, merge_demos};

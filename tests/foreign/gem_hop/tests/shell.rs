@@ -1,6 +1,6 @@
 //! The verbs of the command line, as users call them.
 
-use playbot_shell::GameProgram;
+use playbot_shell::{Desk, GameProgram, Shell};
 
 const GAME: GameProgram = GameProgram {
     program: env!("CARGO_BIN_EXE_foreign_gem_hop"),
@@ -36,6 +36,10 @@ fn the_doctor_finds_nothing() {
 }
 
 #[test]
-fn what_a_window_records_replays() {
-    GAME.what_a_window_records_replays();
+fn a_window_cannot_be_built_anew() {
+    let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
+    let output = desk.command(shell.folder(), &["play", GAME.game]).output().expect("the program starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("`Restart::Rebuild`") && said.contains("`Restart::Startup`"), "{said}");
 }
