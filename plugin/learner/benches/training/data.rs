@@ -42,7 +42,7 @@ pub fn tiles(n: usize, rng: &mut ChaCha8Rng) -> Vec<f32> {
 
 /// Actions of CoinRun.
 pub fn choices(n: usize, rng: &mut ChaCha8Rng) -> Vec<u32> {
-    (0..n).map(|_| below(rng, CHOICES) as u32).collect()
+    (0..n).map(|_| below(rng, CHOICES as u64) as u32).collect()
 }
 
 /// Bytes of so many images.

@@ -41,7 +41,7 @@ pub fn vectors(criterion: &mut Criterion) {
     let mut rng = rng("rollout");
     let observations = tiles(ENVS * steps * OBS, &mut rng);
     let rollout = Rollout { obs: observations.into(), ..Rollout::new(ENVS, OBS, learner.rollout_latent(), &SPACE) };
-    cases(criterion, "score-ppo/vector", learner, rollout, steps);
+    cases(criterion, "score-ppo/vector", learner, rollout, steps, OBS);
 }
 
 /// PPO and SCORE-PPO on images, 64 arenas, 32 steps.
@@ -56,7 +56,7 @@ pub fn images(criterion: &mut Criterion) {
             let (mut rng, steps) = (rng("rollout"), 32);
             let obs = seen(ENVS * steps, &mut rng);
             let rollout = Rollout { obs, ..Rollout::new(ENVS, IMAGE, learner.rollout_latent(), &SPACE) };
-            cases(criterion, &format!("{algorithm}/{name}"), learner, rollout, steps);
+            cases(criterion, &format!("{algorithm}/{name}"), learner, rollout, steps, IMAGE.numbers());
         }
     }
 }
@@ -68,8 +68,8 @@ fn image_skills(cnn: CnnKind) -> SkillModel {
     SkillTrainer::new(config, dataset, 1, DEVICE).expect("fits").into_model()
 }
 
-/// The forward pass of one tick, and the update from what was seen in so many.
-fn cases(criterion: &mut Criterion, name: &str, mut learner: PpoLearner, rollout: Rollout, steps: usize) {
+/// The forward pass of one tick, and the update from what was seen in so many. An observation has `width` numbers.
+fn cases(criterion: &mut Criterion, name: &str, mut learner: PpoLearner, rollout: Rollout, steps: usize, width: usize) {
     let mut rng = rng("cases");
     let (rows, latent) = (ENVS * steps, learner.rollout_latent());
     let rollout = Rollout {
@@ -82,7 +82,6 @@ fn cases(criterion: &mut Criterion, name: &str, mut learner: PpoLearner, rollout
     };
     let rollout = lived(rollout, ENVS, &mut rng);
     let (policy, z) = (learner.policy(), &rollout.z[..ENVS * latent]);
-    let width = rollout.obs.len() / rows;
     criterion.bench_function(&format!("forward/{name}/{ENVS}"), |bencher| {
         bencher.iter(|| policy.forward(z, rollout.obs.rows(0..ENVS, width), ENVS).expect("fits"));
     });
