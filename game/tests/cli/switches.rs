@@ -214,7 +214,7 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
     assert!(described.is_object(), "{described}");
 
     // Long enough to meet what levels differ in.
-    let actions = ["7"; 60].join(",");
+    let actions = ["8"; 60].join(",");
     let trace = |more: &[&str]| done(folder, &[&["trace", "coinrun", "--actions", &actions], more].concat()).0;
     let here = trace(&["--mode", "hard", "--seed", "2", "--json"]);
     assert!(here.lines().all(|step| serde_json::from_str::<Value>(step).is_ok_and(|step| step.is_array())), "{here}");

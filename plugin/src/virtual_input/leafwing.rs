@@ -129,7 +129,9 @@ impl<A: Actionlike> Plugin for LeafwingActionsPlugin<A> {
     fn build(&self, app: &mut App) {
         match self.route {
             InputRoute::Messages => {
-                app.add_systems(PreUpdate, drive::<A>.in_set(InputManagerSystem::ManualControl).run_if(is_tick))
+                let system = drive::<A>.in_set(InputManagerSystem::ManualControl).after(PlaybotSystems::Act);
+                // Whoever takes over after this tick's decisions decides in the next one.
+                app.add_systems(PreUpdate, system.run_if(is_tick).ambiguous_with_all())
             }
             // Other managers have actions of their own.
             InputRoute::Direct => app.add_systems(

@@ -29,7 +29,7 @@ fn the_runner_learns_to_finish_levels_that_it_has_not_seen() {
     assert_eq!(pipeline::record(&game, &levels, 0.1, &demos).expect("the jumper plays"), 50);
     let skills = pipeline::learn_skills(&game, &experiment, device, threads).expect("they replay");
     let trainer = pipeline::train(&game, &experiment, Some(&skills), device, threads, |_| {}).expect("it learns");
-    let policy = Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Sample);
+    let policy = Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Greedy);
 
     let success = |name, player: &Player| {
         pipeline::evaluate(&game, &experiment, name, player, threads).expect("it plays").success
