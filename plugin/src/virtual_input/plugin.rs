@@ -38,7 +38,7 @@ pub enum InputRoute {
     Direct,
 }
 
-/// Lets the actions of agents with a [`VirtualInput`] play through Bevy's own input. Needs [`InputPlugin`], which is part
+/// Lets the actions of agents with a [`VirtualInput`](super::VirtualInput) play through Bevy's own input. Needs [`InputPlugin`], which is part
 /// of Bevy's `DefaultPlugins`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualInputPlugin {

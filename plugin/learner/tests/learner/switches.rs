@@ -154,24 +154,24 @@ fn the_confidence_is_that_of_its_kind() {
         let score = ScoreConfig { confidence, ..ScoreConfig::default() };
         f64::from(two_updates(score, &model, &rollout).0[0].confidence.expect("penalised"))
     };
-    let (rows, policys) = (rollout.rows(), by_ppo(ConfidenceKind::PolicyAction));
+    let (rows, by_policy) = (rollout.rows(), by_ppo(ConfidenceKind::PolicyAction));
     assert_eq!(by_ppo(ConfidenceKind::Off), 1.0);
-    assert_near(policys, mean((0..rows).map(chosen)), "p(a)");
-    assert_near(by_ppo(ConfidenceKind::Density), policys, "the same where actions are discrete");
+    assert_near(by_policy, mean((0..rows).map(chosen)), "p(a)");
+    assert_near(by_ppo(ConfidenceKind::Density), by_policy, "the same where actions are discrete");
     let bounded = by_ppo(ConfidenceKind::BoundedDensity);
     assert_near(bounded, mean((0..rows).map(|row| chosen(row) / largest(row))), "p(a) / max p");
     let own = by_ppo(ConfidenceKind::OwnSample);
-    assert!((0.3..1.0).contains(&own) && own != policys, "p of the decoder's own choices: {own}, {policys}");
+    assert!((0.3..1.0).contains(&own) && own != by_policy, "p of the decoder's own choices: {own}, {by_policy}");
 
     // Whatever rows SAC draws from its buffer, it draws the same ones.
     let by_sac = |confidence| {
         let score = ScoreConfig { confidence, ..ScoreConfig::default() };
         sac_update(score, &model, &rollout).confidence.expect("penalised")
     };
-    let [policys, bounded, off] =
+    let [by_policy, bounded, off] =
         [ConfidenceKind::PolicyAction, ConfidenceKind::BoundedDensity, ConfidenceKind::Off].map(by_sac);
-    assert!(policys < bounded && bounded < off && off == 1.0, "{policys}, {bounded}, {off}");
-    assert_ne!(by_sac(ConfidenceKind::OwnSample), policys);
+    assert!(by_policy < bounded && bounded < off && off == 1.0, "{by_policy}, {bounded}, {off}");
+    assert_ne!(by_sac(ConfidenceKind::OwnSample), by_policy);
 }
 
 #[test]
