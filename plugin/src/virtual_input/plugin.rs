@@ -38,8 +38,8 @@ pub enum InputRoute {
     Direct,
 }
 
-/// Lets the actions of agents with a [`VirtualInput`](super::VirtualInput) play through Bevy's own input. Needs [`InputPlugin`], which is part
-/// of Bevy's `DefaultPlugins`.
+/// Lets the actions of agents with a [`VirtualInput`](super::VirtualInput) play through Bevy's own input. Needs
+/// [`InputPlugin`], which is part of Bevy's `DefaultPlugins`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualInputPlugin {
     /// The way from an action to the game.
