@@ -9,4 +9,3 @@ mod links;
 mod runner;
 mod sources;
 mod tutorial;
-mod tutorial_learns;
