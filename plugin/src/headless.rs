@@ -85,24 +85,29 @@ pub fn set_frame_rate(app: &mut App, hz: f64) {
 
 /// Finishes an app's plugins and takes its World, so that it can move to another thread.
 ///
-/// A system that cannot run, for instance because a resource does not exist, is a fault of the next tick there, and no
-/// panic.
-///
-/// Schedules are set to run on the thread that calls them: Bevy's own threads cost more than they bring in a World of
-/// this size, and several Worlds side by side use the cores better. Where ticks are frames, the game may have left the order
-/// of its systems open: they get one.
+/// Bevy's own threads cost more than they bring in a World of this size, and several Worlds side by side use the cores
+/// better: see [`run_on_one_thread`].
 #[doc(hidden)]
 pub fn into_world(mut app: App) -> World {
     app.finish();
     app.cleanup();
-    for (_, schedule) in app.world_mut().resource_mut::<Schedules>().iter_mut() {
+    run_on_one_thread(app.world_mut());
+    std::mem::take(app.world_mut())
+}
+
+/// Sets the schedules of a World to run on the thread that calls them. To be done before they run.
+///
+/// A system that cannot run, for instance because a resource does not exist, is a fault of the next tick there, and no
+/// panic. Where ticks are frames, the game may have left the order of its systems open: they get one.
+#[doc(hidden)]
+pub fn run_on_one_thread(world: &mut World) {
+    for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.set_executor(SingleThreadedExecutor::new());
     }
-    if app.world().contains_resource::<FrameGate>() {
-        system_order::put_in_order(app.world_mut());
+    if world.contains_resource::<FrameGate>() {
+        system_order::put_in_order(world);
     }
-    system_errors::listen(app.world_mut());
-    std::mem::take(app.world_mut())
+    system_errors::listen(world);
 }
 
 /// Runs one tick. Under [`TickPlacement::Frame`] that may take several frames, while a level is being made ready.

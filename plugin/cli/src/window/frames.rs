@@ -4,13 +4,13 @@
 //! know nothing of that.
 
 use bevy::{
-    ecs::schedule::{ScheduleLabel, Schedules, SingleThreadedExecutor},
+    ecs::schedule::{ScheduleLabel, SingleThreadedExecutor},
     prelude::*,
     time::TimeReceiver,
 };
 use bevy_playbot::{
-    action::Action, control::Control, episode::Episode, fault::Faults, key_bindings::KeyBindings,
-    placement::TickSchedules, system_errors, system_order,
+    action::Action, control::Control, episode::Episode, fault::Faults, headless::run_on_one_thread,
+    key_bindings::KeyBindings, placement::TickSchedules, system_errors,
 };
 use playbot_lab::prelude::*;
 
@@ -77,7 +77,8 @@ fn rest(_: On<EpisodeEnded>, rate: Res<FrameRate>, mut pace: ResMut<Pace>) {
 fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     if !*has_begun {
         *has_begun = true;
-        begin(world);
+        // In the order that systems have headless.
+        run_on_one_thread(world);
     }
     choose_devices(world);
     devices::take(world);
@@ -100,15 +101,6 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
         world.run_schedule(WindowEnd);
     }
     devices::give_back(world);
-}
-
-/// Runs systems one after the other, in the order that they have headless.
-fn begin(world: &mut World) {
-    for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
-        schedule.set_executor(SingleThreadedExecutor::new());
-    }
-    system_order::put_in_order(world);
-    system_errors::listen(world);
 }
 
 /// A person without bindings plays with the devices themselves; nobody else's game sees them.
