@@ -52,9 +52,7 @@ impl TappedKeys {
 
 impl Plugin for KeyboardPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<TappedKeys>()
-            .register_type::<TappedKeys>()
-            .add_systems(PreUpdate, note_taps.after(InputSystems));
+        app.init_resource::<TappedKeys>().add_systems(PreUpdate, note_taps.after(InputSystems));
         match TickSchedules::of(app).placement {
             TickPlacement::Fixed => {
                 app.add_systems(FixedPreUpdate, decide.in_set(PlaybotSystems::Decide).before(bot::run_blind_bots))

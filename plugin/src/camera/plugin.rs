@@ -8,13 +8,12 @@ use bevy::{
 use super::{
     ReadbackDelay, TileLayerPlugin, adapter,
     borrow::BorrowedTargets,
-    eye::{Eyes, SensorCamera, Stamp},
+    eye::{Eyes, Stamp},
     eye_draw, images, look,
     prepare::Atlas,
     readback::Readback,
     renderer::{self, Renderer},
     scene_schedule::add_renderer,
-    sensor::CameraSensor,
 };
 use crate::{
     no_screen::NoScreen,
@@ -72,10 +71,7 @@ impl Plugin for CameraSensorPlugin {
         }
         VisionPlugin::add_to(app);
         eye_draw::add_eyes(app);
-        app.register_type::<CameraSensor>()
-            .register_type::<SensorCamera>()
-            .register_type::<ReadbackDelay>()
-            .init_resource::<ReadbackDelay>()
+        app.init_resource::<ReadbackDelay>()
             .init_resource::<Atlas>()
             .init_resource::<BorrowedTargets>()
             .init_resource::<Eyes>()

@@ -37,7 +37,6 @@ impl Plugin for TileLayerPlugin {
     fn build(&self, app: &mut App) {
         embedded_asset!(app, "tiles.wgsl");
         app.init_resource::<TileBorder>()
-            .register_type::<TileBorder>()
             .init_resource::<Faults>()
             .add_plugins(Material2dPlugin::<TileMaterial>::default())
             .add_systems(PostUpdate, update_tile_meshes.before(AssetEventSystems));

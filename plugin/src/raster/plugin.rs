@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{look, sensor::RasterSensor};
+use super::look;
 use crate::{
     systems::ObserveSchedule,
     vision::{VisionPlugin, VisionSystems},
@@ -15,8 +15,7 @@ pub struct RasterPlugin;
 impl Plugin for RasterPlugin {
     fn build(&self, app: &mut App) {
         VisionPlugin::add_to(app);
-        app.register_type::<RasterSensor>()
-            .init_resource::<Assets<Image>>()
+        app.init_resource::<Assets<Image>>()
             .init_resource::<Assets<TextureAtlasLayout>>()
             .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Render));
     }
