@@ -5,10 +5,10 @@ mod program;
 
 use std::{
     path::Path,
-    process::{Child, Command, Output, Stdio},
-    time::Duration,
+    process::{Command, Output, Stdio},
 };
 
+use playbot_shell::{at_work, kill, logged, results, steps};
 use program::{code, command, done, ended, errors, playbot};
 
 const UPDATES: usize = 120;
@@ -39,44 +39,6 @@ fn resume(folder: &Path, run: &str) -> Output {
     playbot(folder, &["train", "--resume", "--run", run])
 }
 
-/// Starts the program, and waits until it is at work.
-fn at_work(command: &mut Command, is_at_work: impl Fn() -> bool) -> Child {
-    let mut child = command.stderr(Stdio::null()).spawn().expect("the program starts");
-    while !is_at_work() {
-        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
-        std::thread::park_timeout(Duration::from_millis(1));
-    }
-    child
-}
-
-/// SIGKILL: no handler runs, whatever was being written stays as it is.
-fn kill(mut child: Child) {
-    child.kill().expect("it runs");
-    child.wait().expect("a child");
-}
-
-/// Metrics, and weights and arenas of the last checkpoint.
-fn results(run: &Path) -> Vec<Vec<u8>> {
-    let last = steps(run).pop().expect("a checkpoint");
-    let last = run.join("checkpoints").join(last);
-    [run.join("metrics.jsonl"), last.join("learner.safetensors"), last.join("arenas.json")]
-        .map(|path| std::fs::read(path).expect("readable"))
-        .to_vec()
-}
-
-/// Names of the checkpoints, in order.
-fn steps(run: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(run.join("checkpoints")).expect("a run");
-    let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
-    let mut names: Vec<_> = names.filter(|name| name.starts_with("step-")).collect();
-    names.sort();
-    names
-}
-
-fn logged(run: &Path) -> usize {
-    std::fs::read_to_string(run.join("metrics.jsonl")).unwrap_or_default().lines().count()
-}
-
 #[test]
 fn a_killed_training_goes_on_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -85,7 +47,7 @@ fn a_killed_training_goes_on_bit_for_bit() {
     assert!(whole.status.success(), "{}", errors(&whole));
 
     let run = folder.path().join("killed");
-    kill(at_work(&mut start(folder.path(), &["--run", "killed"]), || logged(&run) >= 5));
+    kill(at_work(start(folder.path(), &["--run", "killed"]).stderr(Stdio::null()), || logged(&run) >= 5));
     assert!(logged(&run) < UPDATES, "it was killed too late to prove anything");
     let resumed = resume(folder.path(), "killed");
     assert!(resumed.status.success(), "{}", errors(&resumed));
@@ -98,7 +60,7 @@ fn one_process_at_a_time_trains_in_a_folder() {
     write_experiment(folder.path(), "");
     let run = folder.path().join("busy");
     let mut endless = start(folder.path(), &["--run", "busy", "--steps", "100000000"]);
-    let mut child = at_work(&mut endless, || logged(&run) >= 3);
+    let mut child = at_work(endless.stderr(Stdio::null()), || logged(&run) >= 3);
     let before = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("written"));
     let second = [resume(folder.path(), "busy"), train(folder.path(), &["--run", "busy", "--force"])];
     // Who looks needs no lock.
@@ -211,7 +173,7 @@ fn a_killed_skill_training_goes_on_bit_for_bit() {
     done(folder.path(), &["record", "coinrun", "--levels", "easy:0..9", "--out", "few.demo"]);
     done(folder.path(), &learn("whole", &[]));
     let checkpoint = folder.path().join("killed.checkpoint");
-    kill(at_work(&mut command(folder.path(), &learn("killed", &[])), || checkpoint.exists()));
+    kill(at_work(command(folder.path(), &learn("killed", &[])).stderr(Stdio::null()), || checkpoint.exists()));
     assert!(checkpoint.exists() && !folder.path().join("killed").exists(), "it was killed too late");
     let (_, refused) = ended(folder.path(), &learn("killed", &[]), 3);
     assert!(refused.contains("--resume"), "{refused}");

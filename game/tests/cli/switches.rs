@@ -4,20 +4,11 @@ use std::{fs, path::Path, time::Instant};
 
 use serde_json::{Value, json};
 
-use crate::program::{code, errors, lines, playbot, said};
+use crate::program::{code, command, done, errors, json_lines, lines, playbot};
 
 /// Standard output, line by line as JSON, of a call that passes.
 fn rows(folder: &Path, args: &[&str]) -> Vec<Value> {
-    let output = playbot(folder, args);
-    assert_eq!(code(&output), 0, "{args:?}: {}", errors(&output));
-    lines(&output)
-}
-
-/// A call that passes.
-fn done(folder: &Path, args: &[&str]) -> (String, String) {
-    let output = playbot(folder, args);
-    assert_eq!(code(&output), 0, "{args:?}: {}", errors(&output));
-    (said(&output), errors(&output))
+    json_lines(&done(folder, args).0)
 }
 
 fn bytes(folder: &Path, file: &str) -> Vec<u8> {
@@ -229,9 +220,9 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
 fn what_happens_inside_is_told_to_those_who_ask() {
     let temporary = tempfile::tempdir().expect("a folder");
     let told = |more: &[&str]| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_playbot"));
-        command.args(["doctor", "maze2d", "--ticks", "2", "--seed", "6", "--json"]).args(more);
-        let output = command.current_dir(temporary.path()).env_remove("RUST_LOG").output().expect("the program starts");
+        let doctor = ["doctor", "maze2d", "--ticks", "2", "--seed", "6", "--json"];
+        let mut command = command(temporary.path(), &[&doctor[..], more].concat());
+        let output = command.env_remove("RUST_LOG").output().expect("the program starts");
         assert_eq!(code(&output), 0, "{}", errors(&output));
         let report = lines(&output).remove(0);
         assert_eq!((&report["ticks"], &report["seed"], &report["mode"]), (&json!(2), &json!(6), &json!("umaze")));

@@ -1,13 +1,13 @@
 //! Starting the program, and reading what it says.
 
-#![allow(dead_code, reason = "no test needs all of it")]
+#![allow(dead_code, unused_imports, reason = "no test needs all of it")]
 
 use std::{
     path::Path,
     process::{Command, Output},
 };
 
-use serde_json::Value;
+pub use playbot_shell::{code, errors, json_lines, lines, said};
 
 pub fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));
@@ -33,28 +33,5 @@ pub fn done(folder: &Path, args: &[&str]) -> (String, String) {
 
 /// What a call says that ends with this exit code: data and messages.
 pub fn ended(folder: &Path, args: &[&str], wanted: i32) -> (String, String) {
-    let output = playbot(folder, args);
-    let (out, err) = (said(&output), errors(&output));
-    assert_eq!(code(&output), wanted, "{args:?}: {out}{err}");
-    (out, err)
-}
-
-pub fn code(output: &Output) -> i32 {
-    output.status.code().expect("not killed")
-}
-
-pub fn errors(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-pub fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-pub fn lines(output: &Output) -> Vec<Value> {
-    json_lines(&said(output))
-}
-
-pub fn json_lines(text: &str) -> Vec<Value> {
-    text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+    playbot_shell::ended(command(folder, args), wanted)
 }

@@ -4,21 +4,17 @@ use std::{
     fs,
     path::Path,
     process::{Command, Output, Stdio},
-    time::Duration,
 };
+
+use playbot_shell::at_work;
 
 use crate::program::{code, command, errors, lines, playbot};
 
 const ENDLESS: u64 = 1_000_000_000;
 
 /// Starts the program, waits until it is at work, presses Ctrl-C and waits for its end.
-fn interrupted(folder: &Path, args: &[&str], at_work: impl Fn() -> bool) -> Output {
-    let mut command = command(folder, args);
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts");
-    while !at_work() {
-        assert!(child.try_wait().expect("a child").is_none(), "{args:?} ended by itself");
-        std::thread::park_timeout(Duration::from_millis(5));
-    }
+fn interrupted(folder: &Path, args: &[&str], is_at_work: impl Fn() -> bool) -> Output {
+    let child = at_work(command(folder, args).stdout(Stdio::null()).stderr(Stdio::piped()), is_at_work);
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a shell's kill");
     assert!(sent.success());
     let output = child.wait_with_output().expect("a child");

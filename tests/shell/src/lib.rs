@@ -1,14 +1,21 @@
 //! For tests: programs as people start them, from a shell and on a display of their own. Knows nothing of Bevy or of the
 //! plugin, only what a user sees: words, numbers, exit codes, files and windows.
 
+mod at_work;
 mod desk;
 mod examined;
 mod game_program;
+mod output;
 mod played;
 mod recorded;
+mod run_folder;
 mod shell;
+mod tests;
 mod trained;
 
+pub use at_work::{at_work, kill};
 pub use desk::{Desk, Seat};
 pub use game_program::GameProgram;
+pub use output::{code, ended, errors, json_lines, lines, said};
+pub use run_folder::{logged, results, steps};
 pub use shell::Shell;

@@ -3,10 +3,12 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output, Stdio},
+    process::{Command, Stdio},
 };
 
 use serde_json::Value;
+
+use crate::output::{ended, json_lines};
 
 /// A program, and a folder of its own in which it is started: empty at first, and gone with this.
 pub struct Shell {
@@ -37,25 +39,16 @@ impl Shell {
         command
     }
 
-    /// Runs the program to its end, well or not.
-    pub fn run(&self, args: &[&str]) -> Output {
-        self.command(args).output().expect("the program starts")
-    }
-
     /// Runs the program, which must find that all is well, and returns its standard output.
     #[track_caller]
     pub fn done(&self, args: &[&str]) -> String {
-        let output = self.run(args);
-        let [said, errors] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-        assert_eq!(output.status.code(), Some(0), "{args:?}\n{said}{errors}");
-        said
+        ended(self.command(args), 0).0
     }
 
     /// Runs the program, which must find that all is well, and returns its lines of JSON.
     #[track_caller]
     pub fn answers(&self, args: &[&str]) -> Vec<Value> {
-        let said = self.done(args);
-        said.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()
+        json_lines(&self.done(args))
     }
 
     /// Runs the program, which must find that all is well, and returns its only line of JSON.

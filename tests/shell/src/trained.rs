@@ -1,11 +1,13 @@
 //! Verbs around policies.
 
-use std::{fs, process::Stdio, time::Duration};
+use std::process::Stdio;
 
 use serde_json::Value;
 
 use crate::{
+    at_work::{at_work, kill},
     game_program::{GameProgram, TEST_LEVELS, UPDATES},
+    run_folder::{logged, results},
     shell::Shell,
 };
 
@@ -14,34 +16,6 @@ const TRAIN: [&str; 5] = ["train", "--experiment", "small.ron", "--skills", "ski
 /// Trains into the folder `run`.
 fn train(shell: &Shell, run: &str) {
     shell.done(&[&TRAIN[..], &["--run", run]].concat());
-}
-
-/// Metrics, and weights and arenas of the last checkpoint.
-fn results(shell: &Shell, run: &str) -> [Vec<u8>; 3] {
-    let entries = fs::read_dir(shell.path(run).join("checkpoints")).expect("a run");
-    let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
-    let last = names.filter(|name| name.starts_with("step-")).max().expect("a checkpoint");
-    ["metrics.jsonl", &format!("checkpoints/{last}/learner.safetensors"), &format!("checkpoints/{last}/arenas.json")]
-        .map(|name| shell.read(&format!("{run}/{name}")))
-}
-
-/// Updates that a run has logged.
-fn logged(shell: &Shell, run: &str) -> usize {
-    fs::read_to_string(shell.path(run).join("metrics.jsonl")).unwrap_or_default().lines().count()
-}
-
-/// Starts a training and kills it in its midst, as a power cut would.
-fn train_and_kill(shell: &Shell, run: &str) {
-    let mut command = shell.command(&[&TRAIN[..], &["--run", run]].concat());
-    let mut child = command.stderr(Stdio::null()).spawn().expect("the program starts");
-    while logged(shell, run) < 7 {
-        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was killed");
-        std::thread::park_timeout(Duration::from_millis(1));
-    }
-    // SIGKILL: no handler runs, whatever was being written stays as it is.
-    child.kill().expect("it runs");
-    child.wait().expect("a child");
-    assert!(logged(shell, run) < UPDATES, "it was killed too late to prove anything");
 }
 
 /// What `eval --json` says of one player.
@@ -61,11 +35,14 @@ impl GameProgram {
     pub fn a_killed_training_goes_on_bit_for_bit(&self) {
         let shell = self.with_skills();
         train(&shell, "whole");
-        assert_eq!(logged(&shell, "whole"), UPDATES);
-        train_and_kill(&shell, "killed");
+        let (whole, killed) = (shell.path("whole"), shell.path("killed"));
+        assert_eq!(logged(&whole), UPDATES);
+        let mut command = shell.command(&[&TRAIN[..], &["--run", "killed"]].concat());
+        kill(at_work(command.stderr(Stdio::null()), || logged(&killed) >= 7));
+        assert!(logged(&killed) < UPDATES, "it was killed too late to prove anything");
         shell.done(&["train", "--resume", "--run", "killed"]);
-        let [metrics, weights, arenas] = results(&shell, "whole");
-        let resumed = results(&shell, "killed");
+        let [metrics, weights, arenas] = results(&whole);
+        let resumed = results(&killed);
         assert!(metrics == resumed[0], "killing it changed the metrics");
         assert!(weights == resumed[1], "killing it changed the weights");
         assert!(arenas == resumed[2], "killing it changed what its arenas do");

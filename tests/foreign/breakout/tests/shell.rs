@@ -10,32 +10,12 @@ const GAME: GameProgram = GameProgram {
     key: "Left",
 };
 
-#[test]
-fn recordings_replay() {
-    GAME.recordings_replay();
-}
-
-#[test]
-fn moments_are_drawn() {
-    GAME.moments_are_drawn();
-}
-
-#[test]
-fn a_killed_training_goes_on_bit_for_bit() {
-    GAME.a_killed_training_goes_on_bit_for_bit();
-}
-
-#[test]
-fn a_policy_file_plays_as_its_run() {
-    GAME.a_policy_file_plays_as_its_run();
-}
-
-#[test]
-fn the_doctor_finds_nothing() {
-    GAME.the_doctor_finds_nothing();
-}
-
-#[test]
-fn what_a_window_records_replays() {
-    GAME.what_a_window_records_replays();
+playbot_shell::tests! {
+    GAME:
+    recordings_replay,
+    moments_are_drawn,
+    a_killed_training_goes_on_bit_for_bit,
+    a_policy_file_plays_as_its_run,
+    the_doctor_finds_nothing,
+    what_a_window_records_replays,
 }

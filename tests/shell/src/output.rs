@@ -1,0 +1,42 @@
+//! What a program said, and how it ended.
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Its exit code.
+#[track_caller]
+pub fn code(output: &Output) -> i32 {
+    output.status.code().expect("not killed")
+}
+
+/// Its messages to people.
+pub fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Its data.
+pub fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Its data, where every line is JSON.
+#[track_caller]
+pub fn lines(output: &Output) -> Vec<Value> {
+    json_lines(&said(output))
+}
+
+/// A text of which every line is JSON.
+#[track_caller]
+pub fn json_lines(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()
+}
+
+/// Runs a program, which must end with this exit code, and returns its data and messages.
+#[track_caller]
+pub fn ended(mut command: Command, wanted: i32) -> (String, String) {
+    let output = command.output().expect("the program starts");
+    let (out, err) = (said(&output), errors(&output));
+    assert_eq!(code(&output), wanted, "{command:?}: {out}{err}");
+    (out, err)
+}
