@@ -145,6 +145,7 @@ fn load_level(mut commands: Commands, level: Res<Level>, mut map: ResMut<Map>, m
     }
     for _ in 0..12 {
         let Some(column) = map.columns.get(map.built) else {
+            spawn_ground(&mut commands, &map.columns);
             spawn_hero(&mut commands, f32::from(map.columns[1].ground));
             return next.set(Screen::Playing);
         };
@@ -157,7 +158,7 @@ fn spawn_column(commands: &mut Commands, index: usize, column: Column) {
     let (x, top) = (index as f32 + 0.5, f32::from(column.ground));
     if column.ground > 0 {
         let sprite = Sprite::from_color(Color::srgb(0.35, 0.55, 0.3), Vec2::new(1.0, top));
-        commands.spawn((InLevel, sprite, Transform::from_xyz(x, top / 2.0, 0.0), Collider::cuboid(0.5, top / 2.0)));
+        commands.spawn((InLevel, sprite, Transform::from_xyz(x, top / 2.0, 0.0)));
     }
     let mut place = |thing: Thing, color: Color, half: Vec2, y: f32| {
         let sprite = Sprite::from_color(color, half * 2.0);
@@ -173,6 +174,20 @@ fn spawn_column(commands: &mut Commands, index: usize, column: Column) {
     if index == FLAG_COLUMN {
         place(Thing::Flag, Color::srgb(1.0, 0.8, 0.2), Vec2::new(0.1, 2.0), 2.0);
     }
+}
+
+/// One body without seams between columns of one height, over which the hero would trip.
+fn spawn_ground(commands: &mut Commands, columns: &[Column]) {
+    let mut left = 0.0;
+    let mut blocks = Vec::new();
+    for run in columns.chunk_by(|a, b| a.ground == b.ground) {
+        let half = Vec2::new(run.len() as f32, f32::from(run[0].ground)) / 2.0;
+        if half.y > 0.0 {
+            blocks.push((Vec2::new(left + half.x, half.y), 0.0, Collider::cuboid(half.x, half.y)));
+        }
+        left += run.len() as f32;
+    }
+    commands.spawn((InLevel, Transform::default(), Collider::compound(blocks)));
 }
 
 fn spawn_hero(commands: &mut Commands, ground: f32) {

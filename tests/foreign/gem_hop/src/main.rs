@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use EpisodeEnd::Terminated;
 use KeyCode::{ArrowLeft, ArrowRight, Space};
-use Screen::{Lost, Playing, Won};
+use Screen::{Loading, Lost, Playing, Won};
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Run, Screen};
 use playbot_lab::{
@@ -15,23 +15,21 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, start)
+    playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, game::game)
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe("x y vx vy coyote".split(' ').map(String::from).chain((0..24).map(|i| format!("ahead {i}"))), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
         .end(|on: Res<State<Screen>>| matches!(**on, Won | Lost).then(|| Terminated { success: **on == Won }))
-        .restart(Restart::Rebuild)
+        .restart(Restart::Startup)
+        .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
+            level.0 = seed.0;
+            next.set(Loading);
+        })
         .ready(in_state(Playing))
         .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
             let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
             2 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
         })])
-}
-
-/// The game loads the level of its episode. Each episode has a World of its own, since rapier's contacts depend on what was
-/// before.
-fn start(app: &mut App) {
-    game::game(app.add_systems(PreStartup, |seed: Res<LevelSeed>, mut level: ResMut<Level>| level.0 = seed.0));
 }
 
 /// The hero's place and motion, and the ground, spikes and gems of the next eight columns.

@@ -1,6 +1,6 @@
 //! The verbs of the command line, as users call them.
 
-use playbot_shell::{Desk, GameProgram, Shell};
+use playbot_shell::GameProgram;
 
 const GAME: GameProgram = GameProgram {
     program: env!("CARGO_BIN_EXE_foreign_gem_hop"),
@@ -10,36 +10,12 @@ const GAME: GameProgram = GameProgram {
     key: "Right",
 };
 
-#[test]
-fn recordings_replay() {
-    GAME.recordings_replay();
-}
-
-#[test]
-fn moments_are_drawn() {
-    GAME.moments_are_drawn();
-}
-
-#[test]
-fn a_killed_training_goes_on_bit_for_bit() {
-    GAME.a_killed_training_goes_on_bit_for_bit();
-}
-
-#[test]
-fn a_policy_file_plays_as_its_run() {
-    GAME.a_policy_file_plays_as_its_run();
-}
-
-#[test]
-fn the_doctor_finds_nothing() {
-    GAME.the_doctor_finds_nothing();
-}
-
-#[test]
-fn a_window_cannot_be_built_anew() {
-    let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
-    let output = desk.command(shell.folder(), &["play", GAME.game]).output().expect("the program starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("`Restart::Rebuild`") && said.contains("`Restart::Startup`"), "{said}");
+playbot_shell::tests! {
+    GAME:
+    recordings_replay,
+    moments_are_drawn,
+    a_killed_training_goes_on_bit_for_bit,
+    a_policy_file_plays_as_its_run,
+    the_doctor_finds_nothing,
+    what_a_window_records_replays,
 }
