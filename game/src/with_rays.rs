@@ -1,5 +1,5 @@
-//! Maze games for agents that know where they are: the same games with the goal's direction and the distance of the walls around added to
-//! what an agent is told.
+//! Maze games for agents that know where they are: the same games with the goal's direction and the distance of the walls
+//! around added to what an agent is told.
 //!
 //! In the originals an agent knows its own state only. That will do on one map, which can be learned by heart; in a maze
 //! that nobody has seen it leaves nothing but wandering about.
@@ -30,8 +30,8 @@ pub const WAYS: [(&str, [f64; 2]); 8] = {
     ]
 };
 
-/// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the distance
-/// of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
+/// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the
+/// distance of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
 pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
     observation.vector.extend(to_goal);
     observation.vector.extend(WAYS.map(|(_, way)| wall(way)));

@@ -86,7 +86,7 @@ fn it_plays_without_a_screen() {
     world.ticks(3).expect("the picture has arrived, and nothing is missing");
     let seen = world.get::<Observation>(agents[0]).expect("an agent").vector.clone();
     assert_eq!(seen, [2.0, 16.0], "after two ticks, with a picture of 16 pixels");
-    while world.get::<Control>(agents[0]).is_some_and(|control| control.is_active()) {
+    while Control::of(&world, agents[0]).is_active() {
         world.tick().expect("sound");
     }
     let count = world.get::<EpisodeCount>(agents[0]).expect("an agent");

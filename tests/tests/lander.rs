@@ -9,7 +9,7 @@ mod lander;
 #[allow(dead_code, reason = "its `main` opens a window")]
 mod lander_window;
 
-use bevy::prelude::{ButtonInput, KeyCode};
+use bevy::prelude::{App, ButtonInput, KeyCode};
 use bevy_playbot::{
     headless::set_tick_rate,
     policy_file::{PolicyFile, check_policy, install_policy},
@@ -51,12 +51,17 @@ fn the_lander_goes_the_whole_road() {
 }
 
 /// The game of `lander_window` without its window: the policy that is part of the program plays.
-#[test]
-fn the_policy_that_is_shipped_lands_softly_on_levels_that_it_has_not_seen() {
+fn shipped() -> App {
     let mut app = headless_app();
     set_tick_rate(&mut app, TICK_HZ);
     lander_window::lander_rules::rules::add_rules(&mut app);
     lander_window::add_shipped_policy(&mut app).expect("made for these rules");
+    app
+}
+
+#[test]
+fn the_policy_that_is_shipped_lands_softly_on_levels_that_it_has_not_seen() {
+    let mut app = shipped();
     let levels = LevelQueue::list((64..128).collect::<Vec<_>>());
     let capsule = lander_window::lander_rules::rules::capsule(0);
     let agent = app.world_mut().spawn((capsule, Control::Policy, levels)).id();
@@ -70,10 +75,7 @@ fn the_policy_that_is_shipped_lands_softly_on_levels_that_it_has_not_seen() {
 
 #[test]
 fn f9_gives_the_controls_and_takes_them_back() {
-    let mut app = headless_app();
-    set_tick_rate(&mut app, TICK_HZ);
-    lander_window::lander_rules::rules::add_rules(&mut app);
-    lander_window::add_shipped_policy(&mut app).expect("made for these rules");
+    let mut app = shipped();
     // The first tick has a frame before it, which starts the clock.
     app.tick().expect("sound");
     let mut keys = ButtonInput::default();

@@ -86,14 +86,19 @@ fn with_input_managers() {
     }
 }
 
+/// What is open in a World after some ticks of random play.
+fn open_after(ticks: u64, (mut world, agents): (World, Vec<Entity>)) -> Vec<String> {
+    leave_open(&mut world);
+    world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
+    world.ticks(ticks).expect("sound");
+    world.ambiguous_orders(&OURS)
+}
+
 #[test]
 fn in_worlds_of_foreign_games() {
     for game in [catch_game(), rooms_game()] {
-        let (mut world, agents) = build_world(&game, "default", 1, 0, 1);
-        leave_open(&mut world);
-        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
-        world.ticks(5).expect("sound");
-        assert_eq!(world.ambiguous_orders(&OURS), NONE, "{}", game.name());
+        let built = build_world(&game, "default", 1, 0, 1);
+        assert_eq!(open_after(5, built), NONE, "{}", game.name());
     }
 }
 
@@ -103,15 +108,12 @@ fn in_worlds_of_all_games_with_pictures_and_without() {
         GAMES.iter().flat_map(|game| [ObservationKind::Vector, ObservationKind::Raster].map(|kind| (game, kind)))
     {
         let config = ObservationConfig { kind, ..default() };
-        let (mut world, agents) = match build_observing_world(*game, game.modes()[0], &config, 1, 0, 1) {
+        let built = match build_observing_world(*game, game.modes()[0], &config, 1, 0, 1) {
             Ok(built) => built,
             Err(_) if kind == ObservationKind::Raster => continue,
             Err(error) => panic!("{}: {error}", game.name()),
         };
-        leave_open(&mut world);
-        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
-        world.ticks(3).expect("sound");
-        assert_eq!(world.ambiguous_orders(&OURS), NONE, "{} {kind}", game.name());
+        assert_eq!(open_after(3, built), NONE, "{} {kind}", game.name());
     }
 }
 

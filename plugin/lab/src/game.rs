@@ -156,7 +156,8 @@ pub trait Game: Send + Sync {
     /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
     fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 
-    /// The experiment of the game that serves where none is named; `None` for the plainest one, see [`default_experiment`](crate::train::default_experiment::default_experiment).
+    /// The experiment of the game that serves where none is named; `None` for the plainest one, see
+    /// [`default_experiment`](crate::train::default_experiment::default_experiment).
     fn experiment(&self) -> Option<ExperimentText> {
         None
     }

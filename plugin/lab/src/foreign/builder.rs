@@ -90,8 +90,8 @@ impl ForeignGame {
         self.with(|description| description.input.whole = Some(input))
     }
 
-    /// Actions that a system hands to the game: it finds the agent's [`Action`](bevy_playbot::action::Action) and runs in every
-    /// tick before the game, unless a person plays.
+    /// Actions that a system hands to the game: it finds the agent's [`Action`](bevy_playbot::action::Action) and runs in
+    /// every tick before the game, unless a person plays.
     pub fn actions<M: 'static>(
         self,
         space: ActionSpace,
