@@ -3,7 +3,7 @@
 use playbot_games::antmaze::{AntMaze, components::MazeAnt, geometry::distance};
 use playbot_lab::prelude::*;
 
-use crate::arena::{ended, level, place, put, world_with};
+use super::arena::{ended, level, place, put, world_with};
 
 #[test]
 fn the_first_observation_is_the_reset_in_the_order_of_the_original() {

@@ -6,7 +6,7 @@ use playbot_games::antmaze::AntMaze;
 use playbot_lab::{demo::verify::verify_file, parallel::on_threads, prelude::*, worlds::build_world};
 use playbot_tests::recording::record_random;
 
-use crate::arena::{act, world_with};
+use super::arena::{act, world_with};
 
 /// State hashes of each agent's whole episodes, agent by agent.
 fn traces(worlds: &mut [(World, Vec<Entity>)], threads: usize, ticks: u32) -> Vec<Vec<u64>> {

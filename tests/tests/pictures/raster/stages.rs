@@ -7,7 +7,7 @@ use bevy_playbot::{
 };
 use playbot_lab::prelude::*;
 
-use crate::eye::{BLUE, GREEN, RED, WHITE, four, frame, looking, raster_world, spawn_eye};
+use super::eye::{BLUE, GREEN, RED, WHITE, four, frame, looking, raster_world, spawn_eye};
 
 /// A stage with a sprite, an agent and, on a stage of its own inside, something that nobody else sees.
 fn spawn_stage(world: &mut World, index: u32, place: Transform, sprite: &Sprite) -> Entity {

@@ -1,11 +1,11 @@
 //! The example `lander` goes the whole road, and what it ships plays in an app of `bevy_playbot` alone.
 #![allow(clippy::duplicate_mod, reason = "two examples share the rules of their game")]
 
-#[path = "../../plugin/lab/examples/lander.rs"]
+#[path = "../../../plugin/lab/examples/lander.rs"]
 #[allow(dead_code, reason = "its `main` is for those who run the example")]
 mod lander;
 
-#[path = "../../plugin/examples/lander_window.rs"]
+#[path = "../../../plugin/examples/lander_window.rs"]
 #[allow(dead_code, reason = "its `main` opens a window")]
 mod lander_window;
 

@@ -9,7 +9,7 @@ use bevy_playbot::{
     virtual_input::{ActionAxis, InputRoute, VirtualInput},
 };
 
-use crate::scripted::{STEP, Script, app_with, frames_of};
+use super::scripted::{STEP, Script, app_with, frames_of};
 
 #[derive(Resource, Default)]
 struct Motions {

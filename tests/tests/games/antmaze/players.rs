@@ -16,7 +16,7 @@ use playbot_lab::{
 use playbot_learner::{DeviceKind, PolicyFile};
 use playbot_tests::measuring::plan;
 
-use crate::arena::place;
+use super::arena::place;
 
 #[test]
 fn demonstrations_follow_the_noise_that_is_asked_for() {

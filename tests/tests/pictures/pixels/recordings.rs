@@ -3,7 +3,7 @@
 use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
 use playbot_tests::PaintedCorridor;
 
-use crate::corridor::{demonstrations, experiment, record};
+use super::corridor::{demonstrations, experiment, record};
 
 #[test]
 fn recordings_show_the_same_pictures_whoever_replays_them() {

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_playbot::vision::TileLayer;
 
-use crate::eye::{BLUE, GREEN, RED, WHITE, add, frame, looking, text};
+use super::eye::{BLUE, GREEN, RED, WHITE, add, frame, looking, text};
 
 const GREY: [u8; 4] = [200, 200, 200, 255];
 

@@ -9,7 +9,7 @@ use playbot_lab::{
 use playbot_learner::{DeviceKind, Observations};
 use playbot_tests::{Corridor, PaintedCorridor, training::untrained};
 
-use crate::corridor::{experiment, record, skills};
+use super::corridor::{experiment, record, skills};
 
 #[test]
 fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use playbot_lab::prelude::*;
 
-use crate::arena::{act, put, world_with};
+use super::arena::{act, put, world_with};
 
 #[test]
 fn actions_outside_the_range_are_clipped_and_counted() {

@@ -8,7 +8,7 @@ use bevy_playbot::{
 use playbot_lab::prelude::*;
 use playbot_tests::scene::image;
 
-use crate::eye::{GREEN, RED, add, fault, four, looking};
+use super::eye::{GREEN, RED, add, fault, four, looking};
 
 /// An image without a single texel.
 fn empty(world: &mut World, [width, height]: [u32; 2]) -> Handle<Image> {

@@ -9,7 +9,7 @@ use bevy_playbot::{
     virtual_input::{InputRoute, PressesForPeople, VirtualDevices, VirtualInput, VirtualInputPlugin},
 };
 
-use crate::scripted::{InFrames, STEP, Script, actions, app_with, frames, frames_of, left, ticks};
+use super::scripted::{InFrames, STEP, Script, actions, app_with, frames, frames_of, left, ticks};
 
 /// What every run of a fixed tick must see of the script nothing, left, left, nothing, nothing, left.
 const SEEN: [&str; 6] = ["", "Pd", "P", "u", "", "Pd"];

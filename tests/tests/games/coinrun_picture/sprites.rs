@@ -10,7 +10,7 @@ use playbot_games::coinrun::{
 };
 use playbot_lab::prelude::*;
 
-use crate::arena::{JUMP, LEFT, NOTHING, RIGHT, drawn, look, play, press, sprite};
+use super::arena::{JUMP, LEFT, NOTHING, RIGHT, drawn, look, play, press, sprite};
 
 #[test]
 fn what_is_drawn_is_where_the_game_says() {

@@ -18,7 +18,7 @@ use playbot_tests::{
     training::{train, written},
 };
 
-use crate::corridor::{experiment, record, skills};
+use super::corridor::{experiment, record, skills};
 
 fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer {
     let skills = algorithm.needs_skills().then_some(skills);

@@ -7,7 +7,7 @@ use playbot_games::coinrun::{
 };
 use playbot_lab::prelude::*;
 
-use crate::arena::{NOTHING, drawn, look, play, press, sprite};
+use super::arena::{NOTHING, drawn, look, play, press, sprite};
 
 /// The sprites behind the only enemy, each with depth, left and right end, lower and upper end; and the enemy.
 fn puffs(world: &mut World) -> (Vec<[f32; 5]>, Body) {

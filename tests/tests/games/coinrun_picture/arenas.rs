@@ -13,7 +13,7 @@ use playbot_games::coinrun::{
 };
 use playbot_lab::{prelude::*, worlds::build_world};
 
-use crate::arena::{NOTHING, drawn, play, press};
+use super::arena::{NOTHING, drawn, play, press};
 
 #[test]
 fn levels_come_and_go_without_a_trace() {

@@ -3,7 +3,7 @@
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::Frame;
 
-use crate::eye::{BLUE, GREEN, RED, WHITE, add, fault, four, looking, text};
+use super::eye::{BLUE, GREEN, RED, WHITE, add, fault, four, looking, text};
 
 #[test]
 fn a_sprite_lies_in_the_middle() {

@@ -7,7 +7,7 @@ use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_games::{ant::Ant, antmaze::AntMaze};
 use playbot_lab::{prelude::*, worlds::build_observing_world};
 
-use crate::arena::put;
+use super::arena::put;
 
 #[test]
 fn pictures_show_floor_walls_ant_and_goal() {

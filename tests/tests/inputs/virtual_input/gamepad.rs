@@ -6,7 +6,7 @@ use bevy_playbot::{
     virtual_input::{ActionAxis, InputRoute, VirtualGamepad, VirtualInput},
 };
 
-use crate::scripted::app_with;
+use super::scripted::app_with;
 
 #[test]
 fn an_agent_plays_on_a_gamepad_of_its_own() {

@@ -1,0 +1,15 @@
+//! Agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
+
+mod episodes;
+mod faults;
+mod lander;
+mod orders;
+mod pipeline;
+mod recording;
+mod rewards;
+mod skills_held;
+mod takeover;
+mod trails;
+mod training;
+mod truncation;
+mod vision;

@@ -1,0 +1,4 @@
+//! The doctor and games with planted faults.
+
+mod foreign;
+mod planted;

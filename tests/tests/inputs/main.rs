@@ -1,0 +1,6 @@
+//! What an agent's action presses, and what a person's keys become.
+
+mod foreign;
+mod keyboard;
+mod managers;
+mod virtual_input;

@@ -1,0 +1,6 @@
+//! Camera sensors.
+
+mod errors;
+mod of;
+mod sensor;
+mod ticks;
