@@ -4,8 +4,8 @@
 //! In the originals an agent knows its own state only. That will do on one map, which can be learned by heart; in a maze
 //! that nobody has seen it leaves nothing but wandering about.
 
-use bevy::prelude::*;
-use bevy_playbot::vision::Picture;
+use bevy::{app::PluginGroupBuilder, prelude::*};
+use bevy_playbot::{headless_plugins::HeadlessPlugins, vision::Picture};
 use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
@@ -67,10 +67,15 @@ impl<G: SenseRays> Game for WithRays<G> {
         fn family(mode: &str) -> String;
         fn fingerprint(mode: &str, level: u64) -> Option<u64>;
         fn tick_hz() -> f64;
+        fn placement() -> TickPlacement;
+        fn headless_plugins(usual: HeadlessPlugins) -> PluginGroupBuilder;
+        fn arenas_per_world() -> Option<u32>;
+        fn problem() -> Option<String>;
         fn actions() -> ActionSpace;
         fn action_names() -> Vec<String>;
         fn key_bindings() -> Option<KeyBindings>;
         fn picture() -> Option<Picture>;
+        fn has_camera() -> bool;
         fn build_picture(app: &mut App);
         fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
         fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;

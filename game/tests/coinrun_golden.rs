@@ -221,7 +221,7 @@ impl Means {
                 sums[0] += paid;
                 sums[1] += f64::from(sim.steps());
                 sums[2] += f64::from(u8::from(sim.end().is_some_and(Outcome::is_success)));
-                sums[3] += f64::from(u8::from(sim.end().is_some_and(Outcome::is_timeout)));
+                sums[3] += f64::from(u8::from(sim.end() == Some(Outcome::Timeout)));
             }
             let share = wins / f64::from(passes);
             variance += 100.0 * share * (1.0 - share) / f64::from(passes);

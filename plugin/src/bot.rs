@@ -18,7 +18,7 @@
 //! ```
 
 use bevy::prelude::*;
-use playbot_learner::{Action as ActionValue, ActionSpace};
+use playbot_learner::{Action as ActionValue, ActionSpace, rng::normal};
 use rand::RngExt;
 
 use crate::{action::Action, agent::Agent, control::Control, episode::Episode, streams::AgentStreams};
@@ -55,5 +55,20 @@ pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     match space {
         ActionSpace::Discrete(n) => ActionValue::Discrete(rng.random_range(0..*n as u32)),
         ActionSpace::Continuous(n) => ActionValue::Continuous((0..*n).map(|_| rng.random_range(-1.0..=1.0)).collect()),
+    }
+}
+
+/// What a demonstrator plans to do, with noise: the probability with which a discrete action is replaced by a uniformly
+/// random one, or the standard deviation of the normal noise on each value of a continuous one. Without noise nothing is drawn
+/// and the action stays what it is.
+#[doc(hidden)]
+pub fn with_noise(planned: ActionValue, space: &ActionSpace, noise: f64, rng: &mut impl rand::Rng) -> ActionValue {
+    match planned {
+        ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => uniform(space, rng),
+        ActionValue::Continuous(values) if noise > 0.0 => {
+            let noisy = |value: f32| (value + noise as f32 * normal(rng)).clamp(-1.0, 1.0);
+            ActionValue::Continuous(values.into_iter().map(noisy).collect())
+        }
+        planned => planned,
     }
 }

@@ -65,6 +65,12 @@ pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
     step
 }
 
+/// Gives every frame the same length, however long it takes: `hz` frames are a second of game time. With a window, it is
+/// for the window to draw no more than that.
+pub fn set_frame_rate(app: &mut App, hz: f64) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / hz)));
+}
+
 /// An app with all that Bevy brings, except a screen, for games in which a frame is a tick:
 /// [`HeadlessPlugins`](crate::headless_plugins::HeadlessPlugins), with or without a renderer, and [`PlaybotPlugin`] under [`TickPlacement::Frame`].
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
@@ -74,13 +80,6 @@ pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
     app.add_plugins((plugins, PlaybotPlugin { placement: TickPlacement::Frame }));
     set_frame_rate(&mut app, hz);
     app
-}
-
-/// Gives every frame the same length, however long it takes: `hz` frames are a second of game time. With a window, it is
-/// for the window to draw no more than that.
-#[doc(hidden)]
-pub fn set_frame_rate(app: &mut App, hz: f64) {
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / hz)));
 }
 
 /// Finishes an app's plugins and takes its World, so that it can move to another thread.

@@ -64,7 +64,7 @@ impl Plugin for KeyboardPlugin {
 }
 
 pub(crate) fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
-    // Nothing asks for the order of these.
+    // They come in no certain order, and none is needed: they are only searched.
     tapped.0.extend(keys.get_just_pressed());
 }
 

@@ -9,8 +9,8 @@
 //! - A *level* is named by a number. The plugin picks it from the agent's [`LevelQueue`](level::LevelQueue) and triggers
 //!   [`StartEpisode`](episode::StartEpisode); the game builds the level in an observer.
 //! - An episode ends as [`Terminated`](episode::EpisodeEnd::Terminated) (the game is over: won or lost) or
-//!   [`Truncated`](episode::EpisodeEnd::Truncated) (time is up). The two are never merged, because only the first one
-//!   says that nothing was to be had afterwards.
+//!   [`Truncated`](episode::EpisodeEnd::Truncated) (time is up). The two are never merged: after a termination there is
+//!   no more reward to expect, after a truncation there would have been.
 //! - A [`SkillPrior`](skill_prior::SkillPrior) draws a skill z for each agent every T ticks; a policy decodes it into
 //!   actions together with the observation.
 //! - [`demo`] records who did what, and replays it to the bit.
@@ -21,10 +21,15 @@
 //! # One tick
 //!
 //! ```text
-//! FixedPreUpdate   PlaybotSystems::Begin → Observe → Decide → Act
+//! FixedPreUpdate   PlaybotSystems::Begin → Load → Observe → Decide → Act
 //! FixedUpdate      the game
 //! FixedPostUpdate  PlaybotSystems::Judge → Record → Reset
 //! ```
+//!
+//! `Load` is for games whose levels take several frames to build: until [`Episode::ready`](episode::Episode::ready) is
+//! called, nothing is observed, decided or counted for the agent. For a game that simulates in `Update` each frame is a
+//! tick ([`TickPlacement::Frame`](placement::TickPlacement::Frame)): the first line then runs in `PreUpdate`, the last in
+//! `Last`.
 //!
 //! # A game in thirty lines
 //!
@@ -106,6 +111,7 @@ pub mod policy;
 pub mod policy_file;
 pub mod prelude;
 pub mod raster;
+#[doc(hidden)]
 pub mod renewal;
 pub mod reward;
 pub mod skill_prior;

@@ -129,14 +129,20 @@ pub(crate) fn guard(world: &mut World, work: impl FnOnce(&mut World) -> Result<(
     if world.contains_resource::<Broken>() {
         return Err(Fault("the game has panicked before, and its World cannot go on".to_owned()));
     }
+    hear(|| work(world)).unwrap_or_else(|words| {
+        world.insert_resource(Broken);
+        Err(Fault(report(world, &words)))
+    })
+}
+
+/// Does what may panic. The words of a panic are returned instead of printed; what the work has left behind may be half of
+/// something.
+pub fn hear<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     hear_panics();
     let outer = GUARDED.replace(true);
-    let result = catch_unwind(AssertUnwindSafe(|| work(world)));
+    let result = catch_unwind(AssertUnwindSafe(work));
     GUARDED.set(outer);
-    result.unwrap_or_else(|_| {
-        world.insert_resource(Broken);
-        Err(Fault(report(world, &WORDS.take())))
-    })
+    result.map_err(|_| WORDS.take())
 }
 
 /// Says where the game has panicked, and keeps the way there.

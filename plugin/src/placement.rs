@@ -81,20 +81,7 @@ impl TickSchedules {
 #[doc(hidden)]
 pub struct FrameGate {
     frames: u64,
-    held: bool,
     is_tick: bool,
-}
-
-impl FrameGate {
-    /// Lets no frame be a tick until it is let go again: for a window whose player pauses. Frames go on.
-    pub fn hold(&mut self, held: bool) {
-        self.held = held;
-    }
-
-    /// Whether this frame is a tick.
-    pub fn is_tick(&self) -> bool {
-        self.is_tick
-    }
 }
 
 pub(crate) fn begin_frame(mut gate: ResMut<FrameGate>) {
@@ -104,7 +91,7 @@ pub(crate) fn begin_frame(mut gate: ResMut<FrameGate>) {
 
 /// Whether agents may be given levels in this frame.
 pub(crate) fn has_begun(gate: Res<FrameGate>) -> bool {
-    gate.frames > 1 && !gate.held
+    gate.frames > 1
 }
 
 /// A run condition: whether this frame is a tick. Always under [`TickPlacement::Fixed`], where systems run in ticks only.

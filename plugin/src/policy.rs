@@ -27,8 +27,6 @@
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations, Policy};
 
-pub use crate::streams::{AgentStreams, PlaybotSeed};
-
 use crate::{
     action::Action,
     agent::{Agent, AgentOrder},
@@ -36,7 +34,8 @@ use crate::{
     episode::Episode,
     fault::Faults,
     observation::{Observation, start_batch},
-    skill_prior::ActiveSkill,
+    skill_prior::{ActiveSkill, SkillPrior},
+    streams::AgentStreams,
     vision::{ImageSensor, seen_as},
 };
 
@@ -59,6 +58,17 @@ pub struct ActivePolicy {
     pub policy: Policy,
     /// How actions are drawn.
     pub draw: ActionDraw,
+}
+
+impl ActivePolicy {
+    /// Lets it drive the agents of this World, with skills from this prior, or with none. What was there before goes.
+    pub fn install(self, world: &mut World, skills: Option<SkillPrior>) {
+        world.insert_resource(self);
+        match skills {
+            Some(skills) => world.insert_resource(skills),
+            None => drop(world.remove_resource::<SkillPrior>()),
+        }
+    }
 }
 
 /// What the policy thought when it chose the action of this tick.

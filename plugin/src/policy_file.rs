@@ -43,14 +43,14 @@ use crate::{
     action::ActionSpace,
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,
-    vision::{ObservationConfig, UnknownObservation, VisionError},
+    vision::{ObservationConfig, UnknownObservation},
 };
 
 /// What a game says of itself: a policy that was made for another game, or another state of this one, does not fit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GameCard {
+pub struct GameCard<'a> {
     /// Name of the game.
-    pub name: &'static str,
+    pub name: &'a str,
     /// Version of its rules.
     pub version: u32,
     /// Names of the observation's values.
@@ -99,17 +99,19 @@ pub enum PolicyMisfit {
     #[error(transparent)]
     ObservationConfig(#[from] UnknownObservation),
     /// The policy reads pictures, and the game cannot be drawn.
-    #[error("the policy reads {observation_config}, but {error}")]
-    Vision {
+    #[error("the policy reads {observation_config}, but `{game}` cannot be drawn")]
+    NoPicture {
+        /// This game.
+        game: String,
         /// What the policy reads.
         observation_config: ObservationConfig,
-        /// Why the game cannot show it.
-        error: VisionError,
     },
     /// The observation has changed.
     #[error(
         "the policy reads {made_for} observation values and `{game}` gives {now}; the first difference is at number \
-         {at}: `{expected}` there, `{found}` here"
+         {at}: {} there, {} here",
+        quoted(.expected),
+        quoted(.found)
     )]
     Observation {
         /// This game.
@@ -149,6 +151,11 @@ pub enum PolicyMisfit {
     },
 }
 
+/// A name as messages have it.
+fn quoted(name: &str) -> String {
+    if name.is_empty() { "nothing".to_owned() } else { format!("`{name}`") }
+}
+
 /// What a policy sees: the sensor that its agents need.
 ///
 /// # Errors
@@ -164,7 +171,7 @@ pub fn policy_observation(file: &PolicyFile) -> Result<ObservationConfig, Unknow
 /// # Errors
 ///
 /// [`PolicyMisfit`] with the first difference.
-pub fn check_policy(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+pub fn check_policy(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
     let (card, name) = (&file.card, game.name.to_owned());
     if card.game != name {
         return Err(PolicyMisfit::Game { made_for: card.game.clone(), game: name });
@@ -176,7 +183,7 @@ pub fn check_policy(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisf
     if !observation_config.is_image() {
         check_names(game, file)?;
     } else if !game.has_picture {
-        return Err(PolicyMisfit::Vision { observation_config, error: VisionError::NoPicture { game: game.name } });
+        return Err(PolicyMisfit::NoPicture { game: name, observation_config });
     }
     if file.policy.action_space() != game.actions {
         return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions });
@@ -191,7 +198,7 @@ pub fn check_policy(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisf
 }
 
 /// Compares the names of the values that the policy reads with those of the game.
-fn check_names(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+fn check_names(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
     let (card, names) = (&file.card, &game.observations);
     let reads = file.policy.obs_dim();
     if reads != card.observations.len() {
@@ -216,11 +223,6 @@ fn check_names(game: &GameCard, file: &PolicyFile) -> Result<(), PolicyMisfit> {
 /// [`Control::Policy`](crate::control::Control::Policy). An agent of a policy that reads pictures carries the sensor that
 /// [`policy_observation`] names.
 pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
-    world.insert_resource(ActivePolicy { policy: file.policy.clone(), draw });
-    match &file.skills {
-        Some(skills) => world.insert_resource(SkillPrior::from(skills)),
-        None => {
-            world.remove_resource::<SkillPrior>();
-        }
-    }
+    let active = ActivePolicy { policy: file.policy.clone(), draw };
+    active.install(world, file.skills.as_ref().map(SkillPrior::from));
 }

@@ -25,10 +25,11 @@ pub use crate::{
     placement::TickPlacement,
     plugin::PlaybotPlugin,
     plugins::PlaybotPlugins,
-    policy::{ActionDraw, ActivePolicy, PlaybotSeed},
+    policy::{ActionDraw, ActivePolicy},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior},
     state_hash::StateHash,
+    streams::PlaybotSeed,
     systems::{ObserveSchedule, PlaybotSystems},
     virtual_input::{VirtualInput, VirtualInputPlugin},
 };

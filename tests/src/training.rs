@@ -8,7 +8,7 @@ use playbot_lab::{
     train::{
         Experiment, Trainer,
         checkpoint::Which,
-        run_dir::{RunDir, RunInfo},
+        run_dir::{OpenedRun, RunDir, RunInfo},
     },
 };
 use playbot_learner::{DeviceKind, Learner as _, Policy, PolicySpec, PpoConfig, PpoLearner};
@@ -29,7 +29,7 @@ pub fn run_info(experiment: &Experiment) -> RunInfo {
 /// Trains to the end, or until so many updates are done, and saves. What is in the folder already is gone on with.
 pub fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
     let run = match folder.exists() {
-        true => RunDir::open(folder).expect("a run").0,
+        true => RunDir::open(folder).expect("a run").run,
         false => RunDir::create(folder, trainer.experiment(), &run_info(trainer.experiment()), false).expect("fresh"),
     };
     while !trainer.is_done() && stop_after.is_none_or(|updates| trainer.updates() < updates) {
@@ -42,7 +42,7 @@ pub fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Tr
 
 /// What a run has written: its metrics, and learner and arenas of its last checkpoint.
 pub fn written(folder: &Path) -> [Vec<u8>; 3] {
-    let last = RunDir::open(folder).expect("a run").0.checkpoint(Which::Last).expect("saved");
+    let last = RunDir::open(folder).expect("a run").run.checkpoint(Which::Last).expect("saved");
     [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
         .map(|path| std::fs::read(path).expect("written"))
 }
@@ -54,7 +54,7 @@ pub fn check_resuming(game: &dyn Game, fresh: impl Fn(usize) -> Trainer, stop_af
     let (whole, halved) = (folder.path().join("whole"), folder.path().join("halved"));
     train(&whole, fresh(2), None);
     train(&halved, fresh(1), Some(stop_after));
-    let (run, experiment, _) = RunDir::open(&halved).expect("readable");
+    let OpenedRun { run, experiment, .. } = RunDir::open(&halved).expect("readable");
     let resumed = run.resume(game, &experiment, DeviceKind::Flex, 2).expect("a checkpoint that replays");
     assert_eq!(resumed.updates(), stop_after);
     train(&halved, resumed, None);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_playbot::{agent::AgentOrder, fault::Faults, policy::AgentStreams};
+use bevy_playbot::{agent::AgentOrder, fault::Faults, streams::AgentStreams};
 use playbot_lab::prelude::*;
 use playbot_learner::rng::normal;
 

@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_playbot::{bot::uniform, fault::Faults, policy::AgentStreams};
+use bevy_playbot::{bot::with_noise, fault::Faults, streams::AgentStreams};
 use playbot_lab::prelude::*;
-use rand::RngExt;
 
 use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator, play::NOTHING};
 
@@ -56,12 +55,8 @@ pub(super) fn decide(
             ));
             continue;
         }
-        let planned = planner.act(sim);
-        action.0 = if *noise > 0.0 && streams.action.random_bool(*noise) {
-            uniform(&agent.actions, &mut streams.action)
-        } else {
-            ActionValue::Discrete(planned.into())
-        };
+        let planned = ActionValue::Discrete(planner.act(sim).into());
+        action.0 = with_noise(planned, &agent.actions, *noise, &mut streams.action);
     }
 }
 

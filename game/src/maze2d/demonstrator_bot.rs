@@ -1,7 +1,7 @@
 //! The waypoint demonstrator as an agent of the game.
 
 use bevy::prelude::*;
-use bevy_playbot::policy::AgentStreams;
+use bevy_playbot::streams::AgentStreams;
 use playbot_lab::prelude::*;
 
 use super::{

@@ -23,7 +23,9 @@ use super::{
     experiment::ExperimentArgs,
 };
 
-/// Measures speed. Numbers are for this machine and this moment; nothing is tested.
+/// Measure speed.
+///
+/// Numbers are for this machine and this moment; nothing is tested.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --json

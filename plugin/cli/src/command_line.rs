@@ -2,7 +2,7 @@
 
 use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
 use playbot_lab::{game::Game, games::Games};
 
 use crate::{
@@ -26,7 +26,7 @@ pub(crate) struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  playbot   learn, train and test on GAME, and write a report
+  playbot   learn from recordings of GAME, train, test, and write a report
   playbot level GAME --seed 7   show a level
   playbot record GAME --levels MODE:0..9 --out my.demo
   playbot play GAME --seed 7 --record my.demo   play it yourself
@@ -44,41 +44,25 @@ Examples:
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
 130 stopped by Ctrl-C before it was done.";
 
+// Each is described where its arguments are.
 #[derive(Subcommand)]
 enum Verb {
-    /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
     Quickstart(quickstart::Args),
-    /// Record the game's demonstrator.
     Record(record::Args),
-    /// Play in a window, record, and hand over to a policy and back.
     Play(play::Args),
-    /// Look at, check, repair and join recordings.
     Demo(demo::Args),
-    /// Check that a game plays the same when it is given the same actions, and find what differs.
     Doctor(doctor::Args),
-    /// Learn the skill model from recordings.
     LearnSkills(learn_skills::Args),
-    /// Train a policy.
     Train(train::Args),
-    /// Compare variants of an experiment over several seeds.
     Study(study::Args),
-    /// Show experiments with all their values, and the presets to build them on.
     Config(config::Args),
-    /// Measure policies and baselines, every level equally often.
     Eval(eval::Args),
-    /// Compare what the camera and the raster see.
     Eyes(eyes::Args),
-    /// Make and look at policy files.
     Policy(policy::Args),
-    /// List, show and compare trainings.
     Runs(runs::Args),
-    /// Show a level.
     Level(level::Args),
-    /// Play given actions and print the state after each.
     Trace(trace::Args),
-    /// Write what a bot sees as a picture, or an episode as a moving one.
     View(view::Args),
-    /// Measure speed.
     Bench(bench::Args),
 }
 
@@ -143,13 +127,30 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
 
 /// What the process was called with.
 fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
-    let mut command = help::named(Cli::command(), program::name(), games).name(program::name());
-    if program::name() != program::USUAL {
-        // The version is this crate's, and nobody here knows the game's.
-        command = command.version(concat!("(playbot_cli ", env!("CARGO_PKG_VERSION"), ")"));
-    }
-    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    let mut command = with_own_name(Cli::command());
+    let matches = match command.try_get_matches_from_mut(std::env::args_os()) {
+        Err(error) if is_help(&error) => {
+            // Not before: to know which examples work, games are asked for a level, which takes them some work.
+            let helpful = with_own_name(help::named(Cli::command(), program::name(), games));
+            helpful.try_get_matches_from(std::env::args_os())?
+        }
+        matches => matches?,
+    };
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
+fn is_help(error: &clap::Error) -> bool {
+    matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand)
+}
+
+/// The command line under the name of this program.
+fn with_own_name(command: Command) -> Command {
+    let command = command.name(program::name());
+    if program::name() == program::USUAL {
+        return command;
+    }
+    // The version is this crate's, and nobody here knows the game's.
+    command.version(concat!("(playbot_cli ", env!("CARGO_PKG_VERSION"), ")"))
 }
 
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {

@@ -13,7 +13,7 @@ use super::{
     experiment::{ExperimentArgs, resolve},
 };
 
-/// Shows what an experiment comes to, and what it can be built on.
+/// Show experiments with all their values, and the presets to build them on.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot config show --experiment my.ron --set ppo.lr=0.0003

@@ -11,15 +11,17 @@ use playbot_lab::{
 };
 
 use super::{
+    defaults::mode_to_measure,
     error::{CliError, Outcome, print_line},
     number::at_least_one,
 };
 
-/// Checks whether a game plays the same when it is given the same actions, which recording, replay, resume and training in
-/// many arenas rest on, and names what differs first, when, and what to do.
+/// Check that a game plays the same when it is given the same actions, and find what differs.
 ///
-/// Copies of the game play the same random actions: twice in one thread, with another wall clock, on two threads, two arenas
-/// in one World against each alone, and the same level again after a restart. Exit code 1 if something was found.
+/// Recording, replay, resume and training in many arenas rest on it. Copies of the game play the same random actions:
+/// twice in one thread, with another wall clock, with more archetypes in the World, on two threads, two arenas in one
+/// World against each alone, and the same level again after a restart. What differs first is named, with the tick and
+/// what to do. Exit code 1 if something was found.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot doctor GAME
@@ -51,10 +53,9 @@ const SPEED_SECONDS: f64 = 0.5;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let mode = args.mode.unwrap_or_else(|| game.modes().first().copied().unwrap_or_default().to_owned());
+    let mode = args.mode.unwrap_or_else(|| mode_to_measure(game).to_owned());
     let options = DoctorOptions {
         ticks: u32::try_from(args.ticks).map_err(|_| CliError::Usage("--ticks has too many digits".to_owned()))?,
-        several_arenas: game.arenas_per_world().is_none_or(|most| most > 1),
         seed: args.seed,
         ignored: args.ignore,
         ..DoctorOptions::new(mode)

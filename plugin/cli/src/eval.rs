@@ -15,12 +15,17 @@ use playbot_lab::{
     held_out::HeldOut,
     report::to_text_table,
     split::LevelSplit,
-    train::{Experiment, checkpoint::Which, run_dir::RunDir},
+    train::{
+        Experiment,
+        checkpoint::Which,
+        run_dir::{OpenedRun, RunDir},
+    },
 };
 use playbot_learner::{PolicyFile, SkillModel, SkillSource};
 
 use super::{
     compute::Compute,
+    defaults::first_levels,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
     footprints::Footprints,
@@ -28,7 +33,9 @@ use super::{
     player::Chosen,
 };
 
-/// Measures trained runs, behaviour cloning and bots on the held-out levels, every level equally often.
+/// Measure policies and baselines, every level equally often.
+///
+/// Those are trained runs, behaviour cloning, policy files and bots, on the held-out levels.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eval --run runs/first
@@ -50,14 +57,14 @@ pub struct Args {
     /// Policy file, as written by `playbot policy export`, which says what game is played; may be given several times.
     #[arg(long)]
     policy: Vec<PathBuf>,
-    /// Bot of the game, such as random, right-jump or search; may be given several times.
+    /// Bot of the game, such as random; a name that it does not have lists all. May be given several times.
     #[arg(long)]
     bot: Vec<String>,
     /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
     #[arg(long)]
     observation: Option<ObservationKind>,
     /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named, or the first 64 of
-    /// the game if a policy file is of another game than the built-in experiment.
+    /// the game's first mode if a policy file is of another game than the experiment.
     #[arg(long)]
     levels: Vec<LevelSplit>,
     /// Episodes on each level, instead of the experiment's.
@@ -140,7 +147,7 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
     match (&args.from.experiment, args.run.first()) {
         (None, Some(run)) => {
-            let experiment = RunDir::open(run)?.1.with_set(&args.from.sets(options))?;
+            let experiment = RunDir::open(run)?.experiment.with_set(&args.from.sets(options))?;
             experiment.check()?;
             Ok(experiment)
         }
@@ -148,7 +155,7 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     }
 }
 
-/// The game of the first policy file, and levels of it, where nobody says which: the built-in experiment is CoinRun's.
+/// The game of the first policy file, and levels of it, where nobody says which: the experiment may be of another game.
 fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
     let file = PolicyFile::load(path, args.compute.device())?;
@@ -156,15 +163,14 @@ fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     if args.from.load(games, [])?.game == game.name() {
         return Ok(Vec::new());
     }
-    let mode = game.modes().first().copied().unwrap_or_default();
-    Ok(vec![format!("game={}", game.name()), format!("test={mode}:0..63")])
+    Ok(vec![format!("game={}", game.name()), format!("test={}", first_levels(game, 63))])
 }
 
 fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games) -> Result<Vec<Chosen>, CliError> {
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     let mut players = Vec::new();
     for path in &args.run {
-        let (run, own, info) = RunDir::open(path)?;
+        let OpenedRun { run, experiment: own, info } = RunDir::open(path)?;
         check_run(path, game, &own, experiment, args)?;
         let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.compute.device())?;
         players.push(named(chosen, path, args.run.len()));

@@ -14,6 +14,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
+    defaults::first_levels,
     error::{CliError, Outcome, print_line},
     output,
     player::Chosen,
@@ -21,20 +22,23 @@ use super::{
     view::{film::to_png, screen::Screen},
 };
 
-/// Compares what the camera and the raster see of the same moments: a policy that is trained on one should not notice
-/// that it plays with the other.
+/// Compare what the camera and the raster see.
+///
+/// Both look at the same moments: a policy that is trained on one should not notice that it plays with the other.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eyes GAME
   playbot eyes GAME --levels MODE:0..49 --frames 10 --out eyes --json
 
-Exit code 1 if the pictures are further apart than --most-mean and --least-close allow. Needs the feature `camera`.")]
+Exit code 1 if the pictures are further apart than --most-mean and --least-close allow. Needs the feature `camera`, and a
+game that the raster can draw.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included. The game's demonstrator plays each once.
-    #[arg(long, default_value = "hard:0..49")]
-    levels: LevelSplit,
+    /// Levels, as mode:first..last, both included; without it levels 0 to 49 of the game's first mode. The game's
+    /// demonstrator, or else the first of its bots, plays each once.
+    #[arg(long)]
+    levels: Option<LevelSplit>,
     /// Frames that are compared on each level, spread over the episode.
     #[arg(long, default_value_t = 10)]
     frames: usize,
@@ -55,6 +59,8 @@ pub struct Args {
     json: bool,
 }
 
+/// The last of the levels from 0 that are compared where none are named.
+const LAST_LEVEL: u64 = 49;
 /// Factor by which the worst frame is enlarged.
 const ENLARGE: usize = 5;
 /// Pixels between two pictures.
@@ -87,12 +93,14 @@ struct Summary {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    game.check_mode(&args.levels.mode)?;
+    check_picture(game)?;
+    let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
+    game.check_mode(&levels.mode)?;
     if args.frames == 0 {
         return Err(CliError::Usage("--frames is 0: compare at least one frame a level".to_owned()));
     }
-    let compared = compare(game, &args)?;
-    let summary = sum_up(game, &args, &compared)?;
+    let compared = compare(game, &levels, &args)?;
+    let summary = sum_up(game, &levels, &compared)?;
     if let Some(folder) = &args.out {
         write_report(folder, &summary, &args)?;
     }
@@ -105,11 +113,22 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(if alike { Outcome::Pass } else { Outcome::Findings })
 }
 
+/// A camera of the game's own is not enough: the raster draws what the game says of its picture.
+fn check_picture(game: &dyn Game) -> Result<(), CliError> {
+    if game.picture().is_some() {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "`{0}` cannot be drawn by the raster, so there is nothing to compare; `playbot view {0}` shows what a bot sees of it",
+        game.name()
+    )))
+}
+
 /// One World for each eye, played alike; every frame of both is kept until its level is over.
-fn compare(game: &dyn Game, args: &Args) -> Result<Vec<Compared>, CliError> {
-    let mut raster = Looker::new(game, args, ObservationKind::Raster)?;
-    let mut camera = Looker::new(game, args, ObservationKind::Camera)?;
-    let bar = progress::bar("comparing", args.levels.len(), "levels");
+fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args) -> Result<Vec<Compared>, CliError> {
+    let mut raster = Looker::new(game, levels, args.size, ObservationKind::Raster)?;
+    let mut camera = Looker::new(game, levels, args.size, ObservationKind::Camera)?;
+    let bar = progress::bar("comparing", levels.len(), "levels");
     let (mut compared, mut level): (Vec<Compared>, Vec<Compared>) = (Vec::new(), Vec::new());
     while let (Some(by_raster), Some(by_camera)) = (raster.tick()?, camera.tick()?) {
         if (by_raster.level, by_raster.tick) != (by_camera.level, by_camera.tick) {
@@ -154,13 +173,13 @@ struct Looker {
 }
 
 impl Looker {
-    fn new(game: &dyn Game, args: &Args, kind: ObservationKind) -> Result<Self, CliError> {
+    fn new(game: &dyn Game, levels: &LevelSplit, size: u32, kind: ObservationKind) -> Result<Self, CliError> {
         let observation_config =
-            ObservationConfig { kind, image: ImageOptions { width: args.size, height: args.size, ..default() } };
-        let (mut world, agents) = build_observing_world(game, &args.levels.mode, &observation_config, 1, 0, 1)?;
+            ObservationConfig { kind, image: ImageOptions { width: size, height: size, ..default() } };
+        let (mut world, agents) = build_observing_world(game, &levels.mode, &observation_config, 1, 0, 1)?;
         let agent = agents[0];
         let control = Chosen::usual(game)?.player.seat(game, &mut world, agent);
-        world.entity_mut(agent).insert((control, LevelQueue::list(args.levels.levels().collect::<Vec<_>>())));
+        world.entity_mut(agent).insert((control, LevelQueue::list(levels.levels().collect::<Vec<_>>())));
         Ok(Self { world, agent })
     }
 
@@ -178,7 +197,7 @@ impl Looker {
     }
 }
 
-fn sum_up(game: &dyn Game, args: &Args, compared: &[Compared]) -> Result<Summary, CliError> {
+fn sum_up(game: &dyn Game, levels: &LevelSplit, compared: &[Compared]) -> Result<Summary, CliError> {
     let worst = compared.iter().max_by(|a, b| a.difference.mean.total_cmp(&b.difference.mean));
     let Some(worst) = worst else {
         return Err(CliError::Usage("no frame was seen on these levels".to_owned()));
@@ -188,7 +207,7 @@ fn sum_up(game: &dyn Game, args: &Args, compared: &[Compared]) -> Result<Summary
     };
     Ok(Summary {
         game: game.name(),
-        levels: args.levels.to_string(),
+        levels: levels.to_string(),
         frames: compared.len(),
         mean: mean(|difference| difference.mean),
         close: mean(|difference| difference.close),

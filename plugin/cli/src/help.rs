@@ -1,18 +1,22 @@
 //! Help with the names of this program and of its games.
 //!
 //! Examples are written for the program `playbot` with the words `GAME`, `MODE` and `BOT`, which stand for the program's
-//! first game, its last mode, and its demonstrator.
+//! first game, its last mode, and its demonstrator. Those that cannot work in a program are left out.
 
 use clap::{Arg, Command};
-use playbot_lab::game::Game;
+use playbot_lab::prelude::{ActionSpace, Game};
 
-use super::program::{USUAL, with_name};
+use super::{
+    defaults::mode_to_show,
+    level::shows_levels,
+    program::{USUAL, with_name},
+};
 
 /// The column in which examples are explained.
 const COLUMN: usize = 48;
 
-/// Puts the names of a program and its games into all that a command says of itself. Examples of games that the program
-/// does not have are left out.
+/// Puts the names of a program and its games into all that a command says of itself. Examples are left out if the program
+/// does not have their game, or the game has not what they need.
 pub fn named(command: Command, program: &'static str, games: &[&dyn Game]) -> Command {
     let plays = command.get_arguments().any(|argument| argument.get_id() == "game");
     let examples = command.get_after_help().map(|text| examples(&text.to_string(), plays, program, games));
@@ -41,21 +45,17 @@ fn of_argument(argument: Arg, program: &str) -> Arg {
 /// What stands below a command's options. `plays` says whether the command is given the name of a game.
 fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> String {
     let first = games.first();
-    let mode = first.and_then(|game| game.modes().last().copied());
+    let mode = first.map(|game| mode_to_show(*game));
     let bot = first.and_then(|game| game.demonstrator());
     let names = [
         ("GAME", first.map_or("GAME", |game| game.name())),
         ("MODE", mode.unwrap_or("default")),
         ("BOT", bot.unwrap_or("random")),
     ];
-    let is_there = |example: &str| {
-        let game = example.split_whitespace().nth(2).filter(|_| plays);
-        game.is_none_or(|wanted| wanted == "GAME" || games.iter().any(|game| game.name() == wanted))
-    };
     let mut lines = Vec::new();
     for line in text.lines() {
         match line.strip_prefix("  ").filter(|line| line.starts_with(USUAL)) {
-            Some(example) if is_there(example) => lines.push(own_example(example, program, &names)),
+            Some(example) if works(example, plays, games) => lines.push(own_example(example, program, &names)),
             Some(_) => {}
             None => lines.push(line.to_owned()),
         }
@@ -66,11 +66,29 @@ fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> Stri
     lines.join("\n").trim().to_owned()
 }
 
-/// An example with the names in it, and its explanation, if it has one, in the usual column.
+/// Whether the game of an example is there, and has what the verb needs.
+fn works(example: &str, plays: bool, games: &[&dyn Game]) -> bool {
+    let mut words = example.split_whitespace().skip(1);
+    let (verb, name) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
+    let is_first = name == "GAME";
+    let game = if is_first { games.first() } else { games.iter().find(|game| game.name() == name) };
+    let Some(game) = game else { return !plays };
+    match verb {
+        "record" => game.demonstrator().is_some(),
+        "eyes" => game.picture().is_some(),
+        "level" => shows_levels(*game),
+        // A game that is named here traces its continuous actions in a way of its own.
+        "trace" => !is_first || matches!(game.actions(), ActionSpace::Discrete(_)),
+        _ => true,
+    }
+}
+
+/// An example with the names in it, and its explanation, if it has one, in the usual column, at least three blanks behind
+/// it, so that it does not look like a part of the command.
 fn own_example(example: &str, program: &str, names: &[(&str, &str)]) -> String {
     let own = |text: &str| names.iter().fold(text.to_owned(), |text, (word, name)| text.replace(word, name));
     let (command, explanation) = example.split_once("   ").unwrap_or((example, ""));
-    let (command, explanation) = (own(&command.replacen(USUAL, program, 1)), own(explanation));
+    let (command, explanation) = (own(&command.replacen(USUAL, program, 1)) + "  ", own(explanation));
     format!("  {command:<COLUMN$} {}", explanation.trim_start()).trim_end().to_owned()
 }
 
@@ -82,22 +100,48 @@ mod tests {
     use super::*;
     use crate::command_line::{Cli, check_usage};
 
-    /// All that a command and those below it say of themselves.
+    /// Words of games that a program need not have.
+    const STRANGE: [&str; 5] = ["coinrun", "maze", "hard", "search", "right-jump"];
+
+    fn runner() -> ForeignGame {
+        ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {})
+    }
+
+    /// All that a command and those below it say of themselves: what they are, their options with all values that these
+    /// name, and their examples.
     fn said(command: &Command, all: &mut Vec<String>) {
-        all.extend(command.get_after_help().map(ToString::to_string));
-        all.extend(command.get_arguments().filter_map(Arg::get_help).map(ToString::to_string));
+        let texts = [
+            command.get_about(),
+            command.get_long_about(),
+            command.get_before_help(),
+            command.get_after_help(),
+            command.get_after_long_help(),
+        ];
+        all.extend(texts.into_iter().flatten().map(ToString::to_string));
+        for argument in command.get_arguments() {
+            let texts = [argument.get_help(), argument.get_long_help()];
+            all.extend(texts.into_iter().flatten().map(ToString::to_string));
+            all.extend(argument.get_default_values().iter().map(|value| value.to_string_lossy().into_owned()));
+            all.extend(argument.get_possible_values().iter().map(|value| value.get_name().to_owned()));
+        }
         command.get_subcommands().for_each(|verb| said(verb, all));
+    }
+
+    /// All that the program `jump` says, with this game alone.
+    fn said_of(game: &ForeignGame) -> Vec<String> {
+        let mut all = Vec::new();
+        said(&named(Cli::command(), "jump", &[game]), &mut all);
+        all
     }
 
     #[test]
     fn the_help_of_another_program_speaks_of_its_own_game() {
-        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
-        let mut all = Vec::new();
-        said(&named(Cli::command(), "jump", &[&game]), &mut all);
+        let all = said_of(&runner());
         let mut examples = 0;
         for line in all.iter().flat_map(|text| text.lines()) {
-            let strange =
-                ["playbot ", "GAME", "MODE", "BOT", "coinrun", "maze"].iter().find(|word| line.contains(**word));
+            let small = line.to_lowercase();
+            assert_eq!(STRANGE.iter().find(|word| small.contains(**word)), None, "{line}");
+            let strange = ["playbot ", "GAME", "MODE", "BOT"].iter().find(|word| line.contains(**word));
             if let Some(example) = line.strip_prefix("  jump") {
                 assert_eq!(strange, None, "{line}");
                 let words = example.split("   ").next().unwrap_or_default().split_whitespace();
@@ -111,11 +155,26 @@ mod tests {
     }
 
     #[test]
+    fn examples_that_cannot_work_are_left_out() {
+        let has = |all: &[String], verb: &str| all.iter().any(|text| text.contains(&format!("  jump {verb} runner")));
+        let without = said_of(&runner());
+        for verb in ["record", "eyes", "level"] {
+            assert!(!has(&without, verb), "{verb}: {without:?}");
+        }
+        assert!(has(&without, "view") && has(&without, "trace"), "{without:?}");
+        let with = said_of(&runner().demonstrator("walker", || 0_u32));
+        assert!(has(&with, "record") && !has(&with, "level"), "{with:?}");
+    }
+
+    #[test]
     fn examples_of_other_games_are_left_out_and_explanations_stand_in_one_column() {
-        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
+        let game = runner();
         let text = "Examples:\n  playbot view GAME --seed 5   look\n  playbot view chess --seed 5\n\nMore words.";
         let own = examples(text, true, "jump", &[&game]);
         assert_eq!(own, format!("Examples:\n  {:<48} look\n\nMore words.", "jump view runner --seed 5"));
         assert_eq!(examples("Examples:\n  playbot view chess", true, "jump", &[&game]), "");
+        let program = "a_program_whose_name_is_longer_than_most";
+        let own = examples("Examples:\n  playbot view GAME   look", true, program, &[&game]);
+        assert_eq!(own, format!("Examples:\n  {program} view runner   look"));
     }
 }

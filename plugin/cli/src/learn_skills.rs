@@ -18,13 +18,13 @@ use super::{
     compute::Compute,
     error::{CliError, Outcome, print_line},
     experiment::{self, ExperimentArgs, option},
-    interrupt,
+    interrupt, missing_demos,
     number::counted,
     output::{beside, prepare},
     progress,
 };
 
-/// Learns the skill model (encoder, decoder, prior) from recordings.
+/// Learn the skill model (encoder, decoder, prior) from recordings.
 #[derive(clap::Args)]
 #[command(mut_arg("threads", |threads| threads.help("Threads that replay recordings; the result does not depend on it")))]
 #[command(after_help = "Examples:
@@ -145,7 +145,8 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
 /// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_actions(game.actions())?;
-    let demos = Demonstrations::of(game, experiment, path)?;
+    let demos = Demonstrations::of(game, experiment, path)
+        .map_err(|error| missing_demos::explain(error, game, experiment, path))?;
     let observation_config = experiment.observation_config();
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
     begin_to_tell!(

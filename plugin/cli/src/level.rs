@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use playbot_lab::{
+    game::Game,
     games::Games,
-    inspect::{LevelPicture, LevelRequest},
+    inspect::{InspectError, LevelPicture, LevelRequest},
 };
 
 use crate::{
@@ -14,7 +15,7 @@ use crate::{
     view::film::Film,
 };
 
-/// Shows the layout of a level.
+/// Show the layout of a level.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot level GAME --mode MODE --seed 7
@@ -26,16 +27,16 @@ use crate::{
   playbot level antmaze --map medium+goals=random+random-start --seed 7
   playbot level maze2d --map my-maze.txt --png my-maze.png
 
-A file of rows is a maze as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell;
+A file of rows is a map as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell;
 the rows end at the first empty line.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of CoinRun; hard if none is named.
+    /// Mode of the game; if none is named, the game chooses.
     #[arg(long)]
     mode: Option<String>,
-    /// Map of a maze: umaze, medium, large, xl, random with its options, a whole mode of the game such as medium+sparse,
-    /// with the start and goal that it draws for the seed, or a file of rows; random if none is named.
+    /// Map, for games whose levels are maps: its name, with options where it takes any, a whole mode of the game, with the
+    /// start and goal that it draws for the seed, or a file of rows; if none is named, the game chooses.
     #[arg(long, value_name = "MAP", conflicts_with = "mode")]
     map: Option<String>,
     /// Seed of the level; 0 if none is named.
@@ -44,7 +45,7 @@ pub struct Args {
     /// Print one line of JSON instead of a picture.
     #[arg(long)]
     json: bool,
-    /// Also draw the whole level into this .png; mazes into a .svg too.
+    /// Also draw the whole level into this .png; maps into a .svg too.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 }
@@ -53,12 +54,28 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let file = args.png.as_deref().map(|path| PlotFile::new(path).map(|file| (path, file))).transpose()?;
     let (mode, map) = (args.mode.as_deref(), args.map.as_deref());
-    let level = game.show_level(&LevelRequest { mode, map, seed: args.seed, picture: file.is_some() })?;
+    let request = LevelRequest { mode, map, seed: args.seed, picture: file.is_some() };
+    let level = game.show_level(&request).map_err(|error| explain(game, error))?;
     if let (Some((path, file)), Some(picture)) = (file, &level.picture) {
         write(path, &file, picture, game.tick_hz())?;
     }
     print_line(if args.json { level.json } else { level.text })?;
     Ok(Outcome::Pass)
+}
+
+/// Whether a game can show levels: it is asked for the one that it chooses itself.
+pub fn shows_levels(game: &dyn Game) -> bool {
+    game.show_level(&LevelRequest::default()).is_ok()
+}
+
+/// An error of showing a level; of a game that can show none at all, with what can be looked at instead.
+fn explain(game: &dyn Game, error: InspectError) -> CliError {
+    match error {
+        InspectError::Usage(why) if !shows_levels(game) => {
+            CliError::Usage(format!("{why}; `playbot view {} --seed N` shows what a bot sees of one", game.name()))
+        }
+        error => error.into(),
+    }
 }
 
 fn write(path: &Path, file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> Result<(), CliError> {

@@ -8,6 +8,7 @@ mod bench;
 mod command_line;
 mod compute;
 mod config;
+mod defaults;
 mod demo;
 mod demo_merge;
 mod doctor;
@@ -24,6 +25,7 @@ mod log;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;
 mod methods;
+mod missing_demos;
 mod number;
 mod output;
 mod play;

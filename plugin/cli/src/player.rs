@@ -10,7 +10,11 @@ use playbot_lab::sensors::GameSensors;
 use playbot_lab::{
     eval::Player,
     game::Game,
-    train::{Algorithm, Experiment, Learner, checkpoint::Which, run_dir::RunDir},
+    train::{
+        Algorithm, Experiment, TrainedLearner,
+        checkpoint::Which,
+        run_dir::{OpenedRun, RunDir},
+    },
 };
 use playbot_learner::{DeviceKind, PolicyFile};
 
@@ -26,7 +30,7 @@ pub struct PlayerArgs {
     /// Folder of a run.
     #[arg(long, value_name = "DIR", group = "player")]
     run: Option<PathBuf>,
-    /// Bot of the game, such as random, right-jump or search.
+    /// Bot of the game, such as random; a name that it does not have lists all.
     #[arg(long, value_name = "NAME", group = "player")]
     bot: Option<String>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
@@ -99,7 +103,7 @@ impl Chosen {
         draw: ActionDraw,
         device: DeviceKind,
     ) -> Result<Self, CliError> {
-        let learner = Learner::load(algorithm, &run.checkpoint(checkpoint)?.learner_file(), device)?;
+        let learner = TrainedLearner::load(algorithm, &run.checkpoint(checkpoint)?.learner_file(), device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         let player = Player::Policy { policy: learner.policy(), prior, draw };
         Ok(Self { name: algorithm.name().to_owned(), player, observation_config: experiment.observation_config() })
@@ -143,7 +147,7 @@ impl PlayerArgs {
             return Ok(Some(Chosen::policy_file(game, path, draw, self.device.device)?));
         }
         let Some(path) = &self.run else { return Ok(None) };
-        let (run, experiment, info) = RunDir::open(path)?;
+        let OpenedRun { run, experiment, info } = RunDir::open(path)?;
         if experiment.game != game.name() {
             return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
         }

@@ -8,7 +8,11 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     game::Game,
     policy_export::{Provenance, export_policy, policy_file},
-    train::{Experiment, Learner, checkpoint::Which, run_dir::RunDir},
+    train::{
+        Experiment, TrainedLearner,
+        checkpoint::Which,
+        run_dir::{OpenedRun, RunDir},
+    },
 };
 use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
 use serde_json::json;
@@ -22,7 +26,7 @@ use super::{
     program,
 };
 
-/// Make and look at the policy files that a game ships with.
+/// Make and look at policy files, which a game ships with.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot policy export --run runs/first --checkpoint best --out GAME.policy
@@ -102,10 +106,10 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
 type Exported<'a> = (&'a dyn Game, Experiment, PolicyFile);
 
 fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<'a>, CliError> {
-    let (run, experiment, info) = RunDir::open(path)?;
+    let OpenedRun { run, experiment, info } = RunDir::open(path)?;
     let game = games.get(&experiment.game)?;
     let checkpoint = run.checkpoint(which)?;
-    let learner = Learner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
+    let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
     let training = format!(
         "{} of {} steps on {}, seed {}",
         checkpoint.summary.step, experiment.steps, experiment.train, info.seed

@@ -36,12 +36,17 @@ use super::{
 /// The file of the skill model.
 const SKILLS: &str = "skills.safetensors";
 
-/// Learns skills from the shipped demonstrations, trains SCORE-PPO and PPO for the same number of steps on the training
-/// levels, and measures both, behaviour cloning and the blind baselines on levels that none of them has seen.
+/// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
+///
+/// Both train for the same number of steps on the experiment's training levels, with its recordings. Behaviour cloning
+/// and the blind baselines are measured beside them, on levels that none of them has seen.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot
-  playbot quickstart --json --run runs/another --seed 2")]
+  playbot quickstart --json --run runs/another --seed 2
+
+Needs recordings where the experiment's `demos` says, which is demos/ and the name of the game unless it says otherwise; the
+verbs record and play make them.")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,

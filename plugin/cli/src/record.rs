@@ -11,12 +11,16 @@ use playbot_lab::prelude::*;
 use playbot_lab::{game::Game, held_out::HeldOut, worlds::build_world};
 
 use super::{
+    defaults::first_levels,
     error::{CliError, Outcome},
     interrupt, progress,
     recording::Existing,
 };
 
-/// Records the game's demonstrator: a bot that plans, with noise on its actions.
+/// Record the game's demonstrator.
+///
+/// That is a bot of the game's own; --noise replaces some of its actions, so that recordings show how to go on from
+/// there.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot record GAME --levels MODE:0..9 --out my.demo
@@ -54,9 +58,12 @@ pub struct Args {
     existing: Existing,
 }
 
+/// The last of the levels from 0 that are recorded where none are named.
+const LAST_LEVEL: u64 = 499;
+
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let levels = args.levels.clone().unwrap_or_else(|| usual_levels(game));
+    let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
     game.check_mode(&levels.mode)?;
     check_demonstrator(game)?;
     check_noise(game, args.noise)?;
@@ -127,10 +134,6 @@ fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
         advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
     }
     Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
-}
-
-fn usual_levels(game: &dyn Game) -> LevelSplit {
-    LevelSplit { mode: game.modes().first().copied().unwrap_or_default().to_owned(), first: 0, last: 499 }
 }
 
 /// A probability for discrete actions, a standard deviation for continuous ones.

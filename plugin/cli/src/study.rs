@@ -24,8 +24,10 @@ use super::{
     study_run::Runner,
 };
 
-/// Runs every variant of an experiment with every seed: learns skills, trains, and measures on the held-out levels. The
-/// tables and the plot say nothing of the machine: the same study gives the same files.
+/// Compare variants of an experiment over several seeds.
+///
+/// Every variant with every seed learns skills, trains, and is measured on the held-out levels. The tables and the
+/// plot say nothing of the machine: the same study gives the same files.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot study --experiment my.ron --out study

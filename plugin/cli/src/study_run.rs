@@ -18,7 +18,7 @@ use playbot_lab::{
         Experiment, Trainer,
         checkpoint::Which,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
-        run_dir::{RunDir, RunInfo, check_replaceable, is_unstarted, write_atomically},
+        run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, is_unstarted, write_atomically},
         run_lock::RunLock,
         study::StudyRun,
     },
@@ -85,7 +85,7 @@ impl<'a> Runner<'a> {
         }
         fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
         let lock = RunLock::take(&folder)?;
-        let dir = if is_saved { Place::Begun(RunDir::open_with(lock)?.0) } else { Place::New(lock) };
+        let dir = if is_saved { Place::Begun(RunDir::open_with(lock)?.run) } else { Place::New(lock) };
         // Nobody else writes there until the result is written.
         let Some((_dir, player, training, curve)) = self.player(game, run, dir, title, on_step)? else {
             return Ok(None);
@@ -139,7 +139,7 @@ impl<'a> Runner<'a> {
         if self.force || !folder.exists() || is_unstarted(folder) {
             return Ok(false);
         }
-        let (_, saved, info) = RunDir::open(folder)?;
+        let OpenedRun { experiment: saved, info, .. } = RunDir::open(folder)?;
         if saved == run.experiment {
             self.warn_of_others(folder, &info);
             return Ok(true);

@@ -10,32 +10,33 @@ use playbot_lab::{
 
 use crate::error::{CliError, Outcome, print_line};
 
-/// Plays given actions and prints the state after each.
+/// Play given actions and print the state after each.
 ///
-/// coinrun: `[x, y, vx, vy, reward, done]`, in tiles and tiles per step; stops at the end of the episode or of the actions.
-/// maze2d: `[x, y, vx, vy]`, in metres and metres per second; stops at the end of the actions.
+/// A line holds the numbers by which the game describes its state, which the head of the table names, and of most
+/// games the reward and whether the episode is over. It stops at the end of the episode or of the actions.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot trace coinrun --mode hard --seed 2 --actions 7,7,7,7,8,7 --json
-  playbot trace coinrun --mode hard --seed 2 --actions-file actions.txt
+  playbot trace GAME --seed 2 --actions 0,0,0,0 --json
+  playbot trace GAME --mode MODE --seed 2 --actions-file actions.txt
   playbot trace maze2d --map medium --start 1,1,0,0 --actions-file pushes.txt --json
   playbot trace maze2d --map large+contact=rapier --seed 3 --actions-file pushes.txt")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; of a maze its map, with options. Without it hard, or medium.
+    /// Mode of the game, or its map where levels are maps; if none is named, the game's last mode or its own choice.
     #[arg(long, visible_alias = "map")]
     mode: Option<String>,
     /// Seed of the level.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// coinrun: actions, separated by commas.
+    /// Discrete actions: their numbers, from 0, separated by commas.
     #[arg(long, value_delimiter = ',', conflicts_with = "actions_file")]
     actions: Vec<u32>,
-    /// coinrun: file of actions, separated by commas, spaces or line ends. maze2d: one push `ux uy` a line.
+    /// File of actions. Discrete ones: their numbers, separated by commas, spaces or line ends. Continuous ones, in games
+    /// that can trace them: one action per line, its values separated by spaces.
     #[arg(long, value_name = "FILE", required_unless_present = "actions")]
     actions_file: Option<PathBuf>,
-    /// maze2d: where the ball starts and how fast, instead of where the level says.
+    /// Place and speed to start with instead of the level's, in games that can start anywhere.
     #[arg(long, value_name = "X,Y,VX,VY", value_delimiter = ',', allow_hyphen_values = true)]
     start: Vec<f64>,
     /// One line of JSON per step; without it a table.

@@ -9,7 +9,7 @@ use playbot_lab::{
         Algorithm, Experiment, TrainError, Trainer, UpdateReport,
         checkpoint::Which,
         checksum::file_checksum,
-        run_dir::{RunDir, RunError, RunInfo},
+        run_dir::{OpenedRun, RunDir, RunError, RunInfo},
     },
 };
 use playbot_learner::{DeviceKind, SkillModel};
@@ -21,7 +21,7 @@ use super::{
     interrupt, program, progress,
 };
 
-/// Trains a policy, headless, over the experiment's training levels.
+/// Train a policy, headless, over the experiment's training levels.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot train --skills skills.safetensors --run runs/first
@@ -98,7 +98,7 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
 }
 
 fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
-    let (run, saved, _) = RunDir::open_to_write(&args.run)?;
+    let OpenedRun { run, experiment: saved, .. } = RunDir::open_to_write(&args.run)?;
     let game = games.get(&saved.game)?;
     let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
     let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;

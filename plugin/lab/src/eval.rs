@@ -66,10 +66,7 @@ impl Player {
     /// Gives a World what the player needs once: networks and the source of skills.
     pub fn install(&self, world: &mut World) {
         if let Self::Policy { policy, prior, draw } = self {
-            world.insert_resource(ActivePolicy { policy: policy.clone(), draw: *draw });
-            if let Some(prior) = prior {
-                world.insert_resource(prior.clone());
-            }
+            ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());
         }
     }
 

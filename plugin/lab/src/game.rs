@@ -82,7 +82,7 @@ pub trait Game: Send + Sync {
         None
     }
 
-    /// The game again, if its Worlds are to be built anew for each episode: see [`Renewal`](bevy_playbot::renewal::Renewal).
+    /// The game again, if its Worlds are to be built anew for each episode, since it keeps state that nobody can set back.
     /// `None` for a game that restarts in the World it has.
     fn built_anew(&self) -> Option<Arc<dyn Game>> {
         None
@@ -213,7 +213,7 @@ pub trait Game: Send + Sync {
     }
 
     /// What the game says of itself to policy files.
-    fn card(&self) -> GameCard {
+    fn card(&self) -> GameCard<'_> {
         GameCard {
             name: self.name(),
             version: self.version(),

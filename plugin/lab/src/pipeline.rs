@@ -75,7 +75,8 @@ pub enum PipelineError {
 }
 
 /// Records the game's demonstrator on each of these levels into a new file, and returns the number of episodes. `noise` is
-/// the share of random actions, or the deviation of continuous ones.
+/// the share of random actions, or the deviation of continuous ones, drawn from seed 1, as the command line does unless told
+/// otherwise.
 ///
 /// # Errors
 ///
@@ -86,7 +87,7 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
     let mut header = game.demo_header(&levels.mode);
     header.demonstrator = name.to_owned();
     header.action_noise = noise;
-    let (mut world, agents) = build_world(game, &levels.mode, 0, 0, 1);
+    let (mut world, agents) = build_world(game, &levels.mode, 1, 0, 1);
     game.attach_demonstrator(&mut world, agents[0], noise);
     world.insert_resource(Recorder::new(DemoWriter::create(path, header)?));
     let queue = LevelQueue::list(levels.levels().collect::<Vec<_>>());

@@ -7,8 +7,8 @@ use bevy_playbot::{
     headless::{headless_app, headless_frame_app, into_world, set_tick_rate},
     panics::{EpisodeTrace, PanicReports},
     placement::TickPlacement,
-    policy::PlaybotSeed,
     renewal::Renewal,
+    streams::PlaybotSeed,
     vision::{ObservationConfig, VisionError},
 };
 

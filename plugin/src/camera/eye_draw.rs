@@ -36,7 +36,7 @@ pub(super) struct DrawEyes;
 
 /// The eyes in the render World. Their phases and entities are used again and again.
 #[derive(Resource, Default, Reflect)]
-#[reflect(from_reflect = false)]
+#[reflect(Resource)]
 struct RenderEyes {
     #[reflect(ignore)]
     scene: Eyes,

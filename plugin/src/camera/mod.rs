@@ -56,14 +56,13 @@ mod tiles;
 
 pub(crate) use adapter::{creation as drawing, none as not_drawing};
 pub use error::CameraError;
+pub use eye::SensorCamera;
 pub use plugin::CameraSensorPlugin;
 pub(crate) use render_list::RenderListPlugin;
 pub use sensor::{CameraSensor, CameraSource};
 pub use tiles::TileBorder;
 
 // For playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
-pub use eye::SensorCamera;
 #[doc(hidden)]
 pub use readback::ReadbackDelay;
 #[doc(hidden)]

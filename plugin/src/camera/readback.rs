@@ -53,7 +53,7 @@ struct Copied {
 
 /// The buffers, of which there is one as long as nothing is delayed.
 #[derive(Default, Resource, Reflect)]
-#[reflect(from_reflect = false)]
+#[reflect(Resource)]
 pub(super) struct Readback {
     #[reflect(ignore)]
     on_the_way: VecDeque<Copied>,

@@ -10,6 +10,7 @@ use bevy::{
 /// Who would draw, and takes what is on the list.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
+#[reflect(Component)]
 struct NoRenderer(#[reflect(ignore)] SyncCell<SubApp>);
 
 /// Sprites, meshes and cameras are noted for the renderer as they come and go, and Bevy fails where nobody keeps the list.
@@ -22,7 +23,7 @@ impl Plugin for RenderListPlugin {
             return;
         }
         app.add_plugins(ExtractPlugin::default());
-        // Taken out at once, before anybody takes it for a renderer.
+        // Removed at once: plugins that find the sub-app would think that there is a renderer and add their systems to it.
         if let Some(renderer) = app.remove_sub_app(RenderApp) {
             // Nobody else looks at the list.
             app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list.ambiguous_with_all());

@@ -13,6 +13,7 @@ use super::scene_schedule::SceneSchedule;
 /// The renderer and the schedules that feed it.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
+#[reflect(Component)]
 pub(super) struct Renderer {
     #[reflect(ignore)]
     app: SyncCell<SubApp>,

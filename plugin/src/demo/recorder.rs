@@ -40,6 +40,7 @@ use crate::{
 /// Each episode is on disk as soon as it has ended.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
+#[reflect(Component)]
 pub struct Recorder {
     #[reflect(ignore)]
     writer: DemoWriter,

@@ -96,7 +96,7 @@ fn decode(encoded: f64) -> f64 {
     base * base * fifth_root(base * base)
 }
 
-/// Newton's method from above, where it falls until it has arrived.
+/// By Newton's method from a start that is not below the root: each step brings it down, until rounding stops that.
 fn fifth_root(x: f64) -> f64 {
     let mut root = x.max(1.0);
     loop {

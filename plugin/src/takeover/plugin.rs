@@ -55,7 +55,7 @@ impl Plugin for TakeoverPlugin {
         };
         app.insert_resource(self.game.clone())
             .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
-            // People who have just lost their seat press nothing.
+            // Before keys are noted, so that in the frame in which somebody takes over the person's keys no longer act.
             .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems).before(note_taps))
             .add_systems(
                 Last,
@@ -67,7 +67,7 @@ impl Plugin for TakeoverPlugin {
 
 /// Who has taken over.
 #[derive(Resource, Debug, Reflect)]
-#[reflect(from_reflect = false)]
+#[reflect(Resource)]
 pub struct Takeover {
     request: TakeoverRequest,
     key: Option<KeyCode>,

@@ -1,5 +1,7 @@
 //! `play`: a window, in which each frame is a tick of the game.
 
+use std::collections::BTreeSet;
+
 use crate::{desk::Desk, game_program::GameProgram, shell::Shell};
 
 /// Ticks that the demonstrator plays of each level.
@@ -17,6 +19,8 @@ impl GameProgram {
         seat.tap("Tab");
         seat.read(&format!("{} plays", self.demonstrator));
         seat.pass_ticks(TICKS);
+        let colours: BTreeSet<u32> = desk.pixels(400).into_iter().collect();
+        assert!(colours.len() > 1, "the window shows the game");
         seat.tap("n");
         seat.read(&format!("{} default 1 · tick", self.game));
         seat.pass_ticks(TICKS);

@@ -20,6 +20,8 @@ pub enum CatchFault {
     EndlessLocal,
     /// Apples sink at the pace of `Time<Real>`.
     WallClock,
+    /// Two [`Gale`]s of different archetypes are there, and the first that a query finds blows apples aside.
+    FirstGale,
     /// A [`Mood`] is drawn without a seed. Reflection cannot see it, and nothing that is seen depends on it.
     HiddenMood,
 }
@@ -37,6 +39,18 @@ pub struct Wind {
 pub struct Season {
     frames: u32,
 }
+
+/// Blows apples aside, if it is the first.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component)]
+pub struct Gale {
+    force: f32,
+}
+
+/// Makes a gale another archetype.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component)]
+pub struct Cold;
 
 /// What the gardener feels.
 #[derive(Resource, Default)]
@@ -63,6 +77,7 @@ fn plant(app: &mut App, fault: CatchFault) {
         CatchFault::EndlessSeason => app.init_resource::<Season>().add_systems(PreUpdate, ripen),
         CatchFault::EndlessLocal => app.add_systems(PreUpdate, ripen_unseen),
         CatchFault::WallClock => app.add_systems(PreUpdate, sink),
+        CatchFault::FirstGale => app.add_systems(Startup, rise).add_systems(PreUpdate, blow_first),
         CatchFault::HiddenMood => app.init_resource::<Mood>().add_systems(PreUpdate, feel),
     };
 }
@@ -97,6 +112,18 @@ fn ripen_unseen(mut frames: Local<u32>, mut apples: Query<&mut Apple>) {
 fn sink(real: Res<Time<Real>>, mut apples: Query<&mut Transform, With<Apple>>) {
     for mut apple in &mut apples {
         apple.translation.y -= real.delta_secs();
+    }
+}
+
+fn rise(mut commands: Commands) {
+    commands.spawn(Gale { force: 0.01 });
+    commands.spawn((Gale { force: -0.01 }, Cold));
+}
+
+fn blow_first(gales: Query<&Gale>, mut apples: Query<&mut Transform, With<Apple>>) {
+    let Some(gale) = gales.iter().next() else { return };
+    for mut apple in &mut apples {
+        apple.translation.x += gale.force;
     }
 }
 

@@ -129,9 +129,9 @@ fn two_systems_in_no_order_are_found() {
     }
     let mut app = headless_app();
     app.init_resource::<Score>().add_systems(PreUpdate, (earn, double));
-    assert_eq!(app.ambiguous_orders(&["orders"]), NONE, "nothing has run");
+    assert_eq!(app.ambiguous_orders(&["agents"]), NONE, "nothing has run");
     app.ticks(1).expect("sound");
-    let found = app.ambiguous_orders(&["orders"]);
+    let found = app.ambiguous_orders(&["agents"]);
     let [pair] = found.as_slice() else { panic!("{found:?}") };
     for part in ["PreUpdate", "::earn`", "::double`", "::Score"] {
         assert!(pair.contains(part), "`{part}` is missing in: {pair}");

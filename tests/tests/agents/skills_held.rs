@@ -1,7 +1,7 @@
 //! Skills are drawn at the first tick of an episode and then every T ticks, by each agent for itself.
 
 use bevy::prelude::*;
-use bevy_playbot::{policy::AgentStreams, vision::ObservationConfig};
+use bevy_playbot::{streams::AgentStreams, vision::ObservationConfig};
 use playbot_lab::{prelude::*, train::collect::Collector, worlds::build_world};
 use playbot_learner::{PpoConfig, Prior, SkillDraw, rng::normal};
 use playbot_tests::{Corridor, training::untrained};

@@ -215,6 +215,9 @@ fn what_cannot_be_done_is_said_and_the_game_goes_on() {
     let (mut app, _) = build(plugin(Some(of(names))));
     frames(&mut app, 6);
     assert!(heard(&app)[0].contains("number 1: `heat` there, `time` here"), "{:?}", heard(&app));
+    let (mut app, _) = build(plugin(Some(of(PolicyCard { observations: vec!["x".into()], ..card() }))));
+    frames(&mut app, 6);
+    assert!(heard(&app)[0].contains("reads 2 observation values, but 1 are named"), "{:?}", heard(&app));
     let wrong = TakeoverPlugin { request: Some("rekord:x".parse()), ..plugin(None) };
     let (mut app, _) = build(wrong);
     frames(&mut app, 6);
@@ -235,7 +238,7 @@ fn the_environment_says_what_is_done() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ada.demo");
     let status = std::process::Command::new(std::env::current_exe().expect("a test program"))
-        .args(["--exact", "the_environment_says_what_is_done"])
+        .args(["--exact", "takeover::the_environment_says_what_is_done"])
         .env("PLAYBOT", format!("record:{}", path.display()))
         .env("PLAYBOT_NAME", "ada")
         .env(FILE, &path)

@@ -134,7 +134,7 @@ fn skills_and_policies_of_another_game_are_refused() {
 #[test]
 fn levels_can_be_chosen_as_the_original_does() {
     let levels = playbot_games::coinrun::LevelSet { start_level: 10, num_levels: 5 };
-    let queue = playbot_games::coinrun::LevelQueue::new(levels, 3);
+    let queue = playbot_games::coinrun::ProcgenLevels::new(levels, 3);
     let mut expected = queue.clone();
     let mut source = LevelQueue::Custom(Box::new(queue));
     let mut unused = playbot_learner::Streams::new(0).stream("unused", 0);
@@ -154,7 +154,7 @@ fn an_existing_run_is_not_overwritten() {
     let text = error.to_string();
     assert!(text.contains("--resume") && text.contains("--force"), "{text}");
     RunDir::create(&path, &experiment(), &run_info(&experiment()), true).expect("forced");
-    let nothing = RunDir::open(&path).expect("readable").0;
+    let nothing = RunDir::open(&path).expect("readable").run;
     let resumed = nothing.resume(&Corridor, &experiment(), DeviceKind::Flex, 1).err().expect("empty");
     assert!(matches!(resumed, RunError::NoCheckpoint { .. }), "{resumed}");
 }

@@ -11,7 +11,7 @@ use playbot_tests::foreign::{
 };
 
 fn examined(game: &ForeignGame) -> DoctorReport {
-    let options = DoctorOptions { ticks: 120, several_arenas: false, ..DoctorOptions::new("default") };
+    let options = DoctorOptions { ticks: 120, ..DoctorOptions::new("default") };
     examine(game, &options, |_| {}).expect("the game has this mode")
 }
 
@@ -35,7 +35,11 @@ fn check_that_the_apple_is_named(difference: &Difference, report: &DoctorReport)
 fn a_healthy_foreign_game_has_no_findings() {
     let report = examined(&catch_game());
     assert!(report.is_healthy(), "{report}");
-    for comparison in [Comparison::Repeat, Comparison::Clock, Comparison::Threads, Comparison::Restart] {
+    let arenas =
+        report.of(Comparison::Arenas).and_then(|arenas| arenas.skipped.clone()).expect("there can be only one");
+    assert!(arenas.contains("one arena per World"), "{arenas}");
+    assert_eq!(report.safety.arenas.safe, None);
+    for comparison in Comparison::ALL.into_iter().filter(|comparison| *comparison != Comparison::Arenas) {
         let compared = report.of(comparison).expect("it was made");
         assert_eq!((compared.same(), compared.ticks), (Some(true), 120), "{report}");
     }
@@ -83,6 +87,16 @@ fn a_foreign_reader_of_the_wall_clock_is_found() {
     assert_eq!(finding.causes[0].kind, CauseKind::WallClock);
     assert_eq!(report.of(Comparison::Repeat).and_then(|repeat| repeat.same()), Some(true), "{report}");
     assert_eq!(report.safety.window.safe, Some(false), "{report}");
+}
+
+#[test]
+fn an_order_of_archetypes_that_decides_is_found() {
+    let (finding, difference, report) = found(CatchFault::FirstGale, Comparison::Archetypes);
+    check_that_the_apple_is_named(&difference, &report);
+    assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::ArchetypeOrder, 1), "{report}");
+    let [recording, window, resume] =
+        [&report.safety.recording, &report.safety.window, &report.safety.resume].map(|verdict| verdict.safe);
+    assert_eq!((recording, window, resume), (Some(false), Some(false), Some(true)), "{report}");
 }
 
 #[test]

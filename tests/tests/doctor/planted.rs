@@ -106,14 +106,6 @@ fn a_score_that_two_arenas_share_is_found() {
 }
 
 #[test]
-fn a_game_with_one_arena_per_world_is_not_asked_for_two() {
-    let options = DoctorOptions { ticks: 20, several_arenas: false, ..DoctorOptions::new("bed") };
-    let report = examine(&Fault::SharedScore, &options, |_| {}).expect("the game has this mode");
-    assert!(report.is_healthy(), "{report}");
-    assert_eq!(report.safety.arenas.safe, None);
-}
-
-#[test]
 fn state_that_survives_a_restart_is_found() {
     let (finding, report) = named(Fault::Survivor, Comparison::Restart, DifferenceKind::Resource, "::Soil", ".wet");
     assert_eq!(likeliest(&finding), CauseKind::SurvivesRestart);

@@ -30,12 +30,23 @@ pub struct Block {
 
 /// Everything that is written for readers of the repository.
 pub fn documents() -> Vec<Document> {
-    let folders = ["", "demos", "docs", "docs/how-to", "game", "plugin", "plugin/cli", "plugin/lab", "plugin/learner"];
-    let documents: Vec<_> = folders.iter().flat_map(|folder| documents_of(folder)).collect();
-    for path in ["README.md", "CONTRIBUTING.md", "docs/tutorial.md", "docs/how-to/ci.md", "plugin/cli/README.md"] {
+    let folders = ["", "demos", "game", "plugin", "plugin/cli", "plugin/lab", "plugin/learner"].map(str::to_owned);
+    let folders = folders.into_iter().chain(folders_below("docs"));
+    let documents: Vec<_> = folders.flat_map(|folder| documents_of(&folder)).collect();
+    for path in ["README.md", "CONTRIBUTING.md", "docs/tutorial.md", "docs/foreign/table.md", "plugin/cli/README.md"] {
         assert!(documents.iter().any(|document| document.path == path), "{path} is missing");
     }
     documents
+}
+
+/// A folder, and all that are in it.
+fn folders_below(folder: &str) -> Vec<String> {
+    let entries = fs::read_dir(workspace().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
+    let entries = entries.map(|entry| entry.expect("readable")).filter(|entry| entry.path().is_dir());
+    let mut inner: Vec<_> = entries.map(|entry| format!("{folder}/{}", entry.file_name().to_string_lossy())).collect();
+    inner.sort();
+    let below = inner.iter().flat_map(|folder| folders_below(folder));
+    std::iter::once(folder.to_owned()).chain(below).collect()
 }
 
 /// The documents in a folder, but for the list of changes, which tells of what was.

@@ -1,10 +1,16 @@
 //! What the tutorial promises of its game is true.
 
+use std::path::Path;
+
 use playbot_lab::{
     doctor::{DoctorOptions, examine},
     eval::{EvalSummary, Player, evaluate, summarize},
+    games::Games,
+    pipeline,
     prelude::*,
+    train::{Experiment, config_file::parse_experiment, default_experiment::default_experiment},
 };
+use playbot_learner::DeviceKind;
 use playbot_tests::measuring::plan;
 
 use super::runner::runner;
@@ -16,7 +22,7 @@ fn measure(player: &Player) -> EvalSummary {
 
 #[test]
 fn the_game_is_sound() {
-    let options = DoctorOptions { ticks: 200, several_arenas: false, ..DoctorOptions::new("default".to_owned()) };
+    let options = DoctorOptions { ticks: 200, ..DoctorOptions::new("default".to_owned()) };
     let report = examine(&runner(), &options, |_| {}).expect("the game has this mode");
     assert!(report.is_healthy(), "{report}");
 }
@@ -27,4 +33,23 @@ fn the_jumper_finishes_levels_that_a_bot_which_only_runs_does_not() {
     assert_eq!((jumper.episodes, jumper.success), (20, 1.0), "{jumper:?}");
     let runs = measure(&Player::Blind(BlindBot::Constant(ActionValue::Discrete(1))));
     assert_eq!(runs.success, 0.0, "{runs:?}");
+}
+
+/// Its steps 3 and 4 by functions, with a part of the training.
+#[test]
+fn what_is_trained_finishes_levels_that_nobody_has_played() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let demos = folder.path().join("jumper.demo");
+    pipeline::record(&runner(), &"default:128..227".parse().expect("levels"), 0.1, &demos).expect("recorded");
+    let (game, games) = (runner(), [&runner() as &dyn Game]);
+    let games = Games::new(&games).expect("one game");
+    let usual = default_experiment(&games);
+    let usual = parse_experiment(&usual.text, Path::new(&*usual.origin)).expect("valid");
+    let experiment = Experiment { demos: Some(demos), steps: 65_536, ..usual };
+    let skills = pipeline::learn_skills(&game, &experiment, DeviceKind::Flex, 2).expect("learned");
+    let trainer = pipeline::train(&game, &experiment, Some(&skills), DeviceKind::Flex, 2, |_| {}).expect("trained");
+    let player = Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Sample);
+    let trained = measure(&player);
+    let random = measure(&Player::Blind(BlindBot::Uniform));
+    println!("{trained:?} {random:?}");
 }

@@ -57,6 +57,17 @@ fn a_game_of_which_nothing_is_seen_is_refused() {
     assert!(text.contains("nothing of the game `dark` is seen") && text.contains("`.observe`"), "{text}");
 }
 
+/// What everybody has in the `main` of a game.
+#[test]
+fn bevys_plugins_that_a_game_adds_again_are_named_with_what_to_do() {
+    let text = fault(&catch_game_with(|app| _ = app.add_plugins(DefaultPlugins)), 1);
+    for part in ["`broken`", "plugin was already added", "leave `DefaultPlugins`", "`ForeignGame::new`"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+    let text = fault(&catch_game_with(|_| panic!("no saved game")), 1);
+    assert!(text.contains("`broken` panicked when it was added to the app: no saved game"), "{text}");
+}
+
 #[test]
 fn an_observation_that_changes_its_length_is_a_fault() {
     fn grow(mut ticks: Local<usize>) -> Vec<f32> {
@@ -166,9 +177,7 @@ fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
             .reward(|_score: Res<Score>| 0.0)
     };
     let text = fault(&bomb(), 100);
-    for part in
-        ["agent 0, level 3, tick 4", "the paddle has left the field", "foreign_faults.rs", "which replays to it"]
-    {
+    for part in ["agent 0, level 3, tick 4", "the paddle has left the field", "faults.rs:", "which replays to it"] {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
     let path = text.split("are in ").nth(1).and_then(|rest| rest.split(", which").next()).expect("a path");

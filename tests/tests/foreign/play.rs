@@ -9,7 +9,11 @@ use playbot_lab::{
     eval::{EvalPlan, Player, evaluate, summarize},
     foreign::ForeignGame,
     prelude::*,
-    train::{Trainer, config_file::parse_experiment, run_dir::RunDir},
+    train::{
+        Trainer,
+        config_file::parse_experiment,
+        run_dir::{OpenedRun, RunDir},
+    },
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
@@ -125,7 +129,7 @@ fn a_game_with_hidden_state_says_at_resume_what_it_may_be() {
     }
     let forgetful = catch_game().level(hang);
     train(&folder, fresh(&forgetful, 1), Some(3));
-    let (run, experiment, _) = RunDir::open(&folder).expect("readable");
+    let OpenedRun { run, experiment, .. } = RunDir::open(&folder).expect("readable");
     let error = run.resume(&forgetful, &experiment, DeviceKind::Flex, 1).err().expect("the apple hangs elsewhere");
     let text = error.to_string();
     for part in [

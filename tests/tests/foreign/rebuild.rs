@@ -71,6 +71,19 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
     assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 3);
 }
 
+/// As in a window, which keeps its World.
+#[test]
+fn a_world_that_cannot_be_built_anew_says_what_to_do() {
+    let (mut world, agents) = build_world(&stubborn_game(Restart::Rebuild), "default", 0, 0, 1);
+    world.remove_resource::<Renewal>();
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::Always(3)));
+    let fault = world.tick().expect_err("there is no other World").to_string();
+    for words in ["`Restart::Rebuild`", "without a window", "`Restart::Startup`"] {
+        assert!(fault.contains(words), "`{words}` is missing in: {fault}");
+    }
+}
+
 /// Replays a recording, the last episode first.
 fn replayed_backwards(game: &ForeignGame, path: &Path) -> Vec<Option<Divergence>> {
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None).expect("readable");

@@ -5,9 +5,11 @@
 //! is asked of Bevy. Code for tests (`#[cfg(test)]`, `tests/`, `examples/`) may import what it likes; only the length of its
 //! files is looked at.
 
+mod adapters;
 mod circles;
 mod doctests;
 mod files;
+mod hidden;
 mod imports;
 mod items;
 mod modules;

@@ -27,6 +27,15 @@ enum Danger {
     Enemies,
 }
 
+/// What the sections of a level have come to.
+pub(super) struct Built {
+    pub(super) tiles: TileGrid,
+    /// The cell of the coin.
+    pub(super) coin: [i32; 2],
+    /// What lives in the level.
+    pub(super) spawns: Vec<Spawn>,
+}
+
 /// A level under construction. The cursor (`x`, `y`) is the column where the next section starts
 /// and the height of the ground there.
 pub(super) struct Builder<'a> {
@@ -45,8 +54,8 @@ impl<'a> Builder<'a> {
         Self { mode, draw, tiles: empty_room(), spawns: Vec::new(), difficulty: 0, danger: Danger::Lava, x: 5, y: 1 }
     }
 
-    /// The tiles, the cell of the coin, and what lives in the level.
-    pub(super) fn build(mut self) -> (TileGrid, [i32; 2], Vec<Spawn>) {
+    /// Draws and builds all sections.
+    pub(super) fn build(mut self) -> Built {
         self.difficulty = self.draw.below(3) + 1;
         let sections = self.draw.below(self.difficulty) + self.difficulty;
         self.danger = match self.draw.below(3) {
@@ -61,7 +70,7 @@ impl<'a> Builder<'a> {
             self.section();
         }
         self.finish();
-        (self.tiles, [self.x, self.y], self.spawns)
+        Built { tiles: self.tiles, coin: [self.x, self.y], spawns: self.spawns }
     }
 
     /// One section: a change of height, then a pit or a ground block, then barriers at both ends.

@@ -1,7 +1,7 @@
 //! A level from its mode and seed.
 
 use super::{
-    builder::Builder,
+    builder::{Builder, Built},
     draw::Draw,
     themes::{AGENT_THEMES, BACKGROUNDS, GROUND_THEMES},
 };
@@ -23,7 +23,7 @@ pub fn generate(mode: Mode, seed: u32) -> Level {
             ground_theme = draw.below(GROUND_THEMES as i32) as u8;
         }
     }
-    let (tiles, coin, spawns) = Builder::new(mode, &mut draw).build();
+    let Built { tiles, coin, spawns } = Builder::new(mode, &mut draw).build();
     Level::new(LevelParts {
         mode,
         seed,

@@ -29,11 +29,6 @@ impl Outcome {
     pub const fn is_success(self) -> bool {
         matches!(self, Outcome::Coin)
     }
-
-    /// Whether the episode was cut off rather than ended by the game.
-    pub const fn is_timeout(self) -> bool {
-        matches!(self, Outcome::Timeout)
-    }
 }
 
 /// How the episode ends after step number `step` (from 1), if it does. `saws` may be any subset

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{player::PlayerArgs, recording::Existing};
 
-/// Opens a window in which a person plays, records what is played, and hands over to a policy or a bot and back.
+/// Play in a window, record, and hand over to a policy and back.
 #[derive(clap::Args)]
 #[command(after_help = "Keys:
   those of the game, printed at the start
@@ -12,7 +12,7 @@ use crate::{player::PlayerArgs, recording::Existing};
   R, N       play the level again, go to the next one
   P          pause
   -, =       see more, see less
-  V          ants from above or in space, in a program with the feature view3d
+  V          from above or in space, if the game has that view and the program the feature view3d
   Escape     end, as do Ctrl-Q and closing the window
 
 A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
@@ -26,7 +26,7 @@ Examples:
 pub struct Args {
     /// Name of the game.
     pub(super) game: String,
-    /// Mode of the game, such as hard; the game's last one unless the levels name one.
+    /// Mode of the game; its last one unless the levels name one.
     #[arg(long)]
     pub(super) mode: Option<String>,
     /// Level to begin with; the first of the levels if none is named.

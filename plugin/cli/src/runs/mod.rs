@@ -10,7 +10,7 @@ use playbot_lab::train::run_dir::write_atomically;
 
 use super::error::{CliError, Outcome};
 
-/// Look at trainings: list them, show one, compare several over their seeds.
+/// List, show and compare trainings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs ls

@@ -18,15 +18,18 @@ use super::{
     stage::{self, Shot, Stage},
 };
 use crate::{
+    defaults::mode_to_show,
     error::{CliError, Outcome, print_line},
     interrupt, output,
     player::{Chosen, PlayerArgs},
     progress,
 };
 
-/// Writes what a bot sees as a PNG: one observation, or with --episode a whole episode as an animated PNG with tick,
-/// action, value and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it. Of a
-/// game that has a camera of its own it is what that sees; of one that cannot be drawn, the numbers, with a bar for each.
+/// Write what a bot sees as a picture, or an episode as a moving one.
+///
+/// That is a PNG: of one observation, or with --episode an animated one of a whole episode, with tick, action, value
+/// and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it. Of a game that
+/// has a camera of its own it is what that sees; of one that cannot be drawn, the numbers, with a bar for each.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot view GAME --seed 5
@@ -116,7 +119,7 @@ fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig,
         let stage = Stage::replaying(game, &mode, &observation_config, episode)?;
         return Ok((stage, observation_config, "recording".to_owned()));
     }
-    let mode = args.mode.as_deref().or(game.modes().last().copied()).unwrap_or_default();
+    let mode = args.mode.as_deref().unwrap_or_else(|| mode_to_show(game));
     game.check_mode(mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,

@@ -24,7 +24,7 @@ pub(super) fn listen_in(app: &mut App, schedule: impl ScheduleLabel) {
 
 /// Whether the window is to end.
 #[derive(Resource, Reflect)]
-#[reflect(from_reflect = false)]
+#[reflect(Component, from_reflect = false)]
 pub(super) struct Ending {
     asked: bool,
     ended: bool,

@@ -27,7 +27,7 @@ pub(super) fn systems() -> ScheduleConfigs<ScheduleSystem> {
     (hand_over, change_level, other_keys).into_configs()
 }
 
-/// Has V say why it does nothing, where ants could be seen in space by another build of the program.
+/// Has V say why it does nothing, where the game could be seen in space by another build of the program.
 pub(super) fn excuse_view(app: &mut App) {
     let says = |keys: Res<OwnKeys>, mut notice: ResMut<Notice>| {
         if keys.just_pressed(KeyCode::KeyV) {

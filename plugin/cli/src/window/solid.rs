@@ -11,9 +11,9 @@ use super::{
 };
 use playbot_lab::{game::Game, space_view::CameraFocus};
 
-/// From what it follows to the eye at the nearest zoom, metres: so steep that the wall behind an ant does not hide it.
+/// From what it follows to the eye at the nearest zoom, metres: so steep that the wall behind an agent does not hide it.
 const BEHIND: Vec3 = Vec3::new(0.0, -3.2, 8.0);
-/// Share of the way to the ant that the eye makes in a second is 1 - exp(-HASTE).
+/// Share of the way to the agent that the eye makes in a second is 1 - exp(-HASTE).
 const HASTE: f32 = 6.0;
 
 pub(super) fn build(app: &mut App, game: &dyn Game) {

@@ -97,8 +97,8 @@ impl Demonstrations {
     /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
     /// recordings, always the same ones. More steps keep them and others.
     pub fn at_most(mut self, steps: u64) -> Self {
-        // By chance, since any rule could fall into step with the recordings, which go through the same levels again and
-        // again.
+        // At random: recordings repeat the same levels in the same order, so that every n-th episode might always be on the
+        // same level.
         let mut order: Vec<usize> = (0..self.episodes.len()).collect();
         shuffle(&mut order, &mut Streams::new(0).stream("demonstrations", 0));
         let mut sum = 0;

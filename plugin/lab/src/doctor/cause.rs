@@ -14,6 +14,8 @@ pub enum CauseKind {
     HashOrder,
     /// The clock on the wall.
     WallClock,
+    /// The order in which queries go over archetypes.
+    ArchetypeOrder,
     /// Something that belongs to a thread or to the whole process.
     ThreadState,
     /// A resource of which two arenas have only one.
@@ -31,6 +33,10 @@ impl CauseKind {
             Self::Randomness => "random numbers without a seed",
             Self::HashOrder => "iteration over a HashMap or HashSet of std, whose order is another one in every run",
             Self::WallClock => "the clock on the wall: Time<Real>, Instant or SystemTime",
+            Self::ArchetypeOrder => {
+                "the order in which queries go over archetypes, which depends on how many archetypes there were before: a \
+                 recorder, a window and other plugins add some"
+            }
             Self::ThreadState => "a static, a thread_local! or a task on another thread",
             Self::SharedByArenas => "a resource, static or query that all arenas of a World share",
             Self::SurvivesRestart => {
@@ -54,6 +60,11 @@ impl CauseKind {
             Self::WallClock => {
                 "take `Res<Time>` (game time) for everything that moves or counts, and leave Time<Real> and Instant to \
                  what is only shown"
+            }
+            Self::ArchetypeOrder => {
+                "sort what a query finds, or give entities whose order counts one archetype: the same components; a physics \
+                 engine is given colliders in such an order, and a body at a seam between two of them may trip or not, so \
+                 make ground one collider"
             }
             Self::ThreadState => {
                 "put it into the World, as a resource or a component; let a task's result arrive at a tick that does not \
@@ -97,6 +108,7 @@ pub(super) fn causes(
     let kinds: &[CauseKind] = match comparison {
         Comparison::Repeat => &[CauseKind::Randomness, CauseKind::HashOrder, CauseKind::WallClock],
         Comparison::Clock => &[CauseKind::WallClock],
+        Comparison::Archetypes => &[CauseKind::ArchetypeOrder],
         Comparison::Threads => &[CauseKind::ThreadState],
         Comparison::Arenas => &[CauseKind::SharedByArenas],
         Comparison::Restart => &[CauseKind::SurvivesRestart],
@@ -125,6 +137,7 @@ mod tests {
     #[test]
     fn the_comparison_that_differs_tells_causes_apart() {
         assert_eq!(kinds(Comparison::Clock, &[]), [CauseKind::WallClock]);
+        assert_eq!(kinds(Comparison::Archetypes, &[]), [CauseKind::ArchetypeOrder]);
         assert_eq!(kinds(Comparison::Arenas, &[]), [CauseKind::SharedByArenas]);
         assert_eq!(kinds(Comparison::Restart, &[]), [CauseKind::SurvivesRestart]);
         assert_eq!(kinds(Comparison::Repeat, &[])[0], CauseKind::Randomness);

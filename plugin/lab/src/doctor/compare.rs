@@ -83,7 +83,7 @@ impl Comparer<'_> {
 
     /// Whether entities of one kind may stand in another order.
     fn is_loose(&self) -> bool {
-        matches!(self.comparison, Comparison::Restart | Comparison::Arenas)
+        matches!(self.comparison, Comparison::Archetypes | Comparison::Restart | Comparison::Arenas)
     }
 
     fn is_wanted(&self, known: &KnownType) -> bool {

@@ -20,8 +20,6 @@ pub struct DoctorOptions {
     pub ticks: u32,
     /// The level, and the seed of the actions.
     pub seed: u64,
-    /// Whether the game can have several arenas in one World.
-    pub several_arenas: bool,
     /// Components and resources whose path contains one of these are left out, such as a high score that is meant to last.
     pub ignored: Vec<String>,
 }
@@ -29,7 +27,7 @@ pub struct DoctorOptions {
 impl DoctorOptions {
     /// 300 ticks of a mode.
     pub fn new(mode: impl Into<String>) -> Self {
-        Self { mode: mode.into(), ticks: 300, seed: 0, several_arenas: true, ignored: Vec::new() }
+        Self { mode: mode.into(), ticks: 300, seed: 0, ignored: Vec::new() }
     }
 }
 
@@ -51,7 +49,7 @@ pub fn examine(
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
     let mut suspicions = Vec::new();
     for comparison in Comparison::ALL {
-        if let Some(why) = reason_to_skip(comparison, options, &comparisons) {
+        if let Some(why) = reason_to_skip(comparison, game, &comparisons) {
             comparisons.push(skipped(comparison, why));
             continue;
         }
@@ -83,11 +81,15 @@ pub fn examine(
 }
 
 /// A game that differs from itself differs everywhere, and no comparison could tell why.
-fn reason_to_skip(comparison: Comparison, options: &DoctorOptions, done: &[ComparisonReport]) -> Option<String> {
-    if comparison == Comparison::Arenas && !options.several_arenas {
+fn reason_to_skip(comparison: Comparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
+    if comparison == Comparison::Arenas && game.arenas_per_world() == Some(1) {
         return Some("the game has one arena per World, by its own word".to_owned());
     }
-    let broken = done.iter().find(|report| report.comparison == Comparison::Repeat && report.same() == Some(false))?;
+    let differs = |of: Comparison| done.iter().find(|report| report.comparison == of && report.same() == Some(false));
+    if comparison == Comparison::Clock && differs(Comparison::Archetypes).is_some() {
+        return Some("another clock brings archetypes, of which the game already depends on the number".to_owned());
+    }
+    let broken = differs(Comparison::Repeat)?;
     Some(match broken.fault.is_some() {
         true => "the game has a fault, which comes first".to_owned(),
         false => "the game already differs from itself, which comes first".to_owned(),

@@ -1,10 +1,6 @@
 //! One running copy of a game, whose agents do what a script of random actions says.
 
-use std::{
-    any::TypeId,
-    collections::BTreeSet,
-    panic::{AssertUnwindSafe, catch_unwind},
-};
+use std::{any::TypeId, collections::BTreeSet};
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -16,10 +12,10 @@ use bevy_playbot::{
     headless::{headless_app, into_world, tick_world},
     level::LevelQueue,
     observation::{Observation, VectorSensor},
-    policy::AgentStreams,
     renewal::Renewal,
     reward::Reward,
     state_hash::StateHash,
+    streams::AgentStreams,
 };
 
 use super::census::{Census, types_of};
@@ -91,13 +87,7 @@ impl GameCopy {
         }
         self.world.resource_mut::<Ends>().0.clear();
         let before = self.world.id();
-        let world = &mut self.world;
-        // A copy that panicked is never touched again, whatever state it was left in.
-        self.fault = match catch_unwind(AssertUnwindSafe(|| tick_world(world))) {
-            Ok(Ok(())) => None,
-            Ok(Err(fault)) => Some(fault.to_string()),
-            Err(panic) => Some(format!("the game panicked: {}", message(&*panic))),
-        };
+        self.fault = tick_world(&mut self.world).err().map(|fault| fault.to_string());
         if self.world.id() != before {
             // Another World has taken its place, with other entities.
             self.census = Census::default();
@@ -164,9 +154,4 @@ pub(super) fn bare_world() -> World {
     prepare(&mut world);
     world.spawn((Agent::new(0, ActionSpace::Discrete(1)), VectorSensor::new(["nothing"])));
     world
-}
-
-fn message(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a word".to_owned())
 }

@@ -6,6 +6,7 @@
 //! `#[reflect(Component)]` or `#[reflect(Resource)]` are compared field by field; the rest shows only in what agents
 //! observe, get and end with.
 
+mod archetypes;
 mod arenas;
 mod cause;
 mod census;

@@ -12,6 +12,9 @@ pub enum Comparison {
     Repeat,
     /// Two Worlds, in one of which Bevy's `Time<Real>` runs slower, as on a machine that is.
     Clock,
+    /// A World as usual, and some with more archetypes, as a recorder, a window or another plugin brings them. What differs
+    /// counts only if agents notice it: the order of things alone does no harm.
+    Archetypes,
     /// A World on this thread, and two that are ticked at the same time on two threads.
     Threads,
     /// Two arenas in one World, and each of them alone in a World.
@@ -22,13 +25,15 @@ pub enum Comparison {
 
 impl Comparison {
     /// All of them, in the order in which they are made.
-    pub const ALL: [Self; 5] = [Self::Repeat, Self::Clock, Self::Threads, Self::Arenas, Self::Restart];
+    pub const ALL: [Self; 6] =
+        [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart];
 
     /// What is held side by side, for people.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Repeat => "twice in one thread",
             Self::Clock => "with another wall clock",
+            Self::Archetypes => "with more archetypes",
             Self::Threads => "on two threads",
             Self::Arenas => "two arenas in one World",
             Self::Restart => "again after a restart",
@@ -40,6 +45,7 @@ impl Comparison {
         match self {
             Self::Repeat => ("first copy", "second copy"),
             Self::Clock => ("usual clock", "slower clock"),
+            Self::Archetypes => ("usual World", "more archetypes"),
             Self::Threads => ("one thread", "two threads"),
             Self::Arenas => ("alone", "with another arena"),
             Self::Restart => ("first episode", "second episode"),

@@ -48,9 +48,9 @@ impl Safety {
 pub(super) fn judge(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
     let verdict = |needed: &[Comparison]| verdict(comparisons, needed);
     let mut resume = verdict(&[Comparison::Repeat, Comparison::Restart]);
-    let mut recording = resume.clone();
-    if recording.safe == Some(true) && !observation.state_hash {
-        for verdict in [&mut recording, &mut resume] {
+    let mut recording = verdict(&[Comparison::Repeat, Comparison::Archetypes, Comparison::Restart]);
+    for verdict in [&mut recording, &mut resume] {
+        if verdict.safe == Some(true) && !observation.state_hash {
             verdict.why = "but the game writes no StateHash, so that a replay proves little".to_owned();
         }
     }
@@ -59,7 +59,7 @@ pub(super) fn judge(comparisons: &[ComparisonReport], observation: &ObservationR
         resume,
         arenas: verdict(&[Comparison::Repeat, Comparison::Arenas]),
         threads: verdict(&[Comparison::Repeat, Comparison::Threads]),
-        window: verdict(&[Comparison::Repeat, Comparison::Clock]),
+        window: verdict(&[Comparison::Repeat, Comparison::Clock, Comparison::Archetypes]),
     }
 }
 

@@ -1,6 +1,7 @@
 //! One comparison: copies of the game that play the same actions, tick by tick.
 
 use super::{
+    archetypes::{VARIANTS, add_archetypes},
     compare::Comparer,
     game_copy::{GameCopy, Outcome, Plan},
     observed::Watch,
@@ -30,11 +31,17 @@ impl Trial {
         let one = |number: u32| GameCopy::new(game, plan, number, 1);
         let (mut copies, pairs) = match comparison {
             Comparison::Repeat | Comparison::Clock | Comparison::Restart => (vec![one(0), one(0)], vec![(0, 1)]),
+            Comparison::Archetypes => {
+                ((0..=VARIANTS).map(|_| one(0)).collect(), (1..=VARIANTS as usize).map(|right| (0, right)).collect())
+            }
             Comparison::Threads => (vec![one(0), one(0), one(0)], vec![(0, 1), (0, 2)]),
             Comparison::Arenas => (vec![one(0), one(1), GameCopy::new(game, plan, 0, 2)], vec![(0, 2), (1, 2)]),
         };
         match comparison {
             Comparison::Clock => slow_down(&mut copies[1].world),
+            Comparison::Archetypes => {
+                copies.iter_mut().zip(0..).for_each(|(copy, count)| add_archetypes(&mut copy.world, count));
+            }
             Comparison::Restart => copies[1].play_prelude(ticks),
             _ => {}
         }
@@ -76,6 +83,10 @@ impl Trial {
                 report.effect = pairs.find_map(|&(left, right)| effect(&self.copies[left], &self.copies[right], tick));
             }
         }
+        if self.comparison == Comparison::Archetypes && report.effect.is_none() {
+            report.first = None;
+            report.others.clear();
+        }
         Ran { report, incomparable }
     }
 
@@ -111,16 +122,21 @@ pub(super) struct Ran {
 fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
     let number = left.number(0);
     let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
-    let (a, b) = (left.outcome(0), right.outcome(double));
-    let (kind, name, field, left, right) = outcomes(&a, &b, &left.observed_names())?;
-    Some(Difference { tick, kind, name, entity: Some(format!("agent {number}")), field, left, right })
+    let differs = |kind, name: &str, left: String, right: String| {
+        let (name, entity, field) = (name.to_owned(), Some(format!("agent {number}")), String::new());
+        Difference { tick, kind, name, entity, field, left, right }
+    };
+    first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
 }
 
-type OutcomeDifference = (DifferenceKind, String, String, String, String);
-
-fn outcomes(a: &Outcome, b: &Outcome, names: &[String]) -> Option<OutcomeDifference> {
-    let differs =
-        |kind, name: &str, left: String, right: String| Some((kind, name.to_owned(), String::new(), left, right));
+/// What two outcomes differ in, as `differs` puts it.
+fn first_of_outcomes<T>(
+    a: &Outcome,
+    b: &Outcome,
+    names: &[String],
+    differs: impl Fn(DifferenceKind, &str, String, String) -> T,
+) -> Option<T> {
+    let differs = |kind, name: &str, left, right| Some(differs(kind, name, left, right));
     let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
     if let Some(at) = a.observation.iter().zip(&b.observation).position(|(a, b)| !same(a, b)) {
         let name = names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));

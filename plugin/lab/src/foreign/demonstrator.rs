@@ -1,16 +1,9 @@
 //! A scripted bot that sees the World.
 
 use bevy::prelude::*;
-use rand::RngExt;
 
 use super::runtime::{playing_agent, with_foreign};
-use bevy_playbot::{
-    action::{Action, ActionValue},
-    agent::Agent,
-    bot::uniform,
-    control::Control,
-    policy::AgentStreams,
-};
+use bevy_playbot::{action::Action, agent::Agent, bot::with_noise, control::Control, streams::AgentStreams};
 
 /// The agent is played by the game's demonstrator while its control is [`Control::Bot`].
 #[derive(Component, Clone, Copy, Debug, Reflect)]
@@ -33,14 +26,6 @@ pub(super) fn decide(world: &mut World) {
     let mut entity = world.entity_mut(agent);
     let Some(space) = entity.get::<Agent>().map(|agent| agent.actions) else { return };
     let Some(mut streams) = entity.get_mut::<AgentStreams>() else { return };
-    let rng = &mut streams.action;
-    let chosen = match planned {
-        ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => uniform(&space, rng),
-        ActionValue::Continuous(values) if noise > 0.0 => {
-            let noisy = |value: f32| (value + noise as f32 * playbot_learner::rng::normal(rng)).clamp(-1.0, 1.0);
-            ActionValue::Continuous(values.into_iter().map(noisy).collect())
-        }
-        planned => planned,
-    };
+    let chosen = with_noise(planned, &space, noise, &mut streams.action);
     entity.insert(Action(chosen));
 }

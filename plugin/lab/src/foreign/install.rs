@@ -13,7 +13,8 @@ use super::{
 };
 use bevy_playbot::{
     action::check_actions,
-    panics::note_actions,
+    fault::Faults,
+    panics::{self, note_actions},
     placement::{TickSchedules, is_tick},
     systems::PlaybotSystems,
     virtual_input::{InputRoute, VirtualInputPlugin},
@@ -29,7 +30,7 @@ pub(super) struct ForeignPlugin(pub(super) ForeignGame);
 impl Plugin for ForeignPlugin {
     fn build(&self, app: &mut App) {
         let description = &self.0.description;
-        (description.plugin)(app);
+        add_game(app, description.name, &*description.plugin);
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }
@@ -63,6 +64,17 @@ impl Plugin for ForeignPlugin {
         order.startup_labels.insert(0, BeforeGame.intern());
         app.insert_resource(ForeignCell::new(Foreign::new(&self.0, startup)));
     }
+}
+
+/// Lets the game add itself. Its panic is a fault of the first tick, so that it is told as the game's.
+fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
+    let Err(words) = panics::hear(|| plugin(app)) else { return };
+    let mut fault = format!("the game `{name}` panicked when it was added to the app: {words}");
+    if words.contains("plugin was already added") {
+        fault += ". Playbot adds Bevy's own plugins: leave `DefaultPlugins`, or this one of them, out of the function that \
+                  is given to `ForeignGame::new`";
+    }
+    app.world_mut().resource_mut::<Faults>().report(fault);
 }
 
 /// Whatever is there now is not the game's.

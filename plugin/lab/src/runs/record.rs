@@ -13,7 +13,7 @@ use super::{
 use crate::train::{
     Experiment,
     checkpoint::{self, Checkpoint},
-    run_dir::{RunDir, RunInfo},
+    run_dir::{OpenedRun, RunDir, RunInfo},
 };
 
 /// What a run is and what it has reached.
@@ -47,7 +47,7 @@ impl RunRecord {
         if !description.is_file() {
             return Err(RunsError::NotARun(path.into()));
         }
-        let (run, experiment, info) = RunDir::open(path)?;
+        let OpenedRun { run, experiment, info } = RunDir::open(path)?;
         let log = run.metrics_log();
         let modified = |file: &Path| fs::metadata(file).and_then(|data| data.modified()).ok();
         Ok(Self {

@@ -16,9 +16,9 @@ use bevy_playbot::{
     fault::Fault,
     headless::tick_world,
     level::LevelQueue,
-    policy::AgentStreams,
     skill_prior::ActiveSkill,
     state_hash::StateHash,
+    streams::AgentStreams,
 };
 
 /// Actions of the running episode.

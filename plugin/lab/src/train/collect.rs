@@ -19,10 +19,11 @@ use bevy_playbot::{
     level::LevelQueue,
     observation::Observation,
     placement::TickSchedules,
-    policy::{ActionDraw, ActivePolicy, AgentStreams, Decision},
+    policy::{ActionDraw, ActivePolicy, Decision},
     renewal::Renewal,
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior, draw_skills},
+    streams::AgentStreams,
     systems::{ObserveSchedule, PlaybotSystems},
     vision::{ObservationConfig, VisionError},
 };
@@ -36,6 +37,7 @@ pub struct Collector {
 /// Rows of the rollout that is being filled.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
+#[reflect(Component)]
 struct Collecting {
     #[reflect(ignore)]
     rollout: Rollout,

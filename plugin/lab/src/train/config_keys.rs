@@ -134,7 +134,8 @@ impl Keys {
     pub(super) fn of_experiment(experiment: &Experiment, origin: &Origin) -> Result<Self, ConfigError> {
         let text = experiment.to_ron().map_err(|error| origin.error((1, 1), error.to_string()))?;
         let mut keys = Self::default();
-        // Told by their looks, since it is an example that says what is a section; variants of enums have a name.
+        // This text is what tells sections from values: a section begins with its bracket, the variant of an enum with its
+        // name.
         keys.collect(&text, 0, "", &|_, _| origin.clone(), &|_, value| value.starts_with('('))?;
         Ok(keys)
     }

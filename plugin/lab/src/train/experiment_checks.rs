@@ -237,7 +237,7 @@ mod tests {
         }
         let text = check(r#"demos: "d", ppo: (norm_obs: true)"#).expect_err("the decoder sees raw ones");
         assert!(text.starts_with("`ppo.norm_obs` is true") && text.contains("set `skills.norm_obs`"), "{text}");
-        // Those without a tie may do as they like, and the other family's key says nothing.
+        // Algorithms that are not tied to skills may normalise, and the other family's key is not looked at.
         for changes in [
             r#"algorithm: "ppo", ppo: (norm_obs: true)"#,
             r#"algorithm: "bc", ppo: (norm_obs: true)"#,

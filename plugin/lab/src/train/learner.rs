@@ -6,7 +6,7 @@ use std::{
 };
 
 pub use playbot_learner::LearnerMetrics;
-use playbot_learner::{DeviceKind, FileError, PolicySpec, PpoLearner, SacLearner, SkillModel};
+use playbot_learner::{DeviceKind, FileError, Learner, PolicySpec, PpoLearner, SacLearner, SkillModel};
 
 use super::{algorithm::Algorithm, config::Experiment, train_error::TrainError};
 use crate::game::Game;
@@ -15,23 +15,23 @@ use bevy_playbot::vision::ObservationConfig;
 
 /// The learner of an experiment's algorithm, whichever that is.
 #[derive(Debug)]
-pub struct Learner(Box<dyn playbot_learner::Learner>);
+pub struct TrainedLearner(Box<dyn Learner>);
 
-impl Deref for Learner {
-    type Target = dyn playbot_learner::Learner;
+impl Deref for TrainedLearner {
+    type Target = dyn Learner;
 
     fn deref(&self) -> &Self::Target {
         &*self.0
     }
 }
 
-impl DerefMut for Learner {
+impl DerefMut for TrainedLearner {
     fn deref_mut(&mut self) -> &mut Self::Target {
         &mut *self.0
     }
 }
 
-impl Learner {
+impl TrainedLearner {
     /// A learner with fresh weights, tied to `skills` if the experiment's algorithm needs them.
     ///
     /// # Errors
@@ -63,7 +63,7 @@ impl Learner {
         })
     }
 
-    fn of(learner: impl playbot_learner::Learner + 'static) -> Self {
+    fn of(learner: impl Learner + 'static) -> Self {
         Self(Box::new(learner))
     }
 

@@ -33,7 +33,7 @@ mod update_report;
 mod which_checkpoint;
 
 pub use config::{Algorithm, Experiment};
-pub use learner::{Learner, LearnerMetrics};
+pub use learner::{LearnerMetrics, TrainedLearner};
 pub use train_error::TrainError;
 pub use trainer::Trainer;
 pub use update_report::{Timing, UpdateReport};

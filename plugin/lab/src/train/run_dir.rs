@@ -24,7 +24,7 @@ use super::{
     checkpoint::{self, Checkpoint, Which},
     config::{Algorithm, Experiment},
     config_file::read_experiment,
-    learner::Learner,
+    learner::TrainedLearner,
     metrics_log::MetricsLog,
     progress::Progress,
     replaced_run::ReplacedRun,
@@ -86,6 +86,16 @@ pub struct RunDir {
     _lock: Option<RunLock>,
 }
 
+/// A run that exists, with what its folder says of it.
+pub struct OpenedRun {
+    /// The folder.
+    pub run: RunDir,
+    /// Its experiment, with all defaults filled in.
+    pub experiment: Experiment,
+    /// What its `run.json` says.
+    pub info: RunInfo,
+}
+
 impl RunDir {
     /// Makes the folder, locks it, and writes what the run is.
     ///
@@ -134,12 +144,12 @@ impl RunDir {
     /// # Errors
     ///
     /// [`RunError`] if its files are missing or damaged.
-    pub fn open(path: &Path) -> Result<(Self, Experiment, RunInfo), RunError> {
+    pub fn open(path: &Path) -> Result<OpenedRun, RunError> {
         let experiment = read_experiment(&path.join("experiment.ron"))?;
         let info_path = path.join("run.json");
         let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;
         let info = serde_json::from_str(&text).map_err(|error| damaged(&info_path, &error))?;
-        Ok((Self { path: path.into(), _lock: None }, experiment, info))
+        Ok(OpenedRun { run: Self { path: path.into(), _lock: None }, experiment, info })
     }
 
     /// [`open`](Self::open), to go on with it.
@@ -147,7 +157,7 @@ impl RunDir {
     /// # Errors
     ///
     /// As for [`open`](Self::open), and [`RunError::Busy`].
-    pub fn open_to_write(path: &Path) -> Result<(Self, Experiment, RunInfo), RunError> {
+    pub fn open_to_write(path: &Path) -> Result<OpenedRun, RunError> {
         // A folder that is no run gets no lock file.
         Self::open(path)?;
         Self::open_with(RunLock::take(path)?)
@@ -158,9 +168,9 @@ impl RunDir {
     /// # Errors
     ///
     /// As for [`open`](Self::open).
-    pub fn open_with(lock: RunLock) -> Result<(Self, Experiment, RunInfo), RunError> {
-        let (run, experiment, info) = Self::open(lock.folder())?;
-        Ok((Self { _lock: Some(lock), ..run }, experiment, info))
+    pub fn open_with(lock: RunLock) -> Result<OpenedRun, RunError> {
+        let OpenedRun { run, experiment, info } = Self::open(lock.folder())?;
+        Ok(OpenedRun { run: Self { _lock: Some(lock), ..run }, experiment, info })
     }
 
     /// Writes the experiment anew, after its steps were raised.
@@ -245,7 +255,11 @@ impl RunDir {
         Ok(trainer)
     }
 
-    fn last_readable(&self, algorithm: Algorithm, device: DeviceKind) -> Result<(Learner, TrainState), RunError> {
+    fn last_readable(
+        &self,
+        algorithm: Algorithm,
+        device: DeviceKind,
+    ) -> Result<(TrainedLearner, TrainState), RunError> {
         let mut first_error = None;
         for checkpoint in checkpoint::list(&self.path)?.iter().rev() {
             match read_checkpoint(checkpoint, algorithm, device) {
@@ -264,8 +278,8 @@ fn read_checkpoint(
     checkpoint: &Checkpoint,
     algorithm: Algorithm,
     device: DeviceKind,
-) -> Result<(Learner, TrainState), RunError> {
-    let learner = Learner::load(algorithm, &checkpoint.learner_file(), device)?;
+) -> Result<(TrainedLearner, TrainState), RunError> {
+    let learner = TrainedLearner::load(algorithm, &checkpoint.learner_file(), device)?;
     let path = checkpoint.arenas_file();
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let state = serde_json::from_str(&text).map_err(|error| damaged(&path, &error))?;

@@ -9,7 +9,7 @@ use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, Skil
 use super::{
     collect::Collector,
     config::Experiment,
-    learner::Learner,
+    learner::TrainedLearner,
     progress::Progress,
     train_error::TrainError,
     update_report::{Timing, UpdateReport},
@@ -24,7 +24,7 @@ const INITIAL_KL_ROWS: usize = 1024;
 pub struct Trainer {
     experiment: Experiment,
     threads: usize,
-    pub(crate) learner: Learner,
+    pub(crate) learner: TrainedLearner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
 }
@@ -43,7 +43,7 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
-        let learner = Learner::new(game, experiment, skills, device)?;
+        let learner = TrainedLearner::new(game, experiment, skills, device)?;
         Self::with_learner(game, experiment, learner, threads)
     }
 
@@ -51,7 +51,7 @@ impl Trainer {
     pub(crate) fn with_learner(
         game: &dyn Game,
         experiment: &Experiment,
-        learner: Learner,
+        learner: TrainedLearner,
         threads: usize,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);

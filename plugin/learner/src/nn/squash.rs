@@ -54,11 +54,6 @@ impl SquashedGaussian {
         Self { mean, log_std, scale: Tensor::ones([1, dim], device), bias: Tensor::zeros([1, dim], device) }
     }
 
-    /// The action at the mean of x, which is the median action, `[n, dim]`.
-    pub fn median(&self) -> Tensor<2> {
-        self.mean.clone().tanh() * self.scale.clone() + self.bias.clone()
-    }
-
     /// x = mean + σ · noise squashed into an action, differentiable in mean and σ (the reparameterisation trick).
     /// `noise` is standard normal, `[n, dim]`.
     pub fn draw(&self, noise: Tensor<2>, form: LogProbForm) -> SquashedDraw {

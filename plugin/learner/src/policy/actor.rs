@@ -106,11 +106,6 @@ impl Actor {
         Ok(Self { cnn: None, net, log_std })
     }
 
-    /// The same actor with a trunk that reads images; its features must be [`NetShape::obs_dim`] of the actor.
-    pub fn with_cnn(self, cnn: ImageNet) -> Self {
-        Self { cnn: Some(cnn), ..self }
-    }
-
     /// Width of the observation behind a skill of width `latent`: the numbers of a vector, or the features of an image.
     pub(crate) fn obs_dim(&self, latent: usize) -> usize {
         self.net.inputs() - latent

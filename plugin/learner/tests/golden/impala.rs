@@ -27,7 +27,7 @@ fn actor(case: &Case, device: DeviceKind) -> Actor {
     case.fill(&mut cnn, "param.", "cnn", device);
     case.fill(&mut actor, "param.", "decoder", device);
     case.check_number("cnn_param_count", parameter_count(&cnn) as f64);
-    actor.with_cnn(cnn)
+    Actor { cnn: Some(cnn), ..actor }
 }
 
 fn images(case: &Case, device: DeviceKind) -> ObsBatch {

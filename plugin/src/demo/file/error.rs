@@ -22,7 +22,8 @@ impl DemoFileError {
     }
 
     /// Whether `playbot demo repair` can do something about it: the header is sound and frames are not.
-    pub fn is_repairable(&self) -> bool {
+    #[cfg(test)]
+    pub(super) fn is_repairable(&self) -> bool {
         matches!(
             self.fault,
             DemoFault::BadFrameMagic { .. }

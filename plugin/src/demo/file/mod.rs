@@ -58,6 +58,6 @@ pub use header::DEMO_FORMAT;
 #[doc(hidden)]
 pub use preamble::DEMO_MAGIC;
 #[doc(hidden)]
-pub use repair::{DroppedRegion, RepairReport, repair, repair_with_header};
+pub use repair::{DroppedRegion, RepairReport, repair};
 #[doc(hidden)]
 pub use summary::DemoSummary;

@@ -45,28 +45,11 @@ pub struct RepairReport {
 ///
 /// # Errors
 ///
-/// When the header is not sound (see [`repair_with_header`]), when `out` is another file that exists
+/// When the header is not sound, when `out` is another file that exists
 /// ([`DemoFault::Exists`]), while another program records to the file that is repaired in place
 /// ([`DemoFault::Locked`]), or when reading or writing fails.
 pub fn repair(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RepairReport, DemoFileError> {
-    repair_inner(path.as_ref(), out.as_ref(), None)
-}
-
-/// Like [`repair`], for a file whose header is lost: `header` takes its place, and the whole file is
-/// searched for frames that fit it.
-///
-/// # Errors
-///
-/// Those of [`repair`], and [`DemoFault::HeaderValue`] when `header` itself is not valid.
-pub fn repair_with_header(
-    path: impl AsRef<Path>,
-    out: impl AsRef<Path>,
-    header: &DemoHeader,
-) -> Result<RepairReport, DemoFileError> {
-    repair_inner(path.as_ref(), out.as_ref(), Some(header))
-}
-
-fn repair_inner(path: &Path, out: &Path, header: Option<&DemoHeader>) -> Result<RepairReport, DemoFileError> {
+    let (path, out) = (path.as_ref(), out.as_ref());
     let at_input = |fault| DemoFileError::new(path, fault);
     let file = File::open(path).map_err(|e| at_input(DemoFault::io("open the file")(e)))?;
     let in_place = match (fs::canonicalize(path), fs::canonicalize(out)) {
@@ -77,7 +60,8 @@ fn repair_inner(path: &Path, out: &Path, header: Option<&DemoHeader>) -> Result<
     if in_place {
         store::lock(&file).map_err(at_input)?;
     }
-    let (input, mut output, header, start) = load(&file, header).map_err(at_input)?;
+    let Loaded { input, header, start } = load(&file).map_err(at_input)?;
+    let mut output = input[..start].to_vec();
     let mut report = salvage(&input, start, &header, &mut output);
     if in_place {
         if output == input {
@@ -97,17 +81,20 @@ fn repair_inner(path: &Path, out: &Path, header: Option<&DemoHeader>) -> Result<
     Ok(report)
 }
 
-/// The bytes of the input, the start of the output, the header, and where frames may begin.
-fn load(mut file: &File, header: Option<&DemoHeader>) -> Result<(Vec<u8>, Vec<u8>, DemoHeader, usize), DemoFault> {
+/// A file whose header is sound.
+struct Loaded {
+    /// All of its bytes.
+    input: Vec<u8>,
+    header: DemoHeader,
+    /// Where frames begin.
+    start: usize,
+}
+
+fn load(mut file: &File) -> Result<Loaded, DemoFault> {
     let mut input = Vec::new();
     file.read_to_end(&mut input).map_err(DemoFault::io("read the file"))?;
-    if let Some(header) = header {
-        return Ok((input, preamble::encode(header)?, header.clone(), 0));
-    }
     let (header, start) = preamble::decode(input.as_slice())?;
-    let start = start as usize;
-    let output = input[..start].to_vec();
-    Ok((input, output, header, start))
+    Ok(Loaded { input, header, start: start as usize })
 }
 
 /// Appends every sound frame from `start` on to `output`.
@@ -237,19 +224,5 @@ mod tests {
         }
         assert_eq!(seeds(&path), [1, 2, 3]);
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 3, "no temporary file is left");
-    }
-
-    #[test]
-    fn a_lost_header_can_be_replaced() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let path = write(folder.path(), "a.demo", &[episode(1, 5), episode(2, 5)]);
-        let mut bytes = fs::read(&path).expect("read");
-        bytes[..20].fill(0);
-        fs::write(&path, &bytes).expect("damaged");
-        let out = folder.path().join("b.demo");
-        assert!(matches!(repair(&path, &out).expect_err("no header").fault, DemoFault::NotADemo { .. }));
-        let report = repair_with_header(&path, &out, &header()).expect("repaired");
-        assert_eq!((report.kept_episodes, report.dropped_regions.len()), (2, 1));
-        assert_eq!(seeds(&out), [1, 2]);
     }
 }

@@ -100,7 +100,7 @@ pub fn game(app: &mut App) {
         .add_systems(Update, (touch, watch_limits, follow, show_run).chain().run_if(in_state(Screen::Playing)))
         .add_systems(OnEnter(Screen::Won), |commands: Commands| banner(commands, Screen::Won, "The flag! R goes on"))
         .add_systems(OnEnter(Screen::Lost), |commands: Commands| banner(commands, Screen::Lost, "Ouch! R tries again"))
-        .add_systems(Update, play_again.run_if(not(in_state(Screen::Loading))));
+        .add_systems(Update, again.run_if(not(in_state(Screen::Loading))));
 }
 
 fn setup(mut commands: Commands) {
@@ -178,16 +178,14 @@ fn spawn_column(commands: &mut Commands, index: usize, column: Column) {
 
 /// One body without seams between columns of one height, over which the hero would trip.
 fn spawn_ground(commands: &mut Commands, columns: &[Column]) {
-    let mut left = 0.0;
-    let mut blocks = Vec::new();
-    for run in columns.chunk_by(|a, b| a.ground == b.ground) {
+    let mut right = 0.0;
+    let runs = columns.chunk_by(|a, b| a.ground == b.ground).map(|run| {
         let half = Vec2::new(run.len() as f32, f32::from(run[0].ground)) / 2.0;
-        if half.y > 0.0 {
-            blocks.push((Vec2::new(left + half.x, half.y), 0.0, Collider::cuboid(half.x, half.y)));
-        }
-        left += run.len() as f32;
-    }
-    commands.spawn((InLevel, Transform::default(), Collider::compound(blocks)));
+        right += run.len() as f32;
+        (Vec2::new(right - half.x, half.y), 0.0, Collider::cuboid(half.x, half.y))
+    });
+    let ground = Collider::compound(runs.filter(|(center, ..)| center.y > 0.0).collect());
+    commands.spawn((InLevel, Transform::default(), ground));
 }
 
 fn spawn_hero(commands: &mut Commands, ground: f32) {
@@ -268,15 +266,10 @@ fn touch(
 }
 
 /// Who falls into a pit, or is too slow, has lost.
-fn watch_limits(
-    time: Res<Time>,
-    hero: Single<&Transform, With<Hero>>,
-    mut run: ResMut<Run>,
-    mut next: ResMut<NextState<Screen>>,
-) {
+fn watch_limits(time: Res<Time>, at: Single<&Transform, With<Hero>>, mut run: ResMut<Run>, mut commands: Commands) {
     run.time -= time.delta_secs();
-    if hero.translation.y < -1.0 || run.time < 0.0 {
-        next.set(Screen::Lost);
+    if at.translation.y < -1.0 || run.time < 0.0 {
+        commands.set_state(Screen::Lost);
     }
 }
 
@@ -296,14 +289,9 @@ fn banner(mut commands: Commands, screen: Screen, text: &str) {
 }
 
 /// The next level after the flag; the same one after an accident, or when asked.
-fn play_again(
-    input: Single<&ActionState<Move>>,
-    screen: Res<State<Screen>>,
-    mut level: ResMut<Level>,
-    mut next: ResMut<NextState<Screen>>,
-) {
+fn again(input: Single<&ActionState<Move>>, on: Res<State<Screen>>, mut level: ResMut<Level>, mut commands: Commands) {
     if input.just_pressed(&Move::Again) {
-        level.0 += u64::from(*screen.get() == Screen::Won);
-        next.set(Screen::Loading);
+        level.0 += u64::from(*on.get() == Screen::Won);
+        commands.set_state(Screen::Loading);
     }
 }

@@ -60,7 +60,7 @@ fn a_game_may_add_a_saw_and_move_a_crate() {
 #[test]
 fn a_game_plays_the_same_with_a_picture_and_without() {
     let run = |mut world: World, agent: Entity| -> Vec<u64> {
-        world.insert_resource(bevy_playbot::policy::PlaybotSeed(3));
+        world.insert_resource(bevy_playbot::streams::PlaybotSeed(3));
         let queue = LevelQueue::list((0..4).collect::<Vec<_>>());
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
         let mut hash = |_| {

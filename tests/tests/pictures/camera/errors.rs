@@ -21,7 +21,7 @@ fn without_an_adapter_the_raster_is_offered() {
     }
     let this = std::env::current_exe().expect("a test program");
     let output = std::process::Command::new(this)
-        .args(["--exact", "without_an_adapter_the_raster_is_offered"])
+        .args(["--exact", "camera::errors::without_an_adapter_the_raster_is_offered"])
         .envs([("VK_DRIVER_FILES", "/nowhere.json"), ("VK_ICD_FILENAMES", "/nowhere.json"), (CHILD, "1")])
         .output()
         .expect("a copy");
