@@ -35,7 +35,7 @@ fn subscriber<W>(filter: EnvFilter, colours: bool, writer: W) -> impl Subscriber
 where
     W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
 {
-    // What cannot be written is not worth a word, which could not be written either.
+    // An error of writing the log could only be reported to the same place.
     let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
     format.with_ansi(colours).with_writer(writer).finish().with(FilesOnce::default())
 }

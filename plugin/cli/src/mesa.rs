@@ -17,6 +17,6 @@ pub fn silence_warnings() {
     }
     let mut args = std::env::args_os();
     let (Some(name), Ok(program)) = (args.next(), std::env::current_exe()) else { return };
-    // It returns only if it fails; then there are some lines too many.
+    // It returns only if it fails; the program goes on, with Mesa's warnings.
     let _ = Command::new(program).arg0(name).args(args).env(SWITCH, "1").exec();
 }

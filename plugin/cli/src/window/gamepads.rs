@@ -46,7 +46,7 @@ type Own<'w, 's> = Query<'w, 's, (), With<VirtualGamepad>>;
 
 fn keep_events(events: ResMut<Messages<RawGamepadEvent>>, own: Own) {
     keep(events, |event| match event {
-        // That there is a gamepad is no secret.
+        // A game may show which gamepads are connected; only what they do is kept from it.
         RawGamepadEvent::Connection(_) => true,
         RawGamepadEvent::Button(change) => own.contains(change.gamepad),
         RawGamepadEvent::Axis(change) => own.contains(change.gamepad),

@@ -63,14 +63,15 @@ impl Comparer<'_> {
                     a == b
                 }
             }
-            // Of an entity that is no part of the game nothing is known.
+            // Entities outside of the game, such as observers, have no partner and are not compared.
             _ => true,
         };
         self.compare_resources(left, right, tick, &same_entity, &mut found);
         for group in &pairs {
             found.differences.extend(self.compare_group(left, right, tick, group, &same_entity));
         }
-        // What a restart left over is a cause; elsewhere a number of entities follows from something.
+        // After a restart a surplus of entities is itself the cause, so it comes early; in other comparisons it is the effect of
+        // another difference, and comes last.
         let is_cause = self.comparison == Comparison::Restart;
         let rank = |difference: &Difference| match difference.kind {
             DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
@@ -101,7 +102,7 @@ impl Comparer<'_> {
         same_entity: &dyn Fn(Entity, Entity) -> bool,
         found: &mut Found,
     ) {
-        // The second agent of a shared World finds itself at another place of every list than when it is alone.
+        // Lists in resources hold both agents of a shared World, so the second one is not where it is when it is alone.
         if self.comparison == Comparison::Arenas && left.number(0) != right.number(0) {
             return;
         }
