@@ -17,7 +17,8 @@ fn hidden(modules: &Modules) -> BTreeSet<String> {
     for (path, module) in &modules.0 {
         let is_below = closed.iter().any(|hidden| path.starts_with(hidden));
         for item in &module.items {
-            if !item.is_hidden() && !(is_below && item.visibility == Visibility::Public) {
+            let is_hidden = item.is_hidden() || (is_below && item.visibility == Visibility::Public);
+            if !is_hidden {
                 continue;
             }
             if item.keyword == "mod" {
