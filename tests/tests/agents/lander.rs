@@ -3,7 +3,7 @@
 
 #[path = "../../../plugin/lab/examples/lander.rs"]
 #[allow(dead_code, reason = "its `main` is for those who run the example")]
-mod lander;
+mod lander_example;
 
 #[path = "../../../plugin/examples/lander_window.rs"]
 #[allow(dead_code, reason = "its `main` opens a window")]
@@ -18,7 +18,7 @@ use bevy_playbot::{
 use playbot_lab::game::Game;
 use playbot_learner::DeviceKind;
 
-use lander::lander_rules::rules::{TICK_HZ, add_rules, capsule};
+use lander_example::lander_rules::rules::{TICK_HZ, add_rules, capsule};
 
 /// As the example's, but small.
 const TINY: &str = r#"(
@@ -32,12 +32,12 @@ const TINY: &str = r#"(
 fn the_lander_goes_the_whole_road() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("lander.policy");
-    let [learned, random] = lander::road(TINY, "moon:128..133", &path).expect("every step works");
+    let [learned, random] = lander_example::road(TINY, "moon:128..133", &path).expect("every step works");
     assert_eq!((learned.episodes, random.episodes), (8, 8));
     assert!(learned.return_mean.is_finite() && learned.length_mean > 1.0, "{learned:?}");
 
     let file = PolicyFile::load(&path, DeviceKind::default()).expect("written");
-    check_policy(&lander::Lander.card(), &file).expect("made for this game");
+    check_policy(&lander_example::Lander.card(), &file).expect("made for this game");
     let mut app = headless_app();
     set_tick_rate(&mut app, TICK_HZ);
     add_rules(&mut app);
@@ -94,8 +94,8 @@ fn f9_gives_the_controls_and_takes_them_back() {
 #[test]
 fn the_pilot_lands_softly() {
     use playbot_lab::{eval::Player, pipeline, train::config_file::parse_experiment};
-    let experiment = parse_experiment(lander::EXPERIMENT, "lander.ron".as_ref()).expect("valid");
-    let measured = pipeline::evaluate(&lander::Lander, &experiment, "pilot", &Player::Demonstrator, 2);
+    let experiment = parse_experiment(lander_example::EXPERIMENT, "lander.ron".as_ref()).expect("valid");
+    let measured = pipeline::evaluate(&lander_example::Lander, &experiment, "pilot", &Player::Demonstrator, 2);
     let measured = measured.expect("the pilot can fly");
     assert!(measured.success > 0.9, "{measured:?}");
 }
