@@ -40,6 +40,15 @@ pub fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Tr
     trainer
 }
 
+/// Trains to the end without saving, and returns the success rate of the last update, if episodes have ended by then.
+pub fn last_success_rate(mut trainer: Trainer) -> Option<f64> {
+    let mut last = None;
+    while !trainer.is_done() {
+        last = trainer.update().expect("learns").success_rate;
+    }
+    last
+}
+
 /// What a run has written: its metrics, and learner and arenas of its last checkpoint.
 pub fn written(folder: &Path) -> [Vec<u8>; 3] {
     let last = RunDir::open(folder).expect("a run").run.checkpoint(Which::Last).expect("saved");

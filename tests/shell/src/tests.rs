@@ -1,8 +1,19 @@
 //! Functions of a program's game as tests of its crate.
 
-/// Makes a test of each of these functions of a [`GameProgram`](crate::GameProgram), under its name.
+/// Makes a test of each function of a [`GameProgram`](crate::GameProgram) that tests a verb, under its name.
 #[macro_export]
 macro_rules! tests {
+    ($game:ident) => {
+        $crate::tests! {
+            $game:
+            recordings_replay,
+            moments_are_drawn,
+            a_killed_training_goes_on_bit_for_bit,
+            a_policy_file_plays_as_its_run,
+            the_doctor_finds_nothing,
+            what_a_window_records_replays,
+        }
+    };
     ($game:ident: $($name:ident),+ $(,)?) => {
         $(
             #[test]

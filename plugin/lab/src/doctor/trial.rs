@@ -129,13 +129,13 @@ fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
     first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
 }
 
-/// What two outcomes differ in, as `differs` puts it.
-fn first_of_outcomes<T>(
+/// What two outcomes differ in first, as `differs` puts it.
+fn first_of_outcomes(
     a: &Outcome,
     b: &Outcome,
     names: &[String],
-    differs: impl Fn(DifferenceKind, &str, String, String) -> T,
-) -> Option<T> {
+    differs: impl Fn(DifferenceKind, &str, String, String) -> Difference,
+) -> Option<Difference> {
     let differs = |kind, name: &str, left, right| Some(differs(kind, name, left, right));
     let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
     if let Some(at) = a.observation.iter().zip(&b.observation).position(|(a, b)| !same(a, b)) {

@@ -10,12 +10,4 @@ const GAME: GameProgram = GameProgram {
     key: "Left",
 };
 
-playbot_shell::tests! {
-    GAME:
-    recordings_replay,
-    moments_are_drawn,
-    a_killed_training_goes_on_bit_for_bit,
-    a_policy_file_plays_as_its_run,
-    the_doctor_finds_nothing,
-    what_a_window_records_replays,
-}
+playbot_shell::tests!(GAME);

@@ -15,7 +15,7 @@ use playbot_learner::{DeviceKind, Policy, PolicyFile, SkillModel};
 use playbot_tests::{
     Corridor, PaintedCorridor,
     measuring::plan,
-    training::{train, written},
+    training::{last_success_rate, train, written},
 };
 
 use super::corridor::{experiment, record, skills};
@@ -69,11 +69,8 @@ fn pictures_show_enough_to_learn_the_corridor() {
     experiment.algorithm = Algorithm::Ppo;
     experiment.image.stack = 1;
     experiment.steps = 8192;
-    let mut trainer = Trainer::new(&PaintedCorridor, &experiment, None, DeviceKind::Flex, 2).expect("fits");
-    let mut last = None;
-    while !trainer.is_done() {
-        last = trainer.update().expect("learns").success_rate;
-    }
+    let trainer = Trainer::new(&PaintedCorridor, &experiment, None, DeviceKind::Flex, 2).expect("fits");
+    let last = last_success_rate(trainer);
     assert!(last.expect("episodes ended") > 0.9, "success rate {last:?}; a random walker has about 0.3");
 }
 
