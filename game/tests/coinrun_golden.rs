@@ -1,6 +1,8 @@
 //! Compares the generator, the rules and whole episodes with numbers measured on Procgen.
 
-use std::path::PathBuf;
+#[path = "shared/golden.rs"]
+mod golden;
+
 use std::sync::Arc;
 
 use playbot_games::coinrun::{Level, Mode, Outcome, Sim, generate};
@@ -9,17 +11,12 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Reads a reference file: from the folder in `PLAYBOT_GOLDEN_GAMES`, else from the fixtures.
-fn golden(name: &str) -> String {
-    let folder = std::env::var_os("PLAYBOT_GOLDEN_GAMES")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/coinrun"), PathBuf::from);
-    let path = folder.join(name);
-    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-fn golden_lines<T: DeserializeOwned>(name: &str) -> Vec<T> {
-    let parse = |line| serde_json::from_str(line).expect("a valid line");
-    golden(name).lines().map(parse).collect()
+/// The objects of a file of JSON lines, at least one.
+fn golden_lines<T: DeserializeOwned>(fixture: &str) -> Vec<T> {
+    let parse = |line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{fixture}: {error}"));
+    let all: Vec<T> = golden::text(fixture).lines().map(parse).collect();
+    assert!(!all.is_empty(), "{fixture} is empty");
+    all
 }
 
 #[derive(Deserialize)]
@@ -80,8 +77,7 @@ fn start(mode: Mode, seed: u32) -> Sim {
 
 #[test]
 fn all_levels_are_equal() {
-    let levels: Vec<Value> = golden_lines("coinrun_levels.jsonl");
-    assert_eq!(levels.len(), 64);
+    let levels: Vec<Value> = golden_lines("coinrun/coinrun_levels.jsonl");
     for expected in levels {
         let mode: Mode = serde_json::from_value(expected["mode"].clone()).expect("a mode");
         let seed = expected["seed"].as_u64().expect("a seed") as u32;
@@ -92,15 +88,15 @@ fn all_levels_are_equal() {
 
 #[test]
 fn all_traces_are_bit_equal() {
-    let traces: Vec<Trace> = golden_lines("coinrun_traces.jsonl");
-    assert_eq!(traces.len(), 17);
-    for trace in traces {
+    for trace in golden_lines::<Trace>("coinrun/coinrun_traces.jsonl") {
         replay(&trace);
     }
 }
 
 fn replay(trace: &Trace) {
     let name = trace.name();
+    let last = trace.n.checked_sub(1).and_then(|last| trace.recorded(last));
+    assert!(last.is_some(), "{name}: no state after its last step");
     let mut sim = start(trace.mode, trace.seed);
     for (k, action) in trace.actions().into_iter().enumerate() {
         let result = sim.step(action);
@@ -139,6 +135,8 @@ struct Score {
     mode: Mode,
     levels: [u32; 2],
     policy: String,
+    /// How often the original played each level.
+    passes: u32,
     mean_return: f64,
     se_policy_noise_only: Option<f64>,
     mean_length: f64,
@@ -154,7 +152,21 @@ struct PerLevel {
 }
 
 fn scores() -> Scores {
-    serde_json::from_str(&golden("coinrun_scores.json")).expect("valid scores")
+    golden::json("coinrun/coinrun_scores.json")
+}
+
+impl Score {
+    /// The actions of its policy, each as likely as the others in every step: `hold8`, `uniform15` (0 to 14), `mix_7_8`.
+    fn actions(&self) -> Vec<u8> {
+        let action = |text: &str| text.parse::<u8>().unwrap_or_else(|_| panic!("unknown policy {}", self.policy));
+        if let Some(held) = self.policy.strip_prefix("hold") {
+            vec![action(held)]
+        } else if let Some(number) = self.policy.strip_prefix("uniform") {
+            (0..action(number)).collect()
+        } else {
+            self.policy.strip_prefix("mix_").unwrap_or_default().split('_').map(action).collect()
+        }
+    }
 }
 
 /// Return and length of an episode.
@@ -169,8 +181,11 @@ fn play(mut sim: Sim, mut policy: impl FnMut() -> u8) -> (Sim, f64) {
 
 #[test]
 fn holding_right_and_jump_scores_the_same_on_every_level() {
-    for (mode, expected) in scores().per_level_hold8 {
+    let levels = scores().per_level_hold8;
+    assert!(!levels.is_empty());
+    for (mode, expected) in levels {
         let mode: Mode = mode.parse().expect("a mode");
+        assert_eq!(expected.r#return.len(), expected.length.len(), "{mode}");
         for (offset, (&paid, &length)) in expected.r#return.iter().zip(&expected.length).enumerate() {
             let seed = expected.first_seed + offset as u32;
             let (sim, own) = play(start(mode, seed), || 8);
@@ -183,11 +198,7 @@ fn holding_right_and_jump_scores_the_same_on_every_level() {
 fn constant_policies_have_exact_means() {
     let mut compared = 0;
     for expected in scores().aggregate {
-        let action = match expected.policy.as_str() {
-            "hold8" => 8,
-            "hold7" => 7,
-            _ => continue,
-        };
+        let [action] = expected.actions()[..] else { continue };
         let own = Means::over(&expected, 1, || action);
         let context = format!("{} {:?} {}", expected.mode, expected.levels, expected.policy);
         assert!((own.paid - expected.mean_return).abs() < 1e-4, "{context}: {}", own.paid);
@@ -196,7 +207,7 @@ fn constant_policies_have_exact_means() {
         assert!((own.timeouts - expected.frac_timeout).abs() < 1e-4, "{context}");
         compared += 1;
     }
-    assert_eq!(compared, 6);
+    assert!(compared > 0);
 }
 
 /// Means over levels and passes; `error` is the standard error of `paid` for fixed levels.
@@ -237,15 +248,17 @@ fn random_policies_have_the_same_mean_return() {
     let mut draws = Mt::new(20_260_101);
     let mut compared = 0;
     for expected in scores().aggregate {
-        let policy: fn(u32) -> u8 = match expected.policy.as_str() {
-            "uniform15" => |draw| (draw % 15) as u8,
-            "mix_7_8" => |draw| 7 + (draw % 2) as u8,
-            _ => continue,
-        };
-        let passes = if expected.mode == Mode::Easy { 12 } else { 120 };
-        let own = Means::over(&expected, passes, || policy(draws.next_u32() >> 8));
-        let reference = expected.se_policy_noise_only.expect("several passes");
-        let limit = 2.0 * reference.hypot(own.error);
+        let actions = expected.actions();
+        if actions.len() == 1 {
+            continue;
+        }
+        // One pass says nothing of its own error: it is then judged from a few of ours.
+        let passes = expected.passes.max(12);
+        let own = Means::over(&expected, passes, || actions[(draws.next_u32() >> 8) as usize % actions.len()]);
+        let of_as_many = own.error * f64::from(passes).sqrt() / f64::from(expected.passes).sqrt();
+        let reference = expected.se_policy_noise_only.unwrap_or(of_as_many);
+        // Four standard errors, so that of many means of a right game none is outside by chance.
+        let limit = 4.0 * reference.hypot(own.error);
         let difference = (own.paid - expected.mean_return).abs();
         assert!(
             difference <= limit,
@@ -258,5 +271,5 @@ fn random_policies_have_the_same_mean_return() {
         );
         compared += 1;
     }
-    assert_eq!(compared, 6);
+    assert!(compared > 0);
 }

@@ -25,7 +25,7 @@ fn a_healthy_game_passes_and_its_report_is_for_people() {
 fn the_report_is_one_line_of_json_for_programs() {
     let (text, _) = doctor(&["coinrun", "--ticks", "20", "--seed", "7", "--json"], 0);
     let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
-    assert_eq!((&report["game"], &report["mode"], &report["seed"]), (&"coinrun".into(), &"easy".into(), &7.into()));
+    assert_eq!((&report["game"], &report["mode"], &report["seed"]), (&"coinrun".into(), &"hard".into(), &7.into()));
     assert_eq!(report["comparisons"].as_array().map(Vec::len), Some(6));
     assert_eq!(report["safety"]["recording"]["safe"], true);
     assert_eq!(report["findings"].as_array().map(Vec::len), Some(0));

@@ -195,3 +195,26 @@ fn the_program_exports_shows_and_measures() {
         "the file plays otherwise than the run it was made of"
     );
 }
+
+#[test]
+fn a_policy_of_a_game_that_the_program_does_not_have_can_be_looked_at_and_not_played() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lander = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/models/lander.policy");
+    std::fs::copy(lander, folder.path().join("lander.policy")).expect("part of the repository");
+    let (shown, _) = program::done(folder.path(), &["policy", "show", "lander.policy"]);
+    for words in [
+        "lander, version 1 of its rules; this program does not have that game (it has coinrun",
+        "observation   3 values: height, speed, fuel\n",
+        "actions       2 discrete actions\n",
+        "skills        4 numbers, held for 5 ticks\n",
+    ] {
+        assert!(shown.contains(words), "{shown}");
+    }
+    let (shown, _) = program::done(folder.path(), &["policy", "show", "lander.policy", "--json"]);
+    let shown: Value = serde_json::from_str(&shown).expect("JSON");
+    assert_eq!((&shown["card"]["game"], &shown["in_this_program"]), (&"lander".into(), &false.into()));
+    let (_, errors) = program::ended(folder.path(), &["view", "coinrun", "--policy", "lander.policy"], 3);
+    let words =
+        "lander.policy: the policy was made for the game `lander`, not for `coinrun`: name a policy of `coinrun`";
+    assert!(errors.contains(words), "{errors}");
+}

@@ -122,9 +122,14 @@ fn damaged_runs_are_named() {
     let (_, nothing) = ended(folder, &["runs", "ls"], 3);
     assert!(nothing.contains("no runs in runs"), "{nothing}");
     let (_, foreign) = ended(folder, &["runs", "show", "runs/empty"], 3);
-    assert!(foreign.contains("is not the folder of a run"), "{foreign}");
+    assert!(foreign.contains("no run at runs/empty: the folder is there"), "{foreign}");
 
     three_runs(folder);
+    for verb in [&["runs", "show"][..], &["runs", "compare", "runs/b"], &["train", "--resume", "--run"]] {
+        let (_, none) = ended(folder, &[verb, &["runs/bb"]].concat(), 3);
+        let words = "no run at runs/bb: there is no such folder (did you mean runs/b?); `playbot runs ls` lists";
+        assert!(none.contains(words), "{verb:?}: {none}");
+    }
     let metrics = folder.join("runs/b/metrics.jsonl");
     let whole = fs::read(&metrics).expect("written");
     fs::write(&metrics, &whole[..whole.len() - 9]).expect("writable");
@@ -176,6 +181,14 @@ fn a_resumed_run_shows_each_update_once_in_tensorboard() {
     };
     let before = events("runs/b");
     assert_eq!(before.len(), 2 + 4, "version, start, four updates");
+    // The whole command again: there is nothing left to do.
+    let begun = ["train", "--algorithm", "ppo", "--experiment", "b.ron", "--seed", "1", "--run", "runs/b", "--resume"];
+    let (_, finished) = ended(folder, &begun, 0);
+    for words in ["runs/b is finished: it was trained for 512 steps", "--resume --steps N`, where N is more than 512"] {
+        assert!(finished.contains(words), "{finished}");
+    }
+    let (_, other) = ended(folder, &[&begun[..], &["--set", "ppo.lr=0.5"]].concat(), 3);
+    assert!(other.contains("`--set ppo.lr=0.5` asks for ppo.lr=0.5, and the run has 0.002"), "{other}");
     ended(folder, &["train", "--run", "runs/b", "--resume", "--steps", "640"], 0);
     let after = events("runs/b");
     assert_eq!(after.len(), 2 + 5);

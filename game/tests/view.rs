@@ -63,6 +63,11 @@ fn one_observation_is_what_the_bot_sees_enlarged() {
     colours.dedup();
     assert!(colours.len() > 8, "a level has some colours: {colours:?}");
 
+    let (_, words) = done(folder.path(), &["view", "coinrun", "--seed", "5", "--tick", "20", "--out", "again.png"]);
+    let sentence = "again.png shows tick 20 of level 5 of coinrun in mode hard (no --mode was named; the game has easy, \
+                    hard), played by search, on 512 × 512 pixels; after 21 ticks the episode was still running";
+    assert!(words.contains(sentence), "{words}");
+
     view(&["--tick", "20", "--scale", "2", "--image", "stack=2", "--out", "new/stack.png"]);
     let stack = read(&folder.path().join("new/stack.png"));
     assert_eq!(stack.size, (64 * 2 + 2 + 64 * 2, 128));
@@ -177,12 +182,14 @@ fn a_level_can_be_drawn_as_a_whole() {
 fn bad_wishes_are_refused_in_words() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("file"), "in the way").expect("writable");
+    done(folder.path(), &["record", "maze2d", "--levels", "medium:0..0", "--steps", "5", "--out", "maze.demo"]);
     let large = ["--image", "width=1024", "--image", "height=1024", "--image", "stack=16"];
     for (args, code, words) in [
         (&["--mode", "hrad"][..], 3, "did you mean `hard`?"),
-        (&["--seed", "5000000000"], 3, "5000000000 is not in 0..=4294967295"),
+        (&["--seed", "5000000000"], 2, "level 5000000000 does not exist: CoinRun's seeds have 32 bits"),
+        (&["--run", "none"], 3, "none: there is no such folder"),
         (&["--bot", "serch"], 3, "did you mean `search`?"),
-        (&["--policy", "none.policy"], 3, "none.policy"),
+        (&["--policy", "none.policy"], 3, "policy export --run RUN --out none.policy"),
         (&["--image", "width=0"], 3, "width is 0; it must be 1 to 1024"),
         (&["--image", "stack=99"], 3, "stack is 99"),
         (&["--image", "widht=64"], 3, "did you mean `width`?"),
@@ -191,8 +198,9 @@ fn bad_wishes_are_refused_in_words() {
         (&[&large[..], &["--scale", "32"]].concat(), 3, "524768 x 32768 pixels"),
         (&[&large[..], &["--scale", "1", "--episode"]].concat(), 3, "more than 1024 MiB of memory"),
         (&["--tick", "5000"], 3, "there is no tick 5000: the episode has"),
-        (&["--demo", "none.demo"], 3, "none.demo"),
+        (&["--demo", "none.demo"], 3, "record GAME --out none.demo"),
         (&["--demo", "file"], 3, "file"),
+        (&["--demo", "maze.demo"], 3, "look at it with `playbot view maze2d --demo maze.demo`"),
         (&["--demo", "a", "--bot", "random"], 3, "cannot be used with"),
         (&["--out", "file/view.png"], 2, "cannot create file"),
         (&["--out", "."], 3, "written as .png"),

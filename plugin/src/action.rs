@@ -78,7 +78,7 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
             .iter()
             .position(|value| !value.is_finite())
             .map(|at| format!("continuous action has {} at index {at}", values[at])),
-        (action, space) => Some(format!("action {action:?} does not fit the space {space:?}")),
+        (action, space) => Some(format!("action {action:?} does not fit {space}")),
     }
 }
 

@@ -161,7 +161,7 @@ impl Episode {
 }
 
 /// Build level `level` for agent `entity`, now: triggered by the plugin, observed by the game.
-#[derive(EntityEvent, Clone, Copy, Debug)]
+#[derive(EntityEvent, Clone, Copy, Debug, Reflect)]
 pub struct StartEpisode {
     /// The agent.
     pub entity: Entity,

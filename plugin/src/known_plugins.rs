@@ -1,12 +1,13 @@
 //! Which plugin brings a resource: what a game is told when it asks for one that is not there.
 
-/// Resources of Bevy by the beginning of their short names, and who brings them. The first match counts.
-const KNOWN: [(&str, &str); 36] = [
-    ("ButtonInput<", "`InputPlugin`"),
-    ("Axis<", "`InputPlugin`"),
+/// Resources of Bevy by their short names, and who brings them; `*` stands for any rest. The first match counts.
+const KNOWN: [(&str, &str); 37] = [
+    ("ButtonInput<*", "`InputPlugin`"),
+    ("Axis<*", "`InputPlugin`"),
     ("Touches", "`InputPlugin`"),
-    ("Accumulated", "`InputPlugin`"),
+    ("Accumulated*", "`InputPlugin`"),
     ("Time", "`TimePlugin`"),
+    ("Time<*", "`TimePlugin`"),
     ("AssetServer", "`AssetPlugin`"),
     ("Assets<Image>", "`ImagePlugin`"),
     ("Assets<TextureAtlasLayout>", "`ImagePlugin`"),
@@ -17,14 +18,14 @@ const KNOWN: [(&str, &str); 36] = [
     ("Assets<Pitch>", "`AudioPlugin` (Bevy's feature `bevy_audio`)"),
     ("GlobalVolume", "`AudioPlugin` (Bevy's feature `bevy_audio`)"),
     ("Assets<Font>", "`TextPlugin` (Bevy's feature `bevy_text`)"),
-    ("Assets<Gltf", "`GltfPlugin` (Bevy's feature `bevy_gltf`)"),
+    ("Assets<Gltf*", "`GltfPlugin` (Bevy's feature `bevy_gltf`)"),
     ("Assets<AnimationGraph>", "`AnimationPlugin` (Bevy's feature `bevy_animation`)"),
     ("Assets<AnimationClip>", "`AnimationPlugin` (Bevy's feature `bevy_animation`)"),
     ("Assets<Shader>", "`RenderPlugin` (Bevy's feature `bevy_render`)"),
-    ("Assets<", "`init_asset`, called by the plugin that the asset belongs to,"),
-    ("State<", "`init_state`, with `StatesPlugin` (Bevy's feature `bevy_state`),"),
-    ("NextState<", "`init_state`, with `StatesPlugin` (Bevy's feature `bevy_state`),"),
-    ("Messages<", "`add_message`"),
+    ("Assets<*", "`init_asset`, called by the plugin that the asset belongs to,"),
+    ("State<*", "`init_state`, with `StatesPlugin` (Bevy's feature `bevy_state`),"),
+    ("NextState<*", "`init_state`, with `StatesPlugin` (Bevy's feature `bevy_state`),"),
+    ("Messages<*", "`add_message`"),
     ("ClearColor", "`CameraPlugin` (Bevy's feature `bevy_camera`)"),
     ("GlobalAmbientLight", "`LightPlugin` (Bevy's feature `bevy_light`)"),
     ("DirectionalLightShadowMap", "`LightPlugin` (Bevy's feature `bevy_light`)"),
@@ -34,13 +35,31 @@ const KNOWN: [(&str, &str); 36] = [
     ("DiagnosticsStore", "`DiagnosticsPlugin`"),
     ("FrameCount", "`FrameCountPlugin`"),
     ("RenderDevice", "a renderer, which a headless World does not have: it"),
-    ("EventLoopProxyWrapper", "`WinitPlugin`, which a headless World does not have: it"),
+    ("EventLoopProxyWrapper*", "`WinitPlugin`, which a headless World does not have: it"),
     ("DisplayHandleWrapper", "`WinitPlugin`, which a headless World does not have: it"),
     ("WinitMonitors", "`WinitPlugin`, which a headless World does not have: it"),
-    ("Rapier", "`RapierPhysicsPlugin`"),
+    ("Rapier*", "`RapierPhysicsPlugin`"),
 ];
 
 /// Who brings a resource of this short name.
 pub(crate) fn plugin_of(resource: &str) -> Option<&'static str> {
-    KNOWN.iter().find(|(name, _)| resource.starts_with(name)).map(|(_, plugin)| *plugin)
+    KNOWN.iter().find(|(name, _)| is_named(resource, name)).map(|(_, plugin)| *plugin)
+}
+
+fn is_named(resource: &str, name: &str) -> bool {
+    name.strip_suffix('*').map_or(resource == name, |beginning| resource.starts_with(beginning))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_game_s_own_resource_is_not_taken_for_bevy_s() {
+        assert_eq!(plugin_of("TimeLeft"), None);
+        assert_eq!(plugin_of("Touches2"), None);
+        assert_eq!([plugin_of("Time"), plugin_of("Time<Fixed>")], [Some("`TimePlugin`"); 2]);
+        assert!(plugin_of("Assets<GltfNode>").is_some_and(|plugin| plugin.contains("GltfPlugin")));
+        assert!(plugin_of("Assets<Level>").is_some_and(|plugin| plugin.contains("init_asset")));
+    }
 }

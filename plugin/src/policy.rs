@@ -184,7 +184,7 @@ fn misfit(
         _ => "load a policy that was trained for this game",
     };
     Some(format!(
-        "agent {}: the policy was made for {}, {} skill values and {:?}, but the game gives {}, {} and {:?}; {way_out}",
+        "agent {}: the policy was made for {}, {} skill values and {}, but the game gives {}, {} and {}; {way_out}",
         agent.index,
         wanted.describe(),
         spaces.0,

@@ -140,7 +140,7 @@ pub enum PolicyMisfit {
         found: String,
     },
     /// The actions have changed.
-    #[error("the policy acts in {made_for:?}, `{game}` in {now:?}")]
+    #[error("the policy acts with {made_for}, `{game}` with {now}")]
     Actions {
         /// This game.
         game: String,

@@ -79,7 +79,7 @@ pub struct Renewal {
 
 /// The World has not begun to run, and its first episode will be on this level: triggered before anything of the game
 /// runs, in Worlds with a [`Renewal`].
-#[derive(EntityEvent, Clone, Copy, Debug)]
+#[derive(EntityEvent, Clone, Copy, Debug, Reflect)]
 pub struct EpisodeAhead {
     /// The agent.
     pub entity: Entity,

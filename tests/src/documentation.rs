@@ -9,5 +9,9 @@ struct Readme;
 struct Tutorial;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/own-game.md")]
+struct OwnGame;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/recording-in-builds.md")]
 struct RecordingInBuilds;

@@ -1,5 +1,6 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
+mod as_corridor;
 mod corridor;
 mod documentation;
 pub mod faulty;

@@ -9,10 +9,10 @@ use bevy::{
 use bevy_playbot::vision::{Picture, Stage, VisionSystems};
 use playbot_lab::prelude::*;
 
-use crate::corridor::{Cell, Corridor};
+use crate::corridor::Cell;
 
-/// [`Corridor`], which is drawn: a green agent that its eye follows, a white exit at the right end and a red pit at the
-/// left one, a unit for each cell. The pictures say no more than the first number of the vector.
+/// [`Corridor`](crate::Corridor), which is drawn: a green agent that its eye follows, a white exit at the right end and a
+/// red pit at the left one, a unit for each cell. The pictures say no more than the first number of the vector.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PaintedCorridor;
 
@@ -57,29 +57,7 @@ fn follow(mut agents: Query<(&Cell, &mut Transform)>) {
 }
 
 impl Game for PaintedCorridor {
-    fn name(&self) -> &'static str {
-        Corridor.name()
-    }
-
-    fn version(&self) -> u32 {
-        Corridor.version()
-    }
-
-    fn modes(&self) -> &'static [&'static str] {
-        Corridor.modes()
-    }
-
-    fn tick_hz(&self) -> f64 {
-        Corridor.tick_hz()
-    }
-
-    fn actions(&self) -> ActionSpace {
-        Corridor.actions()
-    }
-
-    fn observation(&self) -> ObservationSpace {
-        Corridor.observation()
-    }
+    crate::as_corridor!();
 
     fn picture(&self) -> Option<Picture> {
         Some(Picture { width: 8.0 })
@@ -88,13 +66,5 @@ impl Game for PaintedCorridor {
     fn build_picture(&self, app: &mut App) {
         app.init_resource::<Paints>()
             .add_systems(ObserveSchedule, (spawn_pictures, follow).chain().in_set(VisionSystems::Sync));
-    }
-
-    fn build(&self, app: &mut App, mode: &str) {
-        Corridor.build(app, mode);
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        Corridor.spawn_agent(world, index)
     }
 }

@@ -3,13 +3,15 @@
 //! The mass matrix has this shape, and so has it with contacts added, as each touches one leg. Eliminating the legs
 //! first leaves a 6×6 system.
 
+use bevy::reflect::Reflect;
+
 use super::skeleton::LEGS;
 
 /// Degrees of freedom of the torso.
 pub const BASE: usize = 6;
 
 /// A vector over all degrees of freedom.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
 pub struct Coordinates {
     /// Torso: angular, then linear.
     pub base: [f64; BASE],

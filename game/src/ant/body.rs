@@ -1,6 +1,9 @@
 //! The ant as a body that moves: Runge-Kutta's method of fourth order over the accelerations of mass, hinges and contacts.
 
-use bevy::math::{DQuat, DVec3, Quat, Vec3};
+use bevy::{
+    math::{DQuat, DVec3, Quat, Vec3},
+    reflect::Reflect,
+};
 
 use super::{
     arrow_matrix::Coordinates,
@@ -24,7 +27,7 @@ pub const SUBSTEPS: usize = 5;
 type Hinges = [[f64; 2]; LEGS];
 
 /// What velocities are integrated to.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Reflect)]
 struct Place {
     position: DVec3,
     orientation: DQuat,
@@ -48,7 +51,7 @@ fn spun(turned: DVec3) -> DQuat {
 }
 
 /// Velocities, or accelerations. `centre` is along the world's axes, `spin` along the torso's.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Reflect)]
 struct Rates {
     centre: DVec3,
     spin: DVec3,
@@ -73,18 +76,30 @@ fn plus(a: &Hinges, h: f64, b: &Hinges) -> Hinges {
 const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 /// The quadruped among walls.
+///
+/// Reflection sees its whole state. Left out is what never changes, such as the walls, since rapier's types are not
+/// reflected, and what each step computes anew.
+#[derive(Reflect)]
+#[reflect(from_reflect = false)]
 pub struct AntBody {
+    #[reflect(ignore)]
     solids: Solids,
+    #[reflect(ignore)]
     mobility: Mobility,
+    #[reflect(ignore)]
     walls: Walls,
     gravity: f64,
     place: Place,
     rates: Rates,
     /// Accelerations of the last solution, from which the next is looked for.
     warm: Coordinates,
+    #[reflect(ignore)]
     near: Vec<WallBox>,
+    #[reflect(ignore)]
     contacts: Vec<Contact>,
+    #[reflect(ignore)]
     rows: Vec<Row>,
+    #[reflect(ignore)]
     solver: ConstraintSolver,
 }
 
@@ -220,5 +235,23 @@ impl AntBody {
         for touch in &self.contacts {
             constraint::contact(touch, pose, velocity, &self.mobility, &mut self.rows);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::reflect::GetPath;
+
+    use super::*;
+
+    /// So that `playbot doctor` can name what differs.
+    #[test]
+    fn reflection_sees_where_the_ant_is() {
+        let mut body = AntBody::new(&[]);
+        let height = |body: &AntBody| *body.path::<f64>(".place.position.z").expect("it is reflected");
+        assert_eq!(height(&body), f64::from(body.state().qpos[2]));
+        body.step(&[1.0; JOINTS]);
+        assert_ne!(height(&body), 0.75, "it moves");
+        assert!(body.path::<f64>(".place.joints[0][1]").is_ok() && body.path::<f64>(".rates.spin.x").is_ok());
     }
 }

@@ -91,7 +91,6 @@ struct Beginning {
 #[reflect(Component)]
 pub struct Walker {
     /// The ant.
-    #[reflect(ignore)]
     pub body: AntBody,
     /// The goal, in metres.
     pub goal: Vec2,

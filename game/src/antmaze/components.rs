@@ -22,7 +22,8 @@ pub struct InMaze(pub Arc<AntMazeLevel>);
 /// An agent's ant with the floor and the walls around it: a physics world of its own. Comes with the first episode.
 #[derive(Component, Reflect)]
 #[reflect(from_reflect = false)]
-pub struct MazeAnt(#[reflect(ignore)] pub AntBody);
+#[reflect(Component)]
+pub struct MazeAnt(pub AntBody);
 
 impl HoldsAnt for MazeAnt {
     fn state(&self) -> AntState {

@@ -19,6 +19,8 @@ use super::{
 const AHEAD: Real = 0.06;
 
 /// The context. Coordinates are those of the observation.
+// Without `#[reflect(Component)]`: rapier's types are not reflected, so nothing of it could be compared, and
+// `playbot doctor` must not count it as compared. The ball itself is in `MazeBall`, which is.
 #[derive(Component, Reflect)]
 #[reflect(from_reflect = false)]
 pub struct MazePhysics {

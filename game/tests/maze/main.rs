@@ -3,6 +3,8 @@
 mod cli;
 mod fixed;
 mod generator;
+#[path = "../shared/golden.rs"]
+mod golden;
 mod planner;
 #[path = "../shared/program.rs"]
 mod program;

@@ -16,7 +16,7 @@ pub fn command(folder: &Path, args: &[&str]) -> Command {
 }
 
 pub fn playbot(folder: &Path, args: &[&str]) -> Output {
-    command(folder, args).output().expect("the program starts")
+    playbot_shell::output(&mut command(folder, args)).unwrap_or_else(|error| panic!("{args:?}: {error}"))
 }
 
 /// The program with a limit on the size of its files, in blocks of 512 bytes: a full disk.

@@ -133,3 +133,25 @@ fn recordings_that_do_not_belong_together_are_not_merged() {
         assert!(!folder.join("all.demo").exists(), "{files:?}: nothing is left");
     }
 }
+
+#[test]
+fn recordings_are_shown_in_plain_words() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "a.demo", &["--levels", "easy:0..0", "--noise", "0.2"]);
+    let show = |more: &[&str]| playbot(folder, &[&["demo", "show", "a.demo"], more].concat());
+    let shown = said(&show(&[]));
+    for words in [
+        "coinrun, version 1 of its rules\n",
+        "played by     search\n",
+        "noise         20 % of the actions are random\n",
+        "actions       discrete (15 actions)\n",
+        "by bot 100 %\n",
+    ] {
+        assert!(shown.contains(words), "{shown}");
+    }
+    let ticks = said(&show(&["--episode", "0"]));
+    assert!(ticks.contains("  bot\n") && !(shown + &ticks).contains(['{', '"']), "{ticks}");
+    let none = show(&["--episode", "7"]);
+    assert!(errors(&none).contains("has no episode 7; it has 1 episode, counted from 0"), "{}", errors(&none));
+}

@@ -43,6 +43,15 @@ fn the_folder_of_a_skill_model_is_made() {
     assert_eq!(names, ["skills"], "nothing else is left there");
 }
 
+#[test]
+fn a_quickstart_without_recordings_leaves_no_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = playbot(folder.path(), &["quickstart", "--set", "demos=none", "--run", "runs/quick"]);
+    assert_eq!(code(&output), 3, "{}", errors(&output));
+    assert!(errors(&output).contains("`playbot record coinrun --levels hard:0..63"), "{}", errors(&output));
+    assert!(!folder.path().join("runs").exists(), "nothing was begun");
+}
+
 /// The first checkpoint is the first large file of a run.
 #[cfg(unix)]
 #[test]

@@ -167,7 +167,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Eval(args) => eval::run(args, games),
         Verb::Eyes(args) => eyes::run(args, games),
         Verb::Policy(args) => policy::run(args, games),
-        Verb::Runs(args) => runs::run(args),
+        Verb::Runs(args) => runs::run(args, games),
         Verb::Level(args) => level::run(args, games),
         Verb::Trace(args) => trace::run(args, games),
         Verb::View(args) => view::run(args, games),

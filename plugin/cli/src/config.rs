@@ -11,6 +11,7 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, resolve},
+    open,
 };
 
 /// Show experiments with all their values, and the presets to build them on.
@@ -42,8 +43,8 @@ enum What {
 }
 
 /// Checks what an experiment says of its game. Recordings may still be made.
-fn check(experiment: &Experiment, games: &Games) -> Result<(), CliError> {
-    experiment.check_levels(games.get(&experiment.game)?)?;
+fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
+    experiment.check_levels(open::game(games, from, experiment)?)?;
     let demos = experiment.demos.as_deref().filter(|_| experiment.algorithm.needs_skills());
     if let Some(path) = demos.filter(|path| !resolve(path).exists()) {
         tell!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
@@ -55,7 +56,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.what {
         What::Show { from } => {
             let experiment = from.load(games, [])?;
-            check(&experiment, games)?;
+            check(&experiment, &from, games)?;
             print_line(experiment.to_ron().map_err(|error| CliError::Usage(error.to_string()))?)?;
         }
         What::Presets { name, json } => {

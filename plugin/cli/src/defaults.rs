@@ -1,20 +1,64 @@
-//! What is played where nobody names a mode or levels.
+//! What is played where nobody names a mode or levels. There is one rule, for every verb: what `train` does without options.
+//! A game's mode is that of the training levels of its experiment, and its held-out levels are those of the experiment too.
 
-use playbot_lab::{game::Game, split::LevelSplit};
+use std::path::Path;
 
-/// The mode of verbs that show one level to people, or let them play it: the game's last one, which is the hardest where
-/// modes are difficulties.
-pub fn mode_to_show(game: &dyn Game) -> &'static str {
-    game.modes().last().copied().unwrap_or_default()
+use playbot_lab::{
+    game::Game,
+    split::LevelSplit,
+    train::{Experiment, config_file::parse_experiment, default_experiment::experiment_of},
+};
+
+/// The experiment of a game where none is named.
+pub struct UsualExperiment {
+    /// Where it is from, in words or as a path.
+    pub origin: String,
+    /// All its values.
+    pub experiment: Experiment,
 }
 
-/// The mode of verbs that record, check or measure: the game's first one, as in the experiment of a game that has none of
-/// its own.
-pub fn mode_to_measure(game: &dyn Game) -> &'static str {
-    game.modes().first().copied().unwrap_or_default()
+/// The experiment of a game where none is named; `None` if the game brings one that cannot be read.
+pub fn usual_experiment(game: &dyn Game) -> Option<UsualExperiment> {
+    let text = experiment_of(game);
+    let experiment = parse_experiment(&text.text, Path::new(&*text.origin)).ok()?;
+    Some(UsualExperiment { origin: text.origin.into_owned(), experiment })
 }
 
-/// Levels 0 to `last` of the mode of verbs that record, check or measure.
+/// The mode of every verb to which none is named: the one that is trained in, without the options that it may have.
+pub fn usual_mode(game: &dyn Game) -> &'static str {
+    let modes = game.modes();
+    let trained = usual_experiment(game).map(|usual| usual.experiment.train.mode).unwrap_or_default();
+    let name = trained.split('+').next().unwrap_or_default();
+    let known = |wanted: &str| modes.iter().copied().find(|mode| *mode == wanted);
+    known(&trained).or_else(|| known(name)).or(modes.first().copied()).unwrap_or_default()
+}
+
+/// The held-out levels of every verb to which no experiment is named; `None` if the game brings none that it has.
+pub fn usual_held_out(game: &dyn Game) -> Option<LevelSplit> {
+    let test = usual_experiment(game)?.experiment.test;
+    game.check_mode(&test.mode).is_ok().then_some(test)
+}
+
+/// Levels 0 to `last` of the [`usual_mode`].
 pub fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
-    LevelSplit { mode: mode_to_measure(game).to_owned(), first: 0, last }
+    LevelSplit { mode: usual_mode(game).to_owned(), first: 0, last }
+}
+
+#[cfg(test)]
+mod tests {
+    use playbot_lab::foreign::ForeignGame;
+
+    use super::*;
+
+    #[test]
+    fn a_game_without_an_experiment_has_its_first_mode_and_other_levels_held_out() {
+        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
+        let usual = usual_experiment(&game).expect("the plainest");
+        assert_eq!(usual.origin, "the experiment of runner");
+        assert_eq!(usual_mode(&game), game.modes()[0]);
+        let held_out = usual_held_out(&game).expect("a mode of the game");
+        assert_eq!(held_out, usual.experiment.test);
+        assert!(!held_out.overlaps(&usual.experiment.train));
+        assert_eq!(first_levels(&game, 9).to_string(), "default:0..9");
+    }
 }

@@ -1,22 +1,22 @@
 //! `playbot demo ls|show|verify|repair|merge`.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use bevy_playbot::demo::file::{Decider, DemoEpisode, DemoReader, DemoSummary, EpisodeActions, find_demos, repair};
+use bevy_playbot::demo::file::{DemoSummary, find_demos, repair};
 use playbot_lab::demo::verify::{VerifyError, VerifyReport, verify_file};
-use playbot_lab::games::Games;
+use playbot_lab::games::{Artifact, Games};
 use serde_json::json;
 
 use super::{
     demo_merge::merge,
+    demo_show::show,
     error::{CliError, Outcome, print_line},
     experiment::resolve,
     number::counted,
-    program, progress,
+    open, program, progress,
 };
+
+pub use super::demo_show::deciders;
 
 /// Look at, check, repair and join recordings.
 #[derive(clap::Args)]
@@ -100,7 +100,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 
 fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Pass;
-    for file in find_demos(path)? {
+    for file in find_demos(path).map_err(open::missing_recording)? {
         let summary = match DemoSummary::read(&file) {
             Ok(summary) => summary,
             Err(error) => {
@@ -130,11 +130,15 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-/// The share of successes. Recordings do not say whether the aim was reached before time was up, and an episode that was
-/// cut off when the recording ended is none of those that the share is of.
+/// The share of successes, unless there are none: of many games no episode is ever won. Recordings do not say whether
+/// the aim was reached before time was up, and an episode that was cut off when the recording ended is none of those that
+/// the share is of.
 fn success(summary: &DemoSummary) -> String {
-    let share =
-        summary.success_share.map_or("no episode ended".to_owned(), |share| format!("{:.1} % success", 100.0 * share));
+    let share = match summary.success_share {
+        None => "no episode ended".to_owned(),
+        Some(_) if summary.successes == 0 => "no episode ended with a win".to_owned(),
+        Some(share) => format!("{:.1} % success", 100.0 * share),
+    };
     let notes: Vec<String> = [(summary.truncated, "until time was up"), (summary.aborted, "cut off")]
         .into_iter()
         .filter(|(count, _)| *count > 0)
@@ -143,77 +147,10 @@ fn success(summary: &DemoSummary) -> String {
     if notes.is_empty() { share } else { format!("{share} ({})", notes.join(", ")) }
 }
 
-/// Who decided which share of the ticks.
-pub fn deciders(steps_by_decider: &BTreeMap<Decider, usize>) -> String {
-    let total: usize = steps_by_decider.values().sum();
-    if total == 0 {
-        return "nobody".to_owned();
-    }
-    let share = |(decider, &steps)| format!("{decider} {:.0} %", 100.0 * steps as f64 / total as f64);
-    steps_by_decider.iter().map(share).collect::<Vec<_>>().join(", ")
-}
-
-fn show(file: &Path, wanted: Option<usize>, as_json: bool) -> Result<Outcome, CliError> {
-    let reader = DemoReader::open(file)?;
-    if !as_json {
-        print_line(format!("{:#?}", reader.header()))?;
-    }
-    for (index, episode) in reader.enumerate() {
-        let episode = episode?;
-        match wanted {
-            None => show_episode(index, &episode, as_json)?,
-            Some(wanted) if wanted == index => {
-                show_ticks(&episode, as_json)?;
-                return Ok(Outcome::Pass);
-            }
-            Some(_) => {}
-        }
-    }
-    match wanted {
-        Some(wanted) => Err(CliError::Usage(format!("{} has no episode {wanted}", file.display()))),
-        None => Ok(Outcome::Pass),
-    }
-}
-
-fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
-    if as_json {
-        return print_line(json!({
-            "episode": index, "level": episode.level_seed, "steps": episode.len(),
-            "return": episode.episode_return(), "end": episode.end, "steps_by_decider": episode.steps_by_decider(),
-        }));
-    }
-    print_line(format!(
-        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:?}  by {}",
-        episode.level_seed,
-        episode.len(),
-        episode.episode_return(),
-        episode.end,
-        deciders(&episode.steps_by_decider())
-    ))
-}
-
-fn show_ticks(episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
-    for tick in 0..episode.len() {
-        let action = match &episode.actions {
-            EpisodeActions::Discrete(list) => json!(list[tick]),
-            EpisodeActions::Continuous { dim, values } => json!(values[tick * dim..(tick + 1) * dim]),
-        };
-        let (reward, hash, decider) = (episode.rewards[tick], episode.state_hashes[tick], episode.deciders[tick]);
-        if as_json {
-            print_line(json!({
-                "tick": tick, "action": action, "reward": reward, "state_hash": hash, "decider": decider,
-            }))?;
-        } else {
-            print_line(format!("{tick:>5}  action {action:<4}  reward {reward:<5}  hash {hash:08x}  {decider:?}"))?;
-        }
-    }
-    Ok(())
-}
-
 fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, CliError> {
     let mut files = Vec::new();
     for path in paths {
-        files.extend(find_demos(resolve(path))?);
+        files.extend(find_demos(resolve(path)).map_err(open::missing_recording)?);
     }
     let mut outcome = Outcome::Pass;
     for file in &files {
@@ -240,15 +177,11 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
 fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
     // The whole file is read before any of it is played: damage shows at once.
     let summary = DemoSummary::read(file)?;
-    let game = games.get(&summary.header.game).map_err(|error| in_file(file, &error))?;
+    let game = games.of_file(Artifact::Recording, file, &summary.header.game)?;
     let bar = progress::bar("replay", summary.episodes as u64, "episodes");
     let report = verify_file(game, file, |done| bar.set_position(done));
     bar.finish_and_clear();
     Ok(report?)
-}
-
-fn in_file(file: &Path, error: &impl std::fmt::Display) -> CliError {
-    CliError::Usage(format!("{}: {error}", file.display()))
 }
 
 fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<(), CliError> {
@@ -270,7 +203,7 @@ fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<
 
 /// Repairs a file. One in which no episode is whole is a finding.
 fn mend(file: &Path, out: &Path, as_json: bool) -> Result<Outcome, CliError> {
-    let report = repair(file, out)?;
+    let report = repair(file, out).map_err(open::missing_recording)?;
     if as_json {
         print_line(json!(report))?;
     } else {

@@ -8,6 +8,7 @@ use serde_json::json;
 use super::{
     error::{CliError, Outcome, print_line},
     number::counted,
+    open,
     output::make_folder_of,
 };
 
@@ -19,7 +20,7 @@ use super::{
 /// They are of different games or rules, one is damaged, or there is a file at `out` already. Nothing is left at `out` then.
 pub fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, CliError> {
     make_folder_of(out)?;
-    let report = merge_demos(files, out)?;
+    let report = merge_demos(files, out).map_err(open::missing_recording)?;
     if as_json {
         let parts: Vec<_> =
             report.files.iter().map(|(file, episodes)| json!({ "file": file, "episodes": episodes })).collect();

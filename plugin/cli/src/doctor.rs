@@ -11,7 +11,7 @@ use playbot_lab::{
 };
 
 use super::{
-    defaults::mode_to_measure,
+    defaults::usual_mode,
     error::{CliError, Outcome, print_line},
     number::at_least_one,
 };
@@ -21,19 +21,21 @@ use super::{
 /// Recording, replay, resume and training in many arenas rest on it. Copies of the game play the same random actions:
 /// twice in one thread, with another wall clock, with more archetypes in the World, on two threads, two arenas in one
 /// World against each alone, and the same level again after a restart. What differs first is named, with the tick and
-/// what to do. Exit code 1 if something was found.
+/// what to do. That nothing was found holds for the ticks and the level that were played: more ticks and other levels say
+/// more. Exit code 1 if something was found.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot doctor GAME
+  playbot doctor GAME --ticks 10000 --seed 1
   playbot doctor maze2d --mode medium --ticks 1000 --json
   playbot doctor GAME --ignore HighScore")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; its first one if none is named.
+    /// Mode of the game; the one that `train` trains in if none is named.
     #[arg(long)]
     mode: Option<String>,
-    /// Ticks that each comparison plays.
+    /// Ticks that each comparison plays. More of them find what happens seldom or late.
     #[arg(long, default_value = "300", value_parser = at_least_one)]
     ticks: usize,
     /// Level to play, and seed of the actions.
@@ -53,7 +55,7 @@ const SPEED_SECONDS: f64 = 0.5;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let mode = args.mode.unwrap_or_else(|| mode_to_measure(game).to_owned());
+    let mode = args.mode.unwrap_or_else(|| usual_mode(game).to_owned());
     let options = DoctorOptions {
         ticks: u32::try_from(args.ticks).map_err(|_| CliError::Usage("--ticks has too many digits".to_owned()))?,
         seed: args.seed,

@@ -12,7 +12,7 @@ use bevy_playbot::{
 use playbot_lab::{
     demo::verify::VerifyError,
     eval::EvalError,
-    games::GamesError,
+    games::{ForeignArtifact, GamesError},
     inspect::InspectError,
     mode::ModeError,
     policy_export::ExportError,
@@ -88,6 +88,8 @@ pub enum CliError {
     #[error(transparent)]
     Games(#[from] GamesError),
     #[error(transparent)]
+    ForeignArtifact(#[from] ForeignArtifact),
+    #[error(transparent)]
     Inspect(#[from] InspectError),
     #[error(transparent)]
     Mode(#[from] ModeError),
@@ -137,6 +139,7 @@ impl CliError {
             Self::Usage(_)
             | Self::Name(_)
             | Self::Games(_)
+            | Self::ForeignArtifact(_)
             | Self::Inspect(
                 InspectError::Usage(_) | InspectError::Name(_) | InspectError::Mode(_) | InspectError::Vision(_),
             )

@@ -4,14 +4,12 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
     policy::ActionDraw,
-    skill_prior::SkillPrior,
     vision::{ObservationConfig, ObservationKind},
 };
-use playbot_lab::games::Games;
-use playbot_lab::sensors::GameSensors;
 use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
+    games::{Artifact, Games},
     held_out::HeldOut,
     report::to_text_table,
     split::LevelSplit,
@@ -21,21 +19,23 @@ use playbot_lab::{
         run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::{PolicyFile, SkillModel, SkillSource};
+use playbot_learner::SkillModel;
 
 use super::{
+    cloning::{check_skills, cloning},
     compute::Compute,
-    defaults::first_levels,
+    defaults::{first_levels, usual_held_out},
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
     footprints::Footprints,
-    methods,
+    methods, open,
     player::Chosen,
 };
 
 /// Measure policies and baselines, every level equally often.
 ///
-/// Those are trained runs, behaviour cloning, policy files and bots, on the held-out levels.
+/// Those are trained runs, behaviour cloning, policy files and bots, on the held-out levels. The table's ± is one standard
+/// error of the mean return over levels: playing the same levels more often hardly makes it smaller, more levels do.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eval --run runs/first
@@ -63,8 +63,8 @@ pub struct Args {
     /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
     #[arg(long)]
     observation: Option<ObservationKind>,
-    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named, or the first 64 of
-    /// the game's first mode if a policy file is of another game than the experiment.
+    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named, or those of
+    /// the game's own experiment if a policy file is of another game than the experiment.
     #[arg(long)]
     levels: Vec<LevelSplit>,
     /// Episodes on each level, instead of the experiment's.
@@ -96,7 +96,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         ));
     }
     let experiment = read_experiment(&args, games)?;
-    let game = games.get(&experiment.game)?;
+    let game = match (&args.from.experiment, args.run.first()) {
+        (None, Some(run)) => games.of_file(Artifact::Run, run, &experiment.game)?,
+        _ => open::game(games, &args.from, &experiment)?,
+    };
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
     if args.levels.is_empty() {
         let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
@@ -158,12 +161,13 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
 /// The game of the first policy file, and levels of it, where nobody says which: the experiment may be of another game.
 fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
-    let file = PolicyFile::load(path, args.compute.device())?;
-    let game = games.get(&file.card.game)?;
+    let file = open::policy(path, args.compute.device())?;
+    let game = games.of_file(Artifact::Policy, path, &file.card.game)?;
     if args.from.load(games, [])?.game == game.name() {
         return Ok(Vec::new());
     }
-    Ok(vec![format!("game={}", game.name()), format!("test={}", first_levels(game, 63))])
+    let levels = usual_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+    Ok(vec![format!("game={}", game.name()), format!("test={levels}")])
 }
 
 fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games) -> Result<Vec<Chosen>, CliError> {
@@ -227,7 +231,7 @@ fn check_run(
     let path = path.display();
     if own.game != measured.game {
         return Err(CliError::Usage(format!(
-            "{path} is a run of `{}`, but `{}` is measured: call `playbot eval` once for each game",
+            "{path} is a run of `{}`, but `{}` is measured: measure it by itself with `playbot eval --run {path}`",
             own.game, measured.game
         )));
     }
@@ -244,54 +248,4 @@ fn check_run(
 /// A player, with its path in its name where there are several of its kind.
 fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
     if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
-}
-
-/// Checks that a skill model was learned for a game, and returns what it sees. The model's file does not name its game.
-///
-/// # Errors
-///
-/// What the model reads and how it acts, and which game has that.
-pub fn check_skills(
-    path: &Path,
-    model: &SkillModel,
-    game: &dyn Game,
-    from: &ExperimentArgs,
-    games: &Games,
-) -> Result<ObservationConfig, CliError> {
-    let observation_config = ObservationConfig::from_card(model.picture(), &model.observation())?;
-    let fits = |game: &dyn Game| {
-        let can_see = observation_config.check(game).is_ok();
-        can_see && (model.observation(), model.action_space()) == (observation_config.obs_kind(game), game.actions())
-    };
-    if fits(game) {
-        return Ok(observation_config);
-    }
-    let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
-    let whose = if others.is_empty() { "no game".to_owned() } else { others.join(" or ") };
-    let advice = match from.names_game() {
-        true => "name another one".to_owned(),
-        false => {
-            let game = others.first().copied().unwrap_or("NAME");
-            format!("name its experiment with --experiment, or its game and levels with --set game={game}")
-        }
-    };
-    Err(CliError::Usage(format!(
-        "{} holds skills for {} and {:?}, which are those of {whose}, not of `{}`: {advice}",
-        path.display(),
-        model.observation().describe(),
-        model.action_space(),
-        game.name()
-    )))
-}
-
-/// Behaviour cloning: the decoder under the prior, without any reinforcement learning.
-pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
-    let skills = cloning_skills(model, experiment);
-    Player::Policy { policy: model.policy(), prior: Some(SkillPrior::from(&skills)), draw }
-}
-
-/// The skills of behaviour cloning, held and drawn as the experiment says.
-pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
-    let (horizon, draw) = (experiment.score.horizon, experiment.score.skill_draw);
-    SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
 }

@@ -53,6 +53,14 @@ impl ExperimentArgs {
         self.experiment.is_some() || self.set.iter().any(|set| sets_key(set, "game"))
     }
 
+    /// These as they are written behind a verb, with a blank in front of each.
+    pub fn words(&self) -> String {
+        let experiment =
+            self.experiment.iter().map(|path| format!(" --experiment {}", quoted(&path.to_string_lossy())));
+        let set = self.set.iter().map(|set| format!(" --set {}", quoted(set)));
+        experiment.chain(set).collect()
+    }
+
     /// These, under what is already known of the experiment, as `key=value`.
     pub fn over(&self, known: impl IntoIterator<Item = String>) -> Self {
         Self { experiment: self.experiment.clone(), set: known.into_iter().chain(self.set.iter().cloned()).collect() }
@@ -64,7 +72,8 @@ impl ExperimentArgs {
     }
 }
 
-fn sets_key(set: &str, key: &str) -> bool {
+/// Whether a `key=value` sets exactly this key.
+pub fn sets_key(set: &str, key: &str) -> bool {
     set.split_once('=').is_some_and(|(name, _)| name.trim() == key)
 }
 

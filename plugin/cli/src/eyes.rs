@@ -35,7 +35,7 @@ game that the raster can draw.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included; without it levels 0 to 49 of the game's first mode. The game's
+    /// Levels, as mode:first..last, both included; without it levels 0 to 49 of the mode that `train` trains in. The game's
     /// demonstrator, or else the first of its bots, plays each once.
     #[arg(long)]
     levels: Option<LevelSplit>,

@@ -1,13 +1,13 @@
 //! Help with the names of this program and of its games.
 //!
 //! Examples are written for the program `playbot` with the words `GAME`, `MODE` and `BOT`, which stand for the program's
-//! first game, its last mode, and its demonstrator. Those that cannot work in a program are left out.
+//! first game, the mode that it is trained in, and its demonstrator. Those that cannot work in a program are left out.
 
 use clap::{Arg, Command};
 use playbot_lab::prelude::{ActionSpace, Game};
 
 use super::{
-    defaults::mode_to_show,
+    defaults::usual_mode,
     level::shows_levels,
     program::{USUAL, with_name},
 };
@@ -45,7 +45,7 @@ fn of_argument(argument: Arg, program: &str) -> Arg {
 /// What stands below a command's options. `plays` says whether the command is given the name of a game.
 fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> String {
     let first = games.first();
-    let mode = first.map(|game| mode_to_show(*game));
+    let mode = first.map(|game| usual_mode(*game));
     let bot = first.and_then(|game| game.demonstrator());
     let names = [
         ("GAME", first.map_or("GAME", |game| game.name())),

@@ -20,6 +20,7 @@ use super::{
     experiment::{self, ExperimentArgs, option},
     interrupt, missing_demos,
     number::counted,
+    open,
     output::{beside, prepare},
     progress,
 };
@@ -65,7 +66,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let experiment =
         args.from.load(games, [option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
     let checkpoint = checkpoint(&args)?;
-    let game = games.get(&experiment.game)?;
+    let game = open::game(games, &args.from, &experiment)?;
     let demos = match &args.demos {
         Some(demos) => demos.clone(),
         None => experiment::resolve(experiment.recordings()?),

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use playbot_lab::{
     game::Game,
     games::Games,
-    inspect::{InspectError, LevelPicture, LevelRequest},
+    inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
 };
 
 use crate::{
+    defaults::usual_mode,
     error::{CliError, Outcome, print_line},
     output,
     plot::PlotFile,
@@ -32,7 +33,7 @@ the rows end at the first empty line.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; if none is named, the game chooses.
+    /// Mode of the game; the one that `train` trains in if none is named.
     #[arg(long)]
     mode: Option<String>,
     /// Map, for games whose levels are maps: its name, with options where it takes any, a whole mode of the game, with the
@@ -53,14 +54,36 @@ pub struct Args {
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let file = args.png.as_deref().map(|path| PlotFile::new(path).map(|file| (path, file))).transpose()?;
-    let (mode, map) = (args.mode.as_deref(), args.map.as_deref());
-    let request = LevelRequest { mode, map, seed: args.seed, picture: file.is_some() };
-    let level = game.show_level(&request).map_err(|error| explain(game, error))?;
+    let level = show(game, &args, file.is_some()).map_err(|error| explain(game, error))?;
     if let (Some((path, file)), Some(picture)) = (file, &level.picture) {
         write(path, &file, picture, game.tick_hz())?;
     }
     print_line(if args.json { level.json } else { level.text })?;
     Ok(Outcome::Pass)
+}
+
+/// The level that is asked for. Where neither a mode nor a map is named it is one of the usual mode; games whose levels are
+/// maps take no mode, and choose a map themselves.
+fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, InspectError> {
+    let (mode, map) = (args.mode.as_deref(), args.map.as_deref());
+    let request = LevelRequest { mode, map, seed: args.seed, picture };
+    if mode.is_some() || map.is_some() {
+        return game.show_level(&request);
+    }
+    let (mode, seed) = (usual_mode(game), args.seed.unwrap_or(0));
+    match game.show_level(&LevelRequest { mode: Some(mode), ..request }) {
+        Err(InspectError::Usage(_)) => {
+            let level = game.show_level(&request)?;
+            tell!("no --map is named: one that the game chooses, level {seed}");
+            Ok(level)
+        }
+        level => {
+            if level.is_ok() {
+                tell!("no --mode is named: {mode}, which is trained in, level {seed}");
+            }
+            level
+        }
+    }
 }
 
 /// Whether a game can show levels: it is asked for the one that it chooses itself.

@@ -5,12 +5,14 @@
 mod tell;
 
 mod bench;
+mod cloning;
 mod command_line;
 mod compute;
 mod config;
 mod defaults;
 mod demo;
 mod demo_merge;
+mod demo_show;
 mod doctor;
 mod error;
 mod eval;
@@ -27,6 +29,7 @@ mod mesa;
 mod methods;
 mod missing_demos;
 mod number;
+mod open;
 mod output;
 mod play;
 mod player;
@@ -45,6 +48,7 @@ mod train;
 mod view;
 #[cfg(feature = "window")]
 pub mod window;
+mod words;
 
 pub use command_line::{check_usage, main};
 

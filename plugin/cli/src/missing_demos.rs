@@ -24,7 +24,8 @@ fn is_missing(error: &VerifyError) -> bool {
     }
 }
 
-/// The command that records what can be learned from: the levels to train on, since others may be held out.
+/// The command that records what can be learned from, on levels that are not held out: those to train on, which the
+/// experiment keeps apart from the held-out ones.
 fn advice(game: &dyn Game, experiment: &Experiment, path: &Path) -> String {
     let (name, levels) = (game.name(), quoted(&experiment.train.to_string()));
     let file = |name: &str| {
@@ -32,12 +33,16 @@ fn advice(game: &dyn Game, experiment: &Experiment, path: &Path) -> String {
         let file = if is_file { path.to_owned() } else { path.join(name) };
         quoted(&file.display().to_string())
     };
+    let rule = format!(
+        "; those are the training levels, and any others will do as well, but never the held-out ones, {}",
+        experiment.test
+    );
     if game.demonstrator().is_some() {
         let file = file("bot.demo");
-        format!("record the game's demonstrator with `playbot record {name} --levels {levels} --out {file}`")
+        format!("record the game's demonstrator with `playbot record {name} --levels {levels} --out {file}`{rule}")
     } else if game.key_bindings().is_some() {
         let file = file("mine.demo");
-        format!("play and record it yourself with `playbot play {name} --levels {levels} --record {file}`")
+        format!("play and record it yourself with `playbot play {name} --levels {levels} --record {file}`{rule}")
     } else {
         "train a policy without them, with `playbot train --algorithm ppo --run runs/first`".to_owned()
     }
@@ -71,6 +76,7 @@ mod tests {
         let words = said(&shown, empty);
         let command = "`playbot record runner --levels default:0..63 --out ";
         assert!(words.contains(command) && words.contains("bot.demo`"), "{words}");
+        assert!(words.contains("training levels") && words.contains("held-out ones, default:64..127"), "{words}");
         let words = said(&shown, &file);
         assert!(words.contains("cannot find recordings") && words.contains("a.demo`"), "{words}");
         assert!(!words.contains("bot.demo"), "{words}");

@@ -9,6 +9,9 @@ use playbot_lab::train::run_dir::write_atomically;
 
 use super::error::CliError;
 
+/// What to do about a place where nothing can be written.
+const ELSEWHERE: &str = "make room or rights there, or name a file in another folder";
+
 /// Makes the folder that a file lies in, and tries whether one can be written there.
 ///
 /// # Errors
@@ -22,7 +25,7 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
     let probe = beside(path, ".probe");
     File::create(&probe)
         .and_then(|_| fs::remove_file(&probe))
-        .map_err(|error| CliError::Io(format!("cannot write {}: {error}", path.display())))
+        .map_err(|error| CliError::Io(format!("cannot write {}: {error}; {ELSEWHERE}", path.display())))
 }
 
 /// Makes the folder that a file lies in.
@@ -32,7 +35,8 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
 /// The system refuses.
 pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     let folder = path.parent().unwrap_or(path);
-    fs::create_dir_all(folder).map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))
+    fs::create_dir_all(folder)
+        .map_err(|error| CliError::Io(format!("cannot create {}: {error}; {ELSEWHERE}", folder.display())))
 }
 
 /// Writes a file, and makes the folder it lies in.

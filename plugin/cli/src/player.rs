@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::{
-    policy::ActionDraw, policy_file::policy_observation, skill_prior::SkillPrior, vision::ObservationConfig,
+    policy::ActionDraw,
+    policy_file::{PolicyMisfit, check_policy, policy_observation},
+    skill_prior::SkillPrior,
+    vision::ObservationConfig,
 };
 use playbot_lab::sensors::GameSensors;
 use playbot_lab::{
@@ -16,9 +18,9 @@ use playbot_lab::{
         run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::{DeviceKind, PolicyFile};
+use playbot_learner::DeviceKind;
 
-use super::{compute::Device, error::CliError, methods};
+use super::{compute::Device, error::CliError, methods, open};
 
 /// A policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
@@ -75,7 +77,8 @@ impl Chosen {
     pub fn usual(game: &dyn Game) -> Result<Self, CliError> {
         let bots = methods::bot_names(game);
         let name = game.demonstrator().or(bots.first().copied());
-        Self::bot(game, name.ok_or(CliError::Usage("the game has no bot: name a --policy or a --run".to_owned()))?)
+        let nobody = || CliError::Usage(format!("`{}` has no bot: name a --policy or a --run", game.name()));
+        Self::bot(game, name.ok_or_else(nobody)?)
     }
 
     /// The policy in a file, under the name of its algorithm.
@@ -84,8 +87,8 @@ impl Chosen {
     ///
     /// It cannot be loaded, or was made for another game.
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
-        let file = PolicyFile::load(path, device)?;
-        check_policy(&game.card(), &file)?;
+        let file = open::policy(path, device)?;
+        check_policy(&game.card(), &file).map_err(|misfit| does_not_fit(path, &misfit))?;
         let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
         Ok(Self { name: file.card.algorithm, player, observation_config })
     }
@@ -121,15 +124,31 @@ impl Chosen {
         if (policy.observation(), policy.action_space()) == (seen, acts) {
             return Ok(());
         }
-        let (reads, made_for) = (policy.observation().describe(), policy.action_space());
         Err(CliError::Usage(format!(
-            "the policy {} was made for {reads} and {made_for:?}, but `{}` has {} and {acts:?}: use one that was \
-             trained for this game and this version",
+            "the policy {} was made for {} and {}, but `{}` has {} and {}: use one that was trained for this game and \
+             this version",
             self.name,
+            policy.observation().describe(),
+            policy.action_space(),
             game.name(),
-            seen.describe()
+            seen.describe(),
+            acts
         )))
     }
+}
+
+/// The error of a policy file that was made for another game, or another state of it.
+fn does_not_fit(path: &Path, misfit: &PolicyMisfit) -> CliError {
+    let path = path.display();
+    CliError::Usage(match misfit {
+        PolicyMisfit::Game { made_for, game } => format!("{path}: {misfit}: {}", way_out("policy", made_for, game)),
+        _ => format!("{path}: {misfit}"),
+    })
+}
+
+/// What to do about something that is of one game where another one was named.
+fn way_out(what: &str, found: &str, named: &str) -> String {
+    format!("name a {what} of `{named}`, or call the program that has `{found}` and name that game")
 }
 
 impl PlayerArgs {
@@ -149,7 +168,13 @@ impl PlayerArgs {
         let Some(path) = &self.run else { return Ok(None) };
         let OpenedRun { run, experiment, info } = RunDir::open(path)?;
         if experiment.game != game.name() {
-            return Err(CliError::Usage(format!("{} is a run of `{}`", path.display(), experiment.game)));
+            return Err(CliError::Usage(format!(
+                "{}: a run of the game `{}`, not of `{}`: {}",
+                path.display(),
+                experiment.game,
+                game.name(),
+                way_out("run", &experiment.game, game.name())
+            )));
         }
         let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, self.device.device)?;
         chosen.check_fit(game)?;

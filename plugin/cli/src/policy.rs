@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::policy_file::policy_observation;
-use playbot_lab::games::Games;
 use playbot_lab::{
     game::Game,
+    games::{Artifact, Games},
     policy_export::{Provenance, export_policy, policy_file},
     train::{
         Experiment, TrainedLearner,
@@ -18,12 +18,13 @@ use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
 use serde_json::json;
 
 use super::{
+    cloning::{check_skills, cloning_skills},
     compute::Device,
     error::{CliError, Outcome, print_line},
-    eval::{check_skills, cloning_skills},
     experiment::{ExperimentArgs, quoted},
+    open,
     output::prepare,
-    program,
+    program, words,
 };
 
 /// Make and look at policy files, which a game ships with.
@@ -78,7 +79,7 @@ struct Export {
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Export(args) => export(&args, games),
-        Verb::Show { file, device, json } => show(&file, device.device, json),
+        Verb::Show { file, device, json } => show(&file, device.device, json, games),
     }
 }
 
@@ -107,7 +108,7 @@ type Exported<'a> = (&'a dyn Game, Experiment, PolicyFile);
 
 fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<'a>, CliError> {
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
-    let game = games.get(&experiment.game)?;
+    let game = games.of_file(Artifact::Run, path, &experiment.game)?;
     let checkpoint = run.checkpoint(which)?;
     let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
     let training = format!(
@@ -124,7 +125,7 @@ fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<
 
 fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Result<Exported<'a>, CliError> {
     let experiment = from.load(games, [])?;
-    let game = games.get(&experiment.game)?;
+    let game = open::game(games, from, &experiment)?;
     let model = SkillModel::load(path, DeviceKind::default())?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let training = match &experiment.demos {
@@ -143,41 +144,40 @@ fn code(version: &str, revision: &str) -> String {
     format!("playbot {version} ({revision})")
 }
 
-fn show(path: &Path, device: DeviceKind, as_json: bool) -> Result<Outcome, CliError> {
-    let file = PolicyFile::load(path, device)?;
+fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result<Outcome, CliError> {
+    let file = open::policy(path, device)?;
     let (card, policy) = (&file.card, &file.policy);
     let skills = file.skills.as_ref();
+    let game = games.get(&card.game);
     if as_json {
         print_line(json!({
-            "card": card, "action_space": policy.action_space(), "latent": policy.latent(),
+            "card": card, "in_this_program": game.is_ok(), "action_space": policy.action_space(),
+            "latent": policy.latent(),
             "horizon": skills.map(|skills| skills.horizon), "normalised": policy.normalises(),
         }))?;
         return Ok(Outcome::Pass);
     }
-    print_line(format!("{}, version {} of its rules", card.game, card.game_version))?;
+    let where_else = match game {
+        Ok(_) => String::new(),
+        Err(unknown) => format!("; this program does not have that game (it has {})", unknown.valid.join(", ")),
+    };
+    print_line(format!("{}, version {} of its rules{where_else}", card.game, card.game_version))?;
     print_line(format!("algorithm     {}", card.algorithm))?;
     print_line(format!("trained on    {}", card.training))?;
     print_line(format!("code          {}", card.code))?;
     print_line(match policy_observation(&file)? {
         observation_config if observation_config.is_image() => format!("observation   {observation_config}"),
-        _ => format!(
-            "observation   {} values{}: {}",
-            policy.obs_dim(),
-            if policy.normalises() { ", normalised" } else { "" },
-            listed(&card.observations)
-        ),
+        _ => {
+            let normalised = if policy.normalises() { ", normalised" } else { "" };
+            let values = format!("{} values{normalised}", policy.obs_dim());
+            format!("observation   {}", words::with_names(&values, &card.observations))
+        }
     })?;
-    print_line(format!("actions       {:?}: {}", policy.action_space(), listed(&card.actions)))?;
+    let actions = policy.action_space().to_string();
+    print_line(format!("actions       {}", words::with_names(&actions, &card.actions)))?;
     print_line(match skills {
         Some(skills) => format!("skills        {} numbers, held for {} ticks", policy.latent(), skills.horizon),
         None => "skills        none".to_owned(),
     })?;
     Ok(Outcome::Pass)
-}
-
-/// The first few names.
-fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 6;
-    let more = if names.len() > SHOWN { ", …" } else { "" };
-    names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ") + more
 }

@@ -40,9 +40,9 @@ fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
     let _ = out.write_str(&describe_left(state.eta()));
 }
 
-/// indicatif estimates no time at all as long as nothing is done.
+/// indicatif estimates no time at all as long as nothing is done; less than a second is not worth a word.
 fn describe_left(left: Duration) -> String {
-    if left.is_zero() { String::new() } else { format!("{:#} left", HumanDuration(left)) }
+    if left < Duration::from_secs(1) { String::new() } else { format!("{:#} left", HumanDuration(left)) }
 }
 
 /// A bar that nobody sees, and how it is spoken of.
@@ -61,6 +61,10 @@ impl Told {
             Some(length) if length > done => format!("{title}: {done} of {length} {unit}"),
             _ => format!("{title}: {done} {unit}"),
         };
+        let left = describe_left(bar.eta());
+        if !left.is_empty() {
+            let _ = write!(line, ", {left}");
+        }
         let message = bar.message();
         if !message.is_empty() {
             let _ = write!(line, ", {message}");

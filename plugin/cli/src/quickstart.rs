@@ -19,18 +19,18 @@ use playbot_lab::{
         run_lock::RunLock,
     },
 };
-use playbot_learner::{DeviceKind, SkillModel};
+use playbot_learner::{Dataset, DeviceKind, SkillModel};
 use serde_json::json;
 
 use report::write_report;
 
 use super::{
+    cloning::cloning,
     compute::Threads,
     error::{CliError, Outcome, print_line},
-    eval::cloning,
     experiment::{self, ExperimentArgs, option},
-    interrupt, learn_skills, methods, program,
-    train::{create_run, drive},
+    interrupt, learn_skills, methods, open, program,
+    train::{create_run, drive, tell_length},
 };
 
 /// The file of the skill model.
@@ -101,10 +101,17 @@ struct CurvePoint {
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let experiment = read_experiment(&args, games)?;
-    let game = games.get(&experiment.game)?;
-    Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() }.check_memory(game)?;
+    let game = open::game(games, &args.from, &experiment)?;
+    let trained = Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() };
+    trained.check_levels(game)?;
+    trained.check_memory(game)?;
+    check_folder(&args.run)?;
+    // Not later: where there is nothing to learn from, no folder is made.
+    let demos = experiment::resolve(experiment.recordings()?);
+    let dataset = learn_skills::read_demos(game, &experiment, &demos, args.threads.threads)?;
     let _lock = take_folder(&args.run)?;
-    let Some(skills) = skills(game, &experiment, &args)? else {
+    tell_length(&trained);
+    let Some(skills) = skills(&experiment, dataset, &args)? else {
         tell!("stopped while learning skills; nothing was saved, start again with `{} quickstart`", program::name());
         return Ok(Outcome::Stopped);
     };
@@ -152,8 +159,8 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     )?)
 }
 
-/// Makes the folder of the quickstart and locks it. Only that of an earlier quickstart is written into again.
-fn take_folder(path: &Path) -> Result<RunLock, CliError> {
+/// Only the folder of an earlier quickstart is written into again, and not while another one is at work there.
+fn check_folder(path: &Path) -> Result<(), CliError> {
     let is_run = path.join("run.json").exists();
     let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
     if path.exists() && !is_unstarted(path) && (is_run || !was_ours) {
@@ -162,9 +169,9 @@ fn take_folder(path: &Path) -> Result<RunLock, CliError> {
             path.display()
         )));
     }
-    std::fs::create_dir_all(path)
-        .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
-    let lock = RunLock::take(path)?;
+    if RunLock::is_known(path) {
+        RunLock::take(path)?;
+    }
     for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
         if run.exists() {
             // Found out before skills are learned.
@@ -172,14 +179,19 @@ fn take_folder(path: &Path) -> Result<RunLock, CliError> {
             RunLock::take(&run)?;
         }
     }
-    Ok(lock)
+    Ok(())
+}
+
+/// Makes the folder of the quickstart and locks it.
+fn take_folder(path: &Path) -> Result<RunLock, CliError> {
+    std::fs::create_dir_all(path)
+        .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+    Ok(RunLock::take(path)?)
 }
 
 /// Learns the skill model and saves it; `None` after Ctrl-C.
-fn skills(game: &dyn Game, experiment: &Experiment, args: &Args) -> Result<Option<SkillModel>, CliError> {
+fn skills(experiment: &Experiment, dataset: Dataset, args: &Args) -> Result<Option<SkillModel>, CliError> {
     interrupt::listen();
-    let demos = experiment::resolve(experiment.recordings()?);
-    let dataset = learn_skills::read_demos(game, experiment, &demos, args.threads.threads)?;
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });

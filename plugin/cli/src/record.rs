@@ -2,16 +2,13 @@
 
 use std::path::PathBuf;
 
-use bevy_playbot::demo::{
-    file::DemoWriter,
-    recorder::{Recorder, Recording, flush_unfinished},
-};
+use bevy_playbot::demo::recorder::{Recorder, flush_unfinished};
 use playbot_lab::games::Games;
 use playbot_lab::prelude::*;
-use playbot_lab::{game::Game, held_out::HeldOut, worlds::build_world};
+use playbot_lab::{demo::demonstration::DemonstrationPlan, game::Game, held_out::HeldOut};
 
 use super::{
-    defaults::first_levels,
+    defaults::{first_levels, usual_held_out},
     error::{CliError, Outcome},
     interrupt, progress,
     recording::Existing,
@@ -21,6 +18,10 @@ use super::{
 ///
 /// That is a bot of the game's own; --noise replaces some of its actions, so that recordings show how to go on from
 /// there.
+///
+/// Recordings may show training levels and any others, but no held-out level, on which bots are tested: `learn-skills`
+/// refuses those, and any level that looks like one. Held-out levels are the experiment's `test`; leave them out with
+/// --hold-out.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot record GAME --levels MODE:0..9 --out my.demo
@@ -31,7 +32,7 @@ pub struct Args {
     /// Name of the game.
     game: String,
     /// Levels, as mode:first..last, both included; played in order, again and again until --steps is reached. Without it
-    /// levels 0 to 499 of the game's first mode.
+    /// levels 0 to 499 of the mode that `train` trains in, but for the held-out ones of the game's own experiment.
     #[arg(long)]
     levels: Option<LevelSplit>,
     /// Leave out these levels, and any that look like one of them; may be given several times.
@@ -70,29 +71,39 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
     }
-    let chosen = choose_levels(game, &levels, &args.hold_out)?;
-    let writer = open_writer(game, &levels.mode, &args)?;
-    let (mut world, agents) = build_world(game, &levels.mode, args.seed, 0, 1);
-    let agent = agents[0];
-    game.attach_demonstrator(&mut world, agent, args.noise);
-    let mut recorder = Recorder::new(writer);
-    if let Some(steps) = args.steps {
-        recorder = recorder.with_step_limit(steps);
+    let left_out = usual_held_out(game).filter(|_| args.levels.is_none());
+    let held_out: Vec<_> = args.hold_out.iter().chain(&left_out).cloned().collect();
+    let chosen = choose_levels(game, &levels, &held_out)?;
+    match &left_out {
+        Some(held_out) => tell!("no --levels are named: recording {levels}, but for the held-out levels {held_out}"),
+        None if args.levels.is_none() => tell!("no --levels are named: recording {levels}"),
+        None => warn_of_held_out(game, &levels, &chosen),
     }
-    world.insert_resource(recorder);
     let count = chosen.len() as u64;
-    let queue = if args.steps.is_some() { LevelQueue::rounds(chosen) } else { LevelQueue::list(chosen) };
-    world.entity_mut(agent).insert((Control::Bot, Recording::default(), queue));
+    let plan = DemonstrationPlan {
+        mode: levels.mode.clone(),
+        levels: chosen,
+        noise: args.noise,
+        seed: args.seed,
+        steps: args.steps,
+        keep_observations: args.observations,
+    };
+    let writer = args.existing.open(&args.out, plan.header(game))?;
+    let (mut world, agent) = plan.stage(game, writer);
     let finished = play(&mut world, agent, count, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
-    let share = 100.0 * ended.successes as f64 / ended.finished.max(1) as f64;
-    tell!("{}: {episodes} episodes, {steps} steps, {share:.1} % reached the goal", args.out.display());
+    let wins = match ended.successes {
+        // Not every game has a goal.
+        0 => "no episode ended with a win".to_owned(),
+        n => format!("{:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
+    };
+    tell!("{}: {episodes} episodes, {steps} steps, {wins}", args.out.display());
     if finished {
         return Ok(Outcome::Pass);
     }
     let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
-    let rest = Rest { level, steps };
+    let rest = Rest { level, steps, left_out };
     tell!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
 }
@@ -103,6 +114,8 @@ struct Rest {
     level: Option<u64>,
     /// Steps that this call has recorded.
     steps: u64,
+    /// Held-out levels that were left out because no levels were named.
+    left_out: Option<LevelSplit>,
 }
 
 impl Rest {
@@ -112,6 +125,7 @@ impl Rest {
         let mut changes = "--append".to_owned();
         if let Some(first) = self.level {
             changes += &format!(" --levels {}", LevelSplit { first, ..levels.clone() });
+            changes.extend(self.left_out.iter().map(|held_out| format!(" --hold-out {held_out}")));
         }
         if let Some(steps) = args.steps {
             changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
@@ -129,7 +143,8 @@ fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
         return Ok(());
     }
     let name = game.name();
-    let mut advice = "train a policy without demonstrations (`playbot train --algorithm ppo`)".to_owned();
+    let mut advice =
+        "train a policy without demonstrations (`playbot train --algorithm ppo --run runs/first`)".to_owned();
     if game.key_bindings().is_some() {
         advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
     }
@@ -147,16 +162,6 @@ fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
     if fits { Ok(()) } else { Err(CliError::Usage(format!("--noise is {noise}; {wanted}"))) }
 }
 
-fn open_writer(game: &dyn Game, mode: &str, args: &Args) -> Result<DemoWriter, CliError> {
-    let mut header = game.demo_header(mode);
-    header.demonstrator = game.demonstrator().unwrap_or("none").to_owned();
-    header.action_noise = args.noise;
-    if args.observations {
-        header.observation_names = game.observation().names;
-    }
-    args.existing.open(&args.out, header)
-}
-
 /// The levels but for those that are held out.
 fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
     held_out.iter().try_for_each(|split| game.check_mode(&split.mode))?;
@@ -167,6 +172,21 @@ fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) 
         return Err(CliError::Usage(format!("every one of the levels {levels} is held out: record others")));
     }
     Ok(chosen)
+}
+
+/// Says so if levels that were asked for are held out where nobody names an experiment: an experiment may hold out others.
+fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
+    let Some(split) = usual_held_out(game) else { return };
+    let hidden = HeldOut::new(game, &split);
+    if hidden.first_of(levels).is_none() {
+        return;
+    }
+    if let Some(level) = chosen.iter().find(|level| hidden.contains(&levels.mode, **level)) {
+        tell!(
+            "warning: level {level} is, or looks like, one of the held-out levels {split}; learn-skills refuses recordings \
+             of them, unless your experiment holds out others: leave them out with --hold-out {split}"
+        );
+    }
 }
 
 /// Plays until enough is recorded; false if somebody stopped it before.

@@ -1,6 +1,9 @@
 //! `playbot study`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use bevy_playbot::unknown_name::UnknownName;
 use indicatif::ProgressBar;
@@ -20,8 +23,9 @@ use super::{
     compute::Compute,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
-    interrupt, program, progress,
+    interrupt, open, program, progress,
     study_run::Runner,
+    train::rounded,
 };
 
 /// Compare variants of an experiment over several seeds.
@@ -67,13 +71,16 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut experiment = args.from.load(games, [seeds])?;
     let runs = chosen(study_runs(&experiment)?, &args.variant)?;
     experiment.variants.retain(|variant| runs.iter().any(|run| run.variant == variant.name));
-    check_games(&runs, games)?;
+    check_games(&runs, &args.from, games)?;
     let folder = runs_folder(&args);
     check_folder(&folder, &args)?;
     for path in [&folder, &args.out] {
         std::fs::create_dir_all(path)
             .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
     }
+    let trained = runs.iter().filter(|run| run.experiment.algorithm.is_trained());
+    let lengths: BTreeSet<String> = trained.filter_map(|run| rounded(&run.experiment)).collect();
+    lengths.iter().for_each(|words| tell!("{words}"));
     interrupt::listen();
     let mut runner = Runner::new(games, &folder, args.force, args.compute.device(), args.compute.threads());
     runner.check_folders(&runs)?;
@@ -104,7 +111,7 @@ fn all(
     command: String,
     experiment: Experiment,
 ) -> Result<Option<StudyReport>, CliError> {
-    let steps = |run: &StudyRun| if run.experiment.algorithm.is_trained() { run.experiment.steps } else { 0 };
+    let steps = |run: &StudyRun| if run.experiment.algorithm.is_trained() { run.experiment.whole_steps() } else { 0 };
     let whole = progress::bar("study", runs.iter().map(steps).sum(), "steps");
     let mut report = StudyReport { command, experiment, results: Vec::new(), curves: Vec::new() };
     let mut done = 0;
@@ -140,9 +147,9 @@ fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>,
     Ok(runs)
 }
 
-fn check_games(runs: &[StudyRun], games: &Games) -> Result<(), CliError> {
+fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
-        let game = games.get(&experiment.game)?;
+        let game = open::game(games, from, experiment)?;
         experiment.check_levels(game)?;
         experiment.check_memory(game)?;
     }

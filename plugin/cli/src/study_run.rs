@@ -27,8 +27,8 @@ use playbot_learner::{Dataset, DeviceKind, SkillModel};
 use serde_json::json;
 
 use super::{
+    cloning::cloning,
     error::CliError,
-    eval::cloning,
     experiment, learn_skills, methods,
     train::{drive, run_info},
 };

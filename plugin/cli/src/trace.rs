@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::ArgGroup;
 use playbot_lab::{
     games::Games,
     inspect::{InspectError, TraceRequest},
@@ -15,6 +16,7 @@ use crate::error::{CliError, Outcome, print_line};
 /// A line holds the numbers by which the game describes its state, which the head of the table names, and of most
 /// games the reward and whether the episode is over. It stops at the end of the episode or of the actions.
 #[derive(clap::Args)]
+#[command(group(ArgGroup::new("given").args(["actions", "actions_file"]).required(true)))]
 #[command(after_help = "Examples:
   playbot trace GAME --seed 2 --actions 0,0,0,0 --json
   playbot trace GAME --mode MODE --seed 2 --actions-file actions.txt
@@ -30,11 +32,11 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Discrete actions: their numbers, from 0, separated by commas.
-    #[arg(long, value_delimiter = ',', conflicts_with = "actions_file")]
+    #[arg(long, value_delimiter = ',')]
     actions: Vec<u32>,
     /// File of actions. Discrete ones: their numbers, separated by commas, spaces or line ends. Continuous ones, in games
     /// that can trace them: one action per line, its values separated by spaces.
-    #[arg(long, value_name = "FILE", required_unless_present = "actions")]
+    #[arg(long, value_name = "FILE")]
     actions_file: Option<PathBuf>,
     /// Place and speed to start with instead of the level's, in games that can start anywhere.
     #[arg(long, value_name = "X,Y,VX,VY", value_delimiter = ',', allow_hyphen_values = true)]

@@ -1,10 +1,13 @@
 //! `playbot train`.
 
+mod length;
+mod repeated;
+
 use std::path::{Path, PathBuf};
 
-use playbot_lab::games::Games;
 use playbot_lab::{
     game::Game,
+    games::{Artifact, Games},
     train::{
         Algorithm, Experiment, TrainError, Trainer, UpdateReport,
         checkpoint::Which,
@@ -17,9 +20,13 @@ use playbot_learner::{DeviceKind, SkillModel};
 use super::{
     compute::Compute,
     error::{CliError, Outcome},
-    experiment::{ExperimentArgs, option},
-    interrupt, program, progress,
+    experiment::ExperimentArgs,
+    interrupt, open, program, progress,
 };
+use bevy_playbot::unknown_name::UnknownName;
+use repeated::resumed;
+
+pub use length::rounded;
 
 /// Train a policy, headless, over the experiment's training levels.
 #[derive(clap::Args)]
@@ -27,30 +34,32 @@ use super::{
   playbot train --skills skills.safetensors --run runs/first
   playbot train --algorithm ppo --run runs/baseline --steps 200000
   playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.hidden=[64,64]
-  playbot train --run runs/first --resume")]
+  playbot train --run runs/first --resume
+  playbot train --run runs/first --resume --steps 1000000")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
     /// score-ppo, ppo, score-sac or sac, instead of the experiment's.
-    #[arg(long, conflicts_with = "resume")]
+    #[arg(long, value_parser = trained)]
     algorithm: Option<Algorithm>,
-    /// Skill model, as written by `playbot learn-skills`.
-    #[arg(long, conflicts_with = "resume")]
+    /// Skill model, as written by `playbot learn-skills --out FILE`; needed by score-ppo and score-sac.
+    #[arg(long, value_name = "FILE")]
     skills: Option<PathBuf>,
     /// Folder of the run.
     #[arg(long)]
     run: PathBuf,
-    /// Go on from the last checkpoint of the run.
-    #[arg(long, conflicts_with_all = ["experiment", "set"])]
+    /// Go on from the last checkpoint of the run, with the settings that it has. Other options may be given again with the
+    /// same values; --steps and --checkpoint-every with new ones.
+    #[arg(long)]
     resume: bool,
     /// Delete the folder of the run first if it exists.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
-    /// Environment steps, instead of the experiment's.
+    /// Environment steps from the beginning, instead of the experiment's; rounded up to whole updates.
     #[arg(long)]
     steps: Option<u64>,
     /// Seed, instead of the experiment's.
-    #[arg(long, conflicts_with = "resume")]
+    #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
     compute: Compute,
@@ -59,55 +68,93 @@ pub struct Args {
     checkpoint_every: Option<u64>,
 }
 
+/// An algorithm that can be trained.
+fn trained(name: &str) -> Result<Algorithm, String> {
+    let names = Algorithm::TRAINED.map(Algorithm::name);
+    match name.parse::<Algorithm>() {
+        Ok(algorithm) if algorithm.is_trained() => Ok(algorithm),
+        Ok(algorithm) => {
+            let why = program::named(&TrainError::NotTrained(algorithm).to_string());
+            Err(format!("{why}; those that are: {}", names.join(", ")))
+        }
+        Err(_) => Err(UnknownName::new("algorithm", name, &names).to_string()),
+    }
+}
+
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let (run, mut trainer) = if args.resume { resume(&args, games)? } else { start(&args, games)? };
+    let (path, program) = (args.run.display(), program::name());
+    if trainer.is_done() {
+        tell!(
+            "{path} is finished: it was trained for {0} steps. Train it further with `{program} train --run {path} --resume \
+             --steps N`, where N is more than {0}, or test it with `{program} eval --run {path}`",
+            trainer.steps()
+        );
+        return Ok(Outcome::Pass);
+    }
+    tell_length(trainer.experiment());
     let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
-        tell!("done: test it with `{} eval --run {}`", program::name(), args.run.display());
+        tell!("done: test it with `{program} eval --run {path}`");
         Ok(Outcome::Pass)
     } else {
-        let (steps, wanted) = (trainer.steps(), trainer.experiment().steps);
-        let run = args.run.display();
+        let (steps, wanted) = (trainer.steps(), trainer.experiment().whole_steps());
         tell!(
             "stopped and saved after {steps} of {wanted} steps, so the training is incomplete: go on with \
-             `{} train --run {run} --resume`",
-            program::name()
+             `{program} train --run {path} --resume`"
         );
         Ok(Outcome::Stopped)
     }
 }
 
+/// Says so if a training will have more steps than were asked for.
+pub fn tell_length(experiment: &Experiment) {
+    if let Some(words) = rounded(experiment) {
+        tell!("{words}");
+    }
+}
+
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
-    let experiment = args.from.load(
-        games,
-        [
-            option("algorithm", &args.algorithm),
-            option("seed", &args.seed),
-            option("steps", &args.steps),
-            option("checkpoints.every", &args.checkpoint_every),
-        ],
-    )?;
-    let game = games.get(&experiment.game)?;
+    let experiment = args.from.load(games, args.settings())?;
+    let game = open::game(games, &args.from, &experiment)?;
     let skills = match &args.skills {
         Some(path) => Some(SkillModel::load(path, args.compute.device())?),
         None => None,
     };
-    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.compute.device(), args.compute.threads())?;
+    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.compute.device(), args.compute.threads())
+        .map_err(|error| explain(error, args, &experiment))?;
     let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.compute.device(), args.force)?;
+    if args.from.experiment.is_none() {
+        let Experiment { train, test, .. } = &experiment;
+        tell!("no --experiment is named: training on {train}, held out for the test {test}");
+    }
     Ok((run, trainer))
 }
 
+/// The error of a training that cannot begin; where skills are missing, with the commands that make and use them.
+fn explain(error: TrainError, args: &Args, experiment: &Experiment) -> CliError {
+    let TrainError::NoSkills(algorithm) = error else { return error.into() };
+    let plain = if experiment.algorithm.is_sac() { Algorithm::Sac } else { Algorithm::Ppo };
+    CliError::Usage(format!(
+        "{algorithm} needs a skill model: learn one with `playbot learn-skills{} --out skills.safetensors`, then give the \
+         same command again with `--skills skills.safetensors`; or train without skills, with `--algorithm {plain}`",
+        args.from.words()
+    ))
+}
+
 fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
-    let OpenedRun { run, experiment: saved, .. } = RunDir::open_to_write(&args.run)?;
-    let game = games.get(&saved.game)?;
-    let options = [option("steps", &args.steps), option("checkpoints.every", &args.checkpoint_every)];
-    let experiment = saved.with_set(&options.into_iter().flatten().collect::<Vec<_>>())?;
-    experiment.check()?;
+    let OpenedRun { run, experiment: saved, info } = RunDir::open_to_write(&args.run)?;
+    let game = games.of_file(Artifact::Run, &args.run, &saved.game)?;
+    let experiment = resumed(args, &saved, &info, games)?;
     let trainer = run.resume(game, &experiment, args.compute.device(), args.compute.threads())?;
+    if trainer.is_done() {
+        // Nothing is to be trained, so the run stays what it is.
+        return Ok((run, trainer));
+    }
     if experiment != saved {
         run.write_experiment(&experiment)?;
     }
-    tell!("going on at step {} of {}", trainer.steps(), experiment.steps);
+    tell!("going on at step {} of {}", trainer.steps(), experiment.whole_steps());
     Ok((run, trainer))
 }
 
@@ -166,7 +213,7 @@ pub fn drive(
     interrupt::listen();
     trainer.report_panics_to(run.path());
     let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
-    let bar = progress::bar(title, trainer.experiment().steps, "steps");
+    let bar = progress::bar(title, trainer.experiment().whole_steps(), "steps");
     let mut saved = trainer.updates();
     if run.checkpoint(Which::Last).is_err() {
         // Whatever goes wrong later, there is something good to go back to.

@@ -4,10 +4,12 @@ use std::collections::HashMap;
 
 use bevy::prelude::*;
 use playbot_learner::{Policy, PolicyFile};
-use serde::Serialize;
 use thiserror::Error;
 
+mod summary;
+
 pub use bevy_playbot::episode::EpisodeResult;
+pub use summary::{EvalSummary, error_over_levels, summarize};
 
 use crate::{
     arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, train::Experiment,
@@ -118,27 +120,6 @@ impl EvalPlan {
             threads,
         }
     }
-}
-
-/// The summary of a measurement: one row of a result table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EvalSummary {
-    /// Name of the player.
-    pub method: String,
-    /// Levels, as `mode:first..last`.
-    pub split: String,
-    /// Episodes.
-    pub episodes: u64,
-    /// Mean return.
-    pub return_mean: f64,
-    /// Standard error of the mean over episodes, taken as independent.
-    pub return_se: f64,
-    /// Share of episodes that reached the level's aim.
-    pub success: f64,
-    /// Mean length, ticks.
-    pub length_mean: f64,
-    /// Share of all ticks whose action was clipped to the game's range.
-    pub clipped: f64,
 }
 
 /// One measured episode, and where it led.
@@ -268,22 +249,4 @@ fn play_out(
         trails.extend(ended.into_iter().map(trail));
     }
     Ok(trails)
-}
-
-/// Sums up the episodes of one player on one split.
-pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) -> EvalSummary {
-    let n = results.len() as f64;
-    let mean = |value: &dyn Fn(&EpisodeResult) -> f64| results.iter().map(value).sum::<f64>() / n;
-    let return_mean = mean(&|result| result.total_reward);
-    let squares = results.iter().map(|result| (result.total_reward - return_mean).powi(2)).sum::<f64>();
-    EvalSummary {
-        method: method.to_owned(),
-        split: split.to_string(),
-        episodes: results.len() as u64,
-        return_mean,
-        return_se: if n > 1.0 { (squares / (n - 1.0) / n).sqrt() } else { 0.0 },
-        success: mean(&|result| f64::from(u8::from(result.success))),
-        length_mean: mean(&|result| f64::from(result.ticks)),
-        clipped: mean(&|result| f64::from(result.clipped)) / mean(&|result| f64::from(result.ticks)).max(1.0),
-    }
 }

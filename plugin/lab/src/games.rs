@@ -1,5 +1,7 @@
 //! The games of a program, by name.
 
+use std::path::{Path, PathBuf};
+
 use bevy_playbot::unknown_name::UnknownName;
 use thiserror::Error;
 
@@ -18,6 +20,54 @@ pub enum GamesError {
     /// No game was given.
     #[error("the program has no game: hand it at least one")]
     None,
+}
+
+/// A file or folder that names the game it is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Artifact {
+    /// The folder of a run.
+    Run,
+    /// A policy file.
+    Policy,
+    /// A recording.
+    Recording,
+    /// An experiment, which people write.
+    Experiment,
+}
+
+impl Artifact {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Run => "a run",
+            Self::Policy => "a policy",
+            Self::Recording => "a recording",
+            Self::Experiment => "an experiment",
+        }
+    }
+
+    fn way_out(self) -> &'static str {
+        match self {
+            Self::Run | Self::Policy | Self::Recording => "use the program of that game",
+            Self::Experiment => "correct `game` in it, or use the program of that game",
+        }
+    }
+}
+
+/// A file or folder is of a game that the program does not have.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[error(
+    "{}: {} of the game `{game}`, which this program does not have (it has {}): {}",
+    path.display(), kind.words(), valid.join(", "), kind.way_out()
+)]
+pub struct ForeignArtifact {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What it is.
+    pub kind: Artifact,
+    /// The game that it names.
+    pub game: String,
+    /// The games of the program.
+    pub valid: Vec<String>,
 }
 
 impl<'a> Games<'a> {
@@ -46,6 +96,20 @@ impl<'a> Games<'a> {
     pub fn get(&self, name: &str) -> Result<&'a dyn Game, UnknownName> {
         let names: Vec<_> = self.iter().map(Game::name).collect();
         self.iter().find(|game| game.name() == name).ok_or_else(|| UnknownName::new("game", name, &names))
+    }
+
+    /// The game that a file or folder names.
+    ///
+    /// # Errors
+    ///
+    /// [`ForeignArtifact`] with the path, the program's games and what can be done.
+    pub fn of_file(&self, kind: Artifact, path: &Path, name: &str) -> Result<&'a dyn Game, ForeignArtifact> {
+        self.get(name).map_err(|unknown| ForeignArtifact {
+            path: path.to_owned(),
+            kind,
+            game: unknown.name,
+            valid: unknown.valid,
+        })
     }
 
     /// All of them.

@@ -32,14 +32,13 @@ use playbot_learner::{DeviceKind, LearnError, PolicyFile, SkillModel, SkillTrain
 use thiserror::Error;
 
 use crate::{
-    demo::{dataset::Demonstrations, verify::VerifyError},
+    demo::{dataset::Demonstrations, demonstration::DemonstrationPlan, verify::VerifyError},
     eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
     policy_export::{Provenance, policy_file},
     split::LevelSplit,
     train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
-    worlds::build_world,
 };
 
 /// A step of the road failed.
@@ -83,16 +82,20 @@ pub enum PipelineError {
 /// Nobody demonstrates the game, it broke its contract, or the file exists or cannot be written.
 pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> Result<u64, PipelineError> {
     game.check_mode(&levels.mode)?;
-    let name = game.demonstrator().ok_or(PipelineError::NoDemonstrator(game.name()))?;
-    let mut header = game.demo_header(&levels.mode);
-    header.demonstrator = name.to_owned();
-    header.action_noise = noise;
-    let (mut world, agents) = build_world(game, &levels.mode, 1, 0, 1);
-    game.attach_demonstrator(&mut world, agents[0], noise);
-    world.insert_resource(Recorder::new(DemoWriter::create(path, header)?));
-    let queue = LevelQueue::list(levels.levels().collect::<Vec<_>>());
-    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), queue));
-    while Control::of(&world, agents[0]).is_active() {
+    if game.demonstrator().is_none() {
+        return Err(PipelineError::NoDemonstrator(game.name()));
+    }
+    let plan = DemonstrationPlan {
+        mode: levels.mode.clone(),
+        levels: levels.levels().collect(),
+        noise,
+        seed: 1,
+        steps: None,
+        keep_observations: false,
+    };
+    let writer = DemoWriter::create(path, plan.header(game))?;
+    let (mut world, agent) = plan.stage(game, writer);
+    while Control::of(&world, agent).is_active() {
         world.tick()?;
     }
     Ok(world.resource::<Recorder>().episodes())

@@ -55,10 +55,26 @@ impl fmt::Display for LevelSplit {
 
 /// The text is not a split.
 #[derive(Debug, Error, PartialEq, Eq)]
-#[error(
-    "`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, with at most 16,777,216 levels"
-)]
-pub struct SplitError(String);
+pub enum SplitError {
+    /// It is written in another way.
+    #[error("`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127")]
+    NotARange(String),
+    /// The range goes backwards.
+    #[error("`{text}`: first level {first} is after last level {last}; write {mode}:{last}..{first}")]
+    Reversed {
+        /// What was written.
+        text: String,
+        /// Its mode.
+        mode: String,
+        /// Its first level.
+        first: u64,
+        /// Its last level.
+        last: u64,
+    },
+    /// There are too many levels in it.
+    #[error("`{0}` has too many levels: a range has at most 16,777,216")]
+    TooMany(String),
+}
 
 impl FromStr for LevelSplit {
     type Err = SplitError;
@@ -67,11 +83,17 @@ impl FromStr for LevelSplit {
         let parse = || {
             let (mode, range) = text.split_once(':')?;
             let (first, last) = range.split_once("..").unwrap_or((range, range));
-            let (first, last) = (first.parse().ok()?, last.parse().ok()?);
-            let is_range = first <= last && last - first < MAX_LEVELS;
-            (!mode.is_empty() && is_range).then(|| Self { mode: mode.to_owned(), first, last })
+            let (first, last) = (first.parse::<u64>().ok()?, last.parse::<u64>().ok()?);
+            (!mode.is_empty()).then(|| (mode.to_owned(), first, last))
         };
-        parse().ok_or_else(|| SplitError(text.to_owned()))
+        let (mode, first, last) = parse().ok_or_else(|| SplitError::NotARange(text.to_owned()))?;
+        if first > last {
+            return Err(SplitError::Reversed { text: text.to_owned(), mode, first, last });
+        }
+        if last - first >= MAX_LEVELS {
+            return Err(SplitError::TooMany(text.to_owned()));
+        }
+        Ok(Self { mode, first, last })
     }
 }
 
@@ -102,6 +124,10 @@ mod tests {
         for bad in ["", "hard", "hard:9..3", ":1..2", "hard:a..b", "hard:-1..2", "easy:0..18446744073709551615"] {
             assert!(bad.parse::<LevelSplit>().is_err(), "{bad} was taken");
         }
+        let words = |text: &str| text.parse::<LevelSplit>().expect_err("no split").to_string();
+        assert_eq!(words("easy:9..3"), "`easy:9..3`: first level 9 is after last level 3; write easy:3..9");
+        assert!(words("easy:0..16777216").contains("at most 16,777,216"));
+        assert_eq!("easy:0..16777215".parse::<LevelSplit>().expect("just as many").len(), MAX_LEVELS);
     }
 
     #[test]

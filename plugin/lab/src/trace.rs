@@ -52,24 +52,38 @@ pub fn trace_actions(game: &dyn Game, request: &TraceRequest, print: Print) -> R
 fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, InspectError> {
     let space = game.actions();
     if matches!(space, ActionSpace::Continuous(_)) {
-        return Err(InspectError::Usage(format!("`{}` has continuous actions, which cannot be traced", game.name())));
+        return Err(InspectError::Usage(format!(
+            "`{0}` has continuous actions, which cannot be traced: watch a level with `playbot view {0} --episode`",
+            game.name()
+        )));
     }
     let actions = match request.file {
         None => request.actions.to_vec(),
         Some(path) => {
-            let text = read_text(path)?;
+            let text = read_text(path).map_err(|error| InspectError::Usage(format!("{error}; {HOW}")))?;
             let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
             let parsed: Result<Vec<u32>, _> =
                 words.map(|word| word.parse().map_err(|_| no_action(path, word))).collect();
-            parsed?
+            let parsed = parsed?;
+            if parsed.is_empty() {
+                return Err(InspectError::Usage(format!("{} has no actions; {HOW}", path.display())));
+            }
+            parsed
         }
     };
+    let from = request.file.map_or("--actions".to_owned(), |path| path.display().to_string());
     match actions.iter().find_map(|&action| misfit(&ActionValue::Discrete(action), &space)) {
-        Some(why) => Err(InspectError::Usage(why)),
+        Some(why) => Err(InspectError::Usage(format!("{from}: {why}, the actions of `{}`", game.name()))),
         None => Ok(actions),
     }
 }
 
+/// How actions are given.
+const HOW: &str = "name actions with --actions 0,1,2, or with --actions-file a file of such numbers";
+
 fn no_action(path: &Path, word: &str) -> InspectError {
-    InspectError::Usage(format!("{}: `{word}` is not an action; write numbers from 0", path.display()))
+    InspectError::Usage(format!(
+        "{}: `{word}` is not an action; write numbers from 0, separated by commas, spaces or line ends",
+        path.display()
+    ))
 }

@@ -1,5 +1,7 @@
 //! Action spaces and actions.
 
+use std::fmt;
+
 use crate::LearnError;
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +45,18 @@ impl ActionSpace {
                     Some(at) => Err(LearnError::Action(format!("row {} is not finite", at / n))),
                 }
             }
-            (space, _) => Err(LearnError::Action(format!("wrong kind for {space:?}"))),
+            (space, _) => Err(LearnError::Action(format!("wrong kind for {space}"))),
+        }
+    }
+}
+
+/// In words: `15 discrete actions`, `continuous actions of 2 numbers`.
+impl fmt::Display for ActionSpace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.dim() == 1 { "" } else { "s" };
+        match self {
+            Self::Discrete(n) => write!(f, "{n} discrete action{plural}"),
+            Self::Continuous(n) => write!(f, "continuous actions of {n} number{plural}"),
         }
     }
 }

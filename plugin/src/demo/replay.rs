@@ -58,7 +58,7 @@ pub struct Replay {
 }
 
 /// A replay has stopped being the recorded game: triggered once in a replay, in the tick that differs.
-#[derive(EntityEvent, Clone, Debug, PartialEq)]
+#[derive(EntityEvent, Clone, Debug, PartialEq, Reflect)]
 pub struct ReplayDiverged {
     /// The agent that replays.
     pub entity: Entity,
@@ -67,7 +67,7 @@ pub struct ReplayDiverged {
 }
 
 /// Where a replay stopped being the recorded game.
-#[derive(Clone, Debug, Error, PartialEq)]
+#[derive(Clone, Debug, Error, PartialEq, Reflect)]
 #[error("level {level}, tick {tick}: {what}")]
 pub struct Divergence {
     /// The level.

@@ -1,25 +1,21 @@
 //! From the actions of this tick to what is held down.
 
-use bevy::prelude::*;
+use bevy::{ecs::system::SystemParam, prelude::*};
 
 use super::{
     axis::VirtualAxis,
     button::VirtualButton,
     claims::is_virtual,
     component::VirtualInput,
-    devices::{Push, VirtualDevices, Wanted},
+    devices::{Change, Push, VirtualDevices, Wanted},
     direct::DirectInput,
     gamepad::VirtualGamepad,
-    input_state::{InputState, Line, Touch},
+    input_state::{InputState, Switch, Touch},
     messages::InputMessages,
     person::PressesForPeople,
+    route::InputRoute,
 };
-use crate::{
-    action::Action,
-    agent::AgentOrder,
-    control::Control,
-    episode::{Episode, EpisodeEnded, StartEpisode},
-};
+use crate::{action::Action, agent::AgentOrder, control::Control, episode::Episode};
 
 /// The gamepad of each agent.
 pub(super) type Pads<'w, 's> = Query<'w, 's, (Entity, &'static VirtualGamepad)>;
@@ -42,7 +38,7 @@ pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: 
         for button in held.buttons {
             let is_pad = matches!(button, VirtualButton::Gamepad(_));
             if !is_pad || pad.is_some() {
-                wanted.lines.push((agent, Line { button, pad: pad.filter(|_| is_pad) }));
+                wanted.switches.push((agent, Switch { button, pad: pad.filter(|_| is_pad) }));
             }
         }
         for (axis, value) in held.axes {
@@ -59,7 +55,7 @@ pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: 
     wanted
 }
 
-/// Route [`Messages`](super::InputRoute::Messages): Bevy's own systems do the rest in this frame.
+/// Route [`Messages`](InputRoute::Messages): Bevy's own systems do the rest in this frame.
 pub(super) fn send_messages(
     order: Res<AgentOrder>,
     players: Players,
@@ -69,24 +65,14 @@ pub(super) fn send_messages(
     mut messages: InputMessages,
 ) {
     let wanted = wanted(&order, &players, &pads, &state);
-    for change in devices.change(&wanted, |line| line.pad.is_some() || state.is_down(line)) {
+    for change in devices.change(&wanted, |switch| switch.pad.is_some() || state.is_down(switch)) {
         messages.send(change);
     }
     messages.send_motion(wanted.motion, wanted.wheel);
 }
 
-/// Lets go of everything at the start of an episode, so that it begins with nothing held.
-pub(super) fn release_at_start(event: On<StartEpisode>, mut hands: Hands) {
-    hands.release(event.entity);
-}
-
-/// Lets go of everything at the end of an episode.
-pub(super) fn release_at_end(event: On<EpisodeEnded>, mut hands: Hands) {
-    hands.release(event.entity);
-}
-
 /// What it takes to let go.
-#[derive(bevy::ecs::system::SystemParam)]
+#[derive(SystemParam)]
 pub(super) struct Hands<'w, 's> {
     devices: ResMut<'w, VirtualDevices>,
     direct: ResMut<'w, DirectInput>,
@@ -97,21 +83,25 @@ pub(super) struct Hands<'w, 's> {
 impl Hands<'_, '_> {
     /// Lets go of what the agent holds, as if it had never been pressed: whether the episode before ended with a key down
     /// must not be seen in the next one.
-    fn release(&mut self, agent: Entity) {
-        use super::devices::Change;
+    pub(super) fn release(&mut self, agent: Entity, route: InputRoute) {
         for change in self.devices.release_agent(agent) {
+            let before = change.read(&self.state);
             match change {
-                Change::Button { line, .. } => {
-                    self.state.touch(line, Touch::Reset);
-                    self.direct.forget(line);
+                Change::Button { switch, .. } => {
+                    self.state.touch(switch, Touch::Reset);
+                    self.direct.forget(switch);
                 }
                 Change::Axis { pad, axis, value } => {
-                    if let Some((line, _)) = self.state.set_axis(pad, axis, value) {
-                        self.state.touch(line, Touch::Settle);
+                    if let Some((switch, _)) = self.state.set_axis(pad, axis, value) {
+                        self.state.touch(switch, Touch::Settle);
                     }
                 }
             }
-            self.messages.send(change);
+            let after = change.read(&self.state);
+            match route {
+                InputRoute::Messages => self.messages.send_and_tell(change, before, after),
+                InputRoute::Direct => self.messages.tell(change, before, after),
+            }
         }
     }
 }

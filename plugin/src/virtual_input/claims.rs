@@ -47,42 +47,49 @@ pub(super) fn check_claims(
         if !is_virtual(*control, for_people) {
             continue;
         }
-        if input.space() != agent.actions {
-            faults.report(format!(
-                "agent {}: its `VirtualInput` is for {:?}, its actions are {:?}; name what every action holds, with an \
-                 empty set for those that hold nothing",
-                agent.index,
-                input.space(),
-                agent.actions
-            ));
+        let wanted = claims_of(input);
+        if let Some(fault) = misfit(agent, input).or_else(|| conflict(agent, &wanted, &claims)) {
+            faults.report(fault);
             *control = Control::Idle;
             continue;
         }
-        if input.is_mixed() {
-            faults.report(format!(
-                "agent {}: its `VirtualInput` has sets of buttons for discrete actions, and its actions are {:?}: give \
-                 the axis that shall press them `ActionAxis::buttons`",
-                agent.index, agent.actions
-            ));
-            *control = Control::Idle;
-            continue;
-        }
-        let reach = input.reach();
-        let buttons = reach.buttons.iter().filter(|button| !matches!(button, VirtualButton::Gamepad(_)));
-        let axes = reach.axes.iter().filter(|(axis, _)| !axis.is_gamepad());
-        let wants: Vec<Claim> =
-            buttons.copied().map(Claim::Button).chain(axes.map(|(axis, _)| Claim::Axis(*axis))).collect();
-        let taken = |claim: &Claim| claims.iter().find(|(other, _)| other == claim).map(|(_, index)| (*claim, *index));
-        if let Some((claim, other)) = wants.iter().find_map(taken) {
-            faults.report(format!(
-                "agents {other} and {} both claim {}: a World has one keyboard and one mouse; give each agent keys of its \
-                 own, or a World of its own",
-                agent.index,
-                claim.name()
-            ));
-            *control = Control::Idle;
-            continue;
-        }
-        claims.extend(wants.into_iter().map(|claim| (claim, agent.index)));
+        claims.extend(wanted.into_iter().map(|claim| (claim, agent.index)));
     }
+}
+
+/// Everything that a mapping may ever press or move, but for the agent's own gamepad.
+fn claims_of(input: &VirtualInput) -> Vec<Claim> {
+    let reach = input.reach();
+    let buttons = reach.buttons.iter().filter(|button| !matches!(button, VirtualButton::Gamepad(_)));
+    let axes = reach.axes.iter().filter(|(axis, _)| !axis.is_gamepad());
+    buttons.copied().map(Claim::Button).chain(axes.map(|(axis, _)| Claim::Axis(*axis))).collect()
+}
+
+/// Why a mapping does not fit the actions of its agent.
+fn misfit(agent: &Agent, input: &VirtualInput) -> Option<String> {
+    let Agent { index, actions } = agent;
+    if input.space() != *actions {
+        return Some(format!(
+            "agent {index}: its `VirtualInput` is for {}, and it has {actions}; name what every action holds, with \
+             an empty set for those that hold nothing",
+            input.space()
+        ));
+    }
+    input.is_mixed().then(|| {
+        format!(
+            "agent {index}: its `VirtualInput` has sets of buttons for discrete actions, and it has {actions}: \
+             give the axis that shall press them `ActionAxis::buttons`"
+        )
+    })
+}
+
+/// Why an agent cannot have what it wants: an earlier one has claimed it.
+fn conflict(agent: &Agent, wanted: &[Claim], claims: &[(Claim, u32)]) -> Option<String> {
+    let (claim, other) = wanted.iter().find_map(|claim| claims.iter().find(|(taken, _)| taken == claim))?;
+    Some(format!(
+        "agents {other} and {} both claim {}: a World has one keyboard and one mouse; give each agent keys of its own, or a \
+         World of its own",
+        agent.index,
+        claim.name()
+    ))
 }

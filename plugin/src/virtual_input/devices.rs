@@ -2,7 +2,11 @@
 
 use bevy::prelude::*;
 
-use super::{axis::VirtualAxis, button::VirtualButton, input_state::Line};
+use super::{
+    axis::VirtualAxis,
+    button::VirtualButton,
+    input_state::{InputState, Switch},
+};
 
 /// What virtual input holds down at the moment, for all agents of the World.
 ///
@@ -17,12 +21,12 @@ use super::{axis::VirtualAxis, button::VirtualButton, input_state::Line};
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct VirtualDevices {
-    held: Vec<(Entity, Line)>,
-    /// Sticks and triggers that are not at rest: agent, gamepad, what, value.
+    held: Vec<(Entity, Switch)>,
+    /// Sticks and triggers that are not at rest.
     pushed: Vec<Push>,
 }
 
-/// A stick or trigger of an agent's gamepad.
+/// A stick or trigger of an agent's gamepad, and how far it is pushed.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 pub(super) struct Push {
     pub agent: Entity,
@@ -31,51 +35,81 @@ pub(super) struct Push {
     pub value: f32,
 }
 
+impl Push {
+    /// Whether both push the same stick or trigger, however far.
+    fn is_of_same(&self, other: &Self) -> bool {
+        (self.agent, self.pad, self.axis) == (other.agent, other.pad, other.axis)
+    }
+}
+
 /// What all agents want in this tick.
 #[derive(Debug, Default)]
 pub(super) struct Wanted {
-    pub lines: Vec<(Entity, Line)>,
+    pub switches: Vec<(Entity, Switch)>,
     pub pushes: Vec<Push>,
-    /// Pixels.
+    /// Motion of the mouse, pixels.
     pub motion: Vec2,
-    /// Lines.
+    /// Motion of the wheel, lines.
     pub wheel: Vec2,
 }
 
 /// A button that goes down or up, or a stick that moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Change {
-    Button { line: Line, down: bool },
+    Button { switch: Switch, down: bool },
     Axis { pad: Entity, axis: VirtualAxis, value: f32 },
+}
+
+/// What games see of the button or stick that a change moves. A trigger is both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reading {
+    pub is_down: bool,
+    /// How far it is pushed; 0 for keys and mouse buttons.
+    pub value: f32,
+}
+
+impl Change {
+    /// What games see now.
+    pub fn read(self, state: &InputState) -> Reading {
+        match self {
+            Self::Button { switch, .. } => Reading { is_down: state.is_down(switch), value: state.value(switch) },
+            Self::Axis { pad, axis: VirtualAxis::Trigger(button), .. } => {
+                let switch = Switch { button: VirtualButton::Gamepad(button), pad: Some(pad) };
+                Reading { is_down: state.is_down(switch), value: state.value(switch) }
+            }
+            Self::Axis { pad, axis: VirtualAxis::Stick(axis), .. } => {
+                Reading { is_down: false, value: state.stick(pad, axis) }
+            }
+            // Motions are not held.
+            Self::Axis { .. } => Reading { is_down: false, value: 0.0 },
+        }
+    }
 }
 
 impl VirtualDevices {
     /// What is held: the agent, and its key or button.
     pub fn held(&self) -> impl Iterator<Item = (Entity, VirtualButton)> + '_ {
-        self.held.iter().map(|(agent, line)| (*agent, line.button))
+        self.held.iter().map(|(agent, switch)| (*agent, switch.button))
     }
 
     /// Goes from what is held to what is wanted. Releases come first. What is wanted and was let go of by something else,
     /// such as a window that lost the keyboard, is pressed again.
-    pub(super) fn change(&mut self, wanted: &Wanted, is_down: impl Fn(Line) -> bool) -> Vec<Change> {
+    pub(super) fn change(&mut self, wanted: &Wanted, is_down: impl Fn(Switch) -> bool) -> Vec<Change> {
         let mut changes = self.release_unless(
-            |held| wanted.lines.contains(held),
-            |held| {
-                wanted.pushes.iter().any(|push| (push.agent, push.pad, push.axis) == (held.agent, held.pad, held.axis))
-            },
+            |held| wanted.switches.contains(held),
+            |held| wanted.pushes.iter().any(|push| push.is_of_same(held)),
         );
-        for &(agent, line) in &wanted.lines {
-            let is_held = self.held.contains(&(agent, line));
+        for &(agent, switch) in &wanted.switches {
+            let is_held = self.held.contains(&(agent, switch));
             if !is_held {
-                self.held.push((agent, line));
+                self.held.push((agent, switch));
             }
-            if !is_held || !is_down(line) {
-                changes.push(Change::Button { line, down: true });
+            if !is_held || !is_down(switch) {
+                changes.push(Change::Button { switch, down: true });
             }
         }
         for &push in &wanted.pushes {
-            let same = |held: &&mut Push| (held.agent, held.pad, held.axis) == (push.agent, push.pad, push.axis);
-            match self.pushed.iter_mut().find(same) {
+            match self.pushed.iter_mut().find(|held| held.is_of_same(&push)) {
                 Some(held) if held.value.to_bits() == push.value.to_bits() => continue,
                 Some(held) => held.value = push.value,
                 None => self.pushed.push(push),
@@ -92,14 +126,14 @@ impl VirtualDevices {
 
     fn release_unless(
         &mut self,
-        keep_button: impl Fn(&(Entity, Line)) -> bool,
+        keep_button: impl Fn(&(Entity, Switch)) -> bool,
         keep_push: impl Fn(&Push) -> bool,
     ) -> Vec<Change> {
         let mut changes = Vec::new();
         self.held.retain(|held| {
             let keep = keep_button(held);
             if !keep {
-                changes.push(Change::Button { line: held.1, down: false });
+                changes.push(Change::Button { switch: held.1, down: false });
             }
             keep
         });
@@ -118,12 +152,12 @@ impl VirtualDevices {
 mod tests {
     use super::*;
 
-    fn key(code: KeyCode) -> Line {
-        Line { button: code.into(), pad: None }
+    fn key(code: KeyCode) -> Switch {
+        Switch { button: code.into(), pad: None }
     }
 
-    fn button(line: Line, down: bool) -> Change {
-        Change::Button { line, down }
+    fn button(switch: Switch, down: bool) -> Change {
+        Change::Button { switch, down }
     }
 
     #[test]
@@ -131,9 +165,9 @@ mod tests {
         let agent = Entity::from_raw_u32(1).expect("a number");
         let (a, b) = (key(KeyCode::KeyA), key(KeyCode::KeyB));
         let mut devices = VirtualDevices::default();
-        let mut change = |lines: &[Line], is_down: bool| {
-            let lines = lines.iter().map(|&line| (agent, line)).collect();
-            devices.change(&Wanted { lines, ..default() }, |_| is_down)
+        let mut change = |switches: &[Switch], is_down: bool| {
+            let switches = switches.iter().map(|&switch| (agent, switch)).collect();
+            devices.change(&Wanted { switches, ..default() }, |_| is_down)
         };
         assert_eq!(change(&[a], false), [button(a, true)]);
         assert_eq!(change(&[a], true), []);
@@ -149,7 +183,7 @@ mod tests {
         let axis = VirtualAxis::Stick(GamepadAxis::LeftStickX);
         let pushes = vec![Push { agent: one, pad: two, axis, value: 0.5 }];
         let mut devices = VirtualDevices::default();
-        devices.change(&Wanted { lines: vec![(one, a), (two, b)], pushes, ..default() }, |_| false);
+        devices.change(&Wanted { switches: vec![(one, a), (two, b)], pushes, ..default() }, |_| false);
         let released = devices.release_agent(one);
         assert_eq!(released, [button(a, false), Change::Axis { pad: two, axis, value: 0.0 }]);
         assert_eq!(devices.held().collect::<Vec<_>>(), [(two, b.button)]);

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use super::{
     act::{Pads, Players, wanted},
     devices::{Change, VirtualDevices},
-    input_state::{InputState, Line, Touch},
+    input_state::{InputState, Switch, Touch},
     messages::InputMessages,
 };
 use crate::agent::AgentOrder;
@@ -24,7 +24,7 @@ pub(super) struct DirectInput {
     /// Ticks that this frame has run.
     ticks: u32,
     /// Buttons about which messages are on their way to Bevy's systems.
-    sent: Vec<(Line, bool)>,
+    sent: Vec<(Switch, bool)>,
     /// Motion about which messages are on their way.
     sent_motion: Motion,
 }
@@ -32,8 +32,8 @@ pub(super) struct DirectInput {
 /// What happened in a span of time.
 #[derive(Clone, Debug, Default, Reflect)]
 struct Marks {
-    down: Vec<Line>,
-    up: Vec<Line>,
+    down: Vec<Switch>,
+    up: Vec<Switch>,
     motion: Motion,
 }
 
@@ -51,29 +51,29 @@ impl Motion {
 }
 
 impl Marks {
-    fn note(&mut self, line: Line, down: bool) {
+    fn note(&mut self, switch: Switch, down: bool) {
         let list = if down { &mut self.down } else { &mut self.up };
-        if !list.contains(&line) {
-            list.push(line);
+        if !list.contains(&switch) {
+            list.push(switch);
         }
     }
 }
 
 impl DirectInput {
     /// Drops the marks of a button that was let go of for good.
-    pub fn forget(&mut self, line: Line) {
+    pub fn forget(&mut self, switch: Switch) {
         for marks in [&mut self.tick, &mut self.frame] {
-            marks.down.retain(|marked| *marked != line);
-            marks.up.retain(|marked| *marked != line);
+            marks.down.retain(|marked| *marked != switch);
+            marks.up.retain(|marked| *marked != switch);
         }
     }
 
-    fn note(&mut self, line: Line, down: bool) {
-        self.tick.note(line, down);
-        self.frame.note(line, down);
-        if line.pad.is_none() {
-            self.sent.retain(|(sent, _)| *sent != line);
-            self.sent.push((line, down));
+    fn note(&mut self, switch: Switch, down: bool) {
+        self.tick.note(switch, down);
+        self.frame.note(switch, down);
+        if switch.pad.is_none() {
+            self.sent.retain(|(sent, _)| *sent != switch);
+            self.sent.push((switch, down));
         }
     }
 }
@@ -89,25 +89,24 @@ pub(super) fn write_directly(
     mut messages: InputMessages,
 ) {
     let past = std::mem::take(&mut direct.tick);
-    for &line in past.down.iter().chain(&past.up) {
-        state.touch(line, Touch::Settle);
+    for &switch in past.down.iter().chain(&past.up) {
+        state.touch(switch, Touch::Settle);
     }
     let wanted = wanted(&order, &players, &pads, &state);
-    for change in devices.change(&wanted, |line| state.is_down(line)) {
+    for change in devices.change(&wanted, |switch| state.is_down(switch)) {
+        let before = change.read(&state);
         match change {
-            Change::Button { line, down } => {
-                state.touch(line, if down { Touch::Press } else { Touch::Release });
-                direct.note(line, down);
-                if line.pad.is_none() {
-                    messages.send(change);
-                }
+            Change::Button { switch, down } => {
+                state.touch(switch, if down { Touch::Press } else { Touch::Release });
+                direct.note(switch, down);
             }
             Change::Axis { pad, axis, value } => {
-                if let Some((line, down)) = state.set_axis(pad, axis, value) {
-                    direct.note(line, down);
+                if let Some((switch, down)) = state.set_axis(pad, axis, value) {
+                    direct.note(switch, down);
                 }
             }
         }
+        messages.tell(change, before, change.read(&state));
     }
     let now = Motion { mouse: wanted.motion, wheel: wanted.wheel };
     if now != Motion::default() || past.motion != Motion::default() {
@@ -126,12 +125,12 @@ pub(super) fn show_frame(mut state: InputState, mut direct: ResMut<DirectInput>)
     if std::mem::take(&mut direct.ticks) < 2 {
         return;
     }
-    for &line in frame.down.iter().chain(frame.up.iter().filter(|line| !frame.down.contains(line))) {
-        let (pressed, released) = (frame.down.contains(&line), frame.up.contains(&line));
-        state.touch(line, Touch::Flag { pressed, released });
+    for &switch in frame.down.iter().chain(frame.up.iter().filter(|switch| !frame.down.contains(switch))) {
+        let (pressed, released) = (frame.down.contains(&switch), frame.up.contains(&switch));
+        state.touch(switch, Touch::Flag { pressed, released });
         // The next tick takes them away again, wherever it falls.
-        direct.tick.note(line, pressed);
-        direct.tick.note(line, !released);
+        direct.tick.note(switch, pressed);
+        direct.tick.note(switch, !released);
     }
     if frame.motion != direct.tick.motion {
         move_by(&mut state, direct.tick.motion, frame.motion);
@@ -141,10 +140,10 @@ pub(super) fn show_frame(mut state: InputState, mut direct: ResMut<DirectInput>)
 
 /// Among Bevy's own input systems: what they made of messages about the past is taken back.
 pub(super) fn settle(mut state: InputState, mut direct: ResMut<DirectInput>, devices: Res<VirtualDevices>) {
-    for (line, _) in std::mem::take(&mut direct.sent) {
-        let is_held = devices.held().any(|(_, button)| button == line.button);
-        state.touch(line, if is_held { Touch::Press } else { Touch::Release });
-        state.touch(line, Touch::Settle);
+    for (switch, _) in std::mem::take(&mut direct.sent) {
+        let is_held = devices.held().any(|(_, button)| button == switch.button);
+        state.touch(switch, if is_held { Touch::Press } else { Touch::Release });
+        state.touch(switch, Touch::Settle);
     }
     let sent = std::mem::take(&mut direct.sent_motion);
     if sent != Motion::default() {

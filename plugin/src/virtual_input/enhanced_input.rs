@@ -13,7 +13,7 @@ use bevy_enhanced_input::prelude::{
 
 use super::{
     claims::{check_claims, is_virtual},
-    plugin::InputRoute,
+    route::InputRoute,
 };
 use crate::{
     action::{Action, ActionValue},

@@ -5,6 +5,7 @@ use std::hash::Hash;
 use bevy::{
     ecs::system::SystemParam,
     input::{
+        gamepad::GamepadInput,
         keyboard::Key,
         mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll},
     },
@@ -16,9 +17,9 @@ use super::{axis::VirtualAxis, button::VirtualButton, logical_key::logical_key};
 /// A gamepad's trigger counts as pressed above the first value, and as released below the second: Bevy's own defaults.
 const TRIGGER: (f32, f32) = (0.75, 0.65);
 
-/// A button on its device: which gamepad, if it is a gamepad's.
+/// A key or button of one device: `pad` says which gamepad, if it is a gamepad's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
-pub(super) struct Line {
+pub(super) struct Switch {
     pub button: VirtualButton,
     pub pad: Option<Entity>,
 }
@@ -52,14 +53,31 @@ pub(super) struct InputState<'w, 's> {
 
 impl InputState<'_, '_> {
     /// Whether the game sees it down.
-    pub fn is_down(&self, line: Line) -> bool {
-        match line.button {
+    pub fn is_down(&self, switch: Switch) -> bool {
+        match switch.button {
             VirtualButton::Key(key) => self.keys.pressed(key),
             VirtualButton::Mouse(button) => self.mouse.pressed(button),
             VirtualButton::Gamepad(button) => {
-                line.pad.and_then(|pad| self.pads.get(pad).ok()).is_some_and(|pad| pad.pressed(button))
+                switch.pad.and_then(|pad| self.pads.get(pad).ok()).is_some_and(|pad| pad.pressed(button))
             }
         }
+    }
+
+    /// How far a button of a gamepad is pushed; 0 for others.
+    pub fn value(&self, switch: Switch) -> f32 {
+        match switch {
+            Switch { button: VirtualButton::Gamepad(button), pad: Some(pad) } => self.analog(pad, button),
+            _ => 0.0,
+        }
+    }
+
+    /// How far a stick is pushed.
+    pub fn stick(&self, pad: Entity, axis: GamepadAxis) -> f32 {
+        self.analog(pad, axis)
+    }
+
+    fn analog(&self, pad: Entity, input: impl Into<GamepadInput>) -> f32 {
+        self.pads.get(pad).ok().and_then(|pad| pad.get_unclamped(input)).unwrap_or(0.0)
     }
 
     /// Whether this entity is a gamepad that is connected.
@@ -67,15 +85,15 @@ impl InputState<'_, '_> {
         self.pads.contains(pad)
     }
 
-    pub fn touch(&mut self, line: Line, touch: Touch) {
-        match line.button {
+    pub fn touch(&mut self, switch: Switch, touch: Touch) {
+        match switch.button {
             VirtualButton::Key(key) => {
                 apply(&mut self.keys, key, touch);
                 apply(&mut self.logical, logical_key(key).0, touch);
             }
             VirtualButton::Mouse(button) => apply(&mut self.mouse, button, touch),
             VirtualButton::Gamepad(button) => {
-                let Some(mut pad) = line.pad.and_then(|pad| self.pads.get_mut(pad).ok()) else { return };
+                let Some(mut pad) = switch.pad.and_then(|pad| self.pads.get_mut(pad).ok()) else { return };
                 apply(pad.digital_mut(), button, touch);
                 match touch {
                     Touch::Press => {
@@ -91,7 +109,7 @@ impl InputState<'_, '_> {
     }
 
     /// Sets a stick or trigger of a gamepad. Returns the trigger as a button if that went down or up.
-    pub fn set_axis(&mut self, pad: Entity, axis: VirtualAxis, value: f32) -> Option<(Line, bool)> {
+    pub fn set_axis(&mut self, pad: Entity, axis: VirtualAxis, value: f32) -> Option<(Switch, bool)> {
         let mut gamepad = self.pads.get_mut(pad).ok()?;
         match axis {
             VirtualAxis::Stick(axis) => {
@@ -100,14 +118,14 @@ impl InputState<'_, '_> {
             VirtualAxis::Trigger(button) => {
                 gamepad.analog_mut().set(button, value);
                 let was_down = gamepad.pressed(button);
-                let line = Line { button: VirtualButton::Gamepad(button), pad: Some(pad) };
+                let switch = Switch { button: VirtualButton::Gamepad(button), pad: Some(pad) };
                 if !was_down && value >= TRIGGER.0 {
                     gamepad.digital_mut().press(button);
-                    return Some((line, true));
+                    return Some((switch, true));
                 }
                 if was_down && value <= TRIGGER.1 {
                     gamepad.digital_mut().release(button);
-                    return Some((line, false));
+                    return Some((switch, false));
                 }
             }
             _ => {}

@@ -11,7 +11,7 @@ use leafwing_input_manager::{
 
 use super::{
     claims::{check_claims, is_virtual},
-    plugin::InputRoute,
+    route::InputRoute,
 };
 use crate::{
     action::{Action, ActionValue},
@@ -204,16 +204,17 @@ fn apply<A: Actionlike>(drives: &[(A, Drive)], value: &ActionValue, state: &mut 
         ActionValue::Continuous(values) => values.get(*index).copied().unwrap_or(0.0),
         ActionValue::Discrete(_) => 0.0,
     };
+    let mut press_if = |is_on: bool, action: &A| {
+        if is_on && !pressed.contains(action) {
+            pressed.push(action.clone());
+        }
+    };
     for (action, drive) in drives {
         match (drive, action.input_control_kind()) {
             (Drive::On(on), InputControlKind::Button) => {
-                let is_on = matches!(value, ActionValue::Discrete(index) if on.contains(index));
-                pressed.extend((is_on && !pressed.contains(action)).then(|| action.clone()));
+                press_if(matches!(value, ActionValue::Discrete(index) if on.contains(index)), action);
             }
-            (Drive::Above(index, threshold), InputControlKind::Button) => {
-                let is_on = number(index) > *threshold;
-                pressed.extend((is_on && !pressed.contains(action)).then(|| action.clone()));
-            }
+            (Drive::Above(index, threshold), InputControlKind::Button) => press_if(number(index) > *threshold, action),
             (Drive::Value(index), InputControlKind::Axis) => state.set_value(action, number(index)),
             (Drive::Pair(x, y), InputControlKind::DualAxis) => {
                 state.set_axis_pair(action, Vec2::new(number(x), number(y)));

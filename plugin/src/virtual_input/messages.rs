@@ -4,10 +4,7 @@ use bevy::{
     ecs::system::SystemParam,
     input::{
         ButtonState,
-        gamepad::{
-            GamepadConnection, GamepadConnectionEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent,
-            RawGamepadEvent,
-        },
+        gamepad::{GamepadConnection, GamepadConnectionEvent},
         keyboard::KeyboardInput,
         mouse::{MouseButtonInput, MouseMotion, MouseScrollUnit, MouseWheel},
         touch::TouchPhase,
@@ -16,7 +13,13 @@ use bevy::{
     window::PrimaryWindow,
 };
 
-use super::{axis::VirtualAxis, button::VirtualButton, devices::Change, input_state::Line, logical_key::logical_key};
+use super::{
+    button::VirtualButton,
+    devices::{Change, Reading},
+    gamepad_messages::{GamepadMessages, of_driver},
+    input_state::Switch,
+    logical_key::logical_key,
+};
 
 /// Where messages go.
 #[derive(SystemParam)]
@@ -25,10 +28,7 @@ pub(super) struct InputMessages<'w, 's> {
     mouse: MessageWriter<'w, MouseButtonInput>,
     motion: MessageWriter<'w, MouseMotion>,
     wheel: MessageWriter<'w, MouseWheel>,
-    connections: MessageWriter<'w, GamepadConnectionEvent>,
-    pads: MessageWriter<'w, RawGamepadEvent>,
-    pad_buttons: MessageWriter<'w, RawGamepadButtonChangedEvent>,
-    pad_axes: MessageWriter<'w, RawGamepadAxisChangedEvent>,
+    pads: GamepadMessages<'w, 's>,
     windows: Query<'w, 's, Entity, With<PrimaryWindow>>,
 }
 
@@ -38,23 +38,42 @@ impl InputMessages<'_, '_> {
         self.windows.single().unwrap_or(Entity::PLACEHOLDER)
     }
 
+    /// As a window and a gamepad driver: Bevy's own systems do the rest.
     pub fn send(&mut self, change: Change) {
-        match change {
-            Change::Button { line, down } => self.send_button(line, down),
-            Change::Axis { pad, axis: VirtualAxis::Stick(axis), value } => {
-                let event = RawGamepadAxisChangedEvent::new(pad, axis, value);
-                self.pad_axes.write(event);
-                self.pads.write(event.into());
-            }
-            Change::Axis { pad, axis: VirtualAxis::Trigger(button), value } => {
-                self.send_pad_button(pad, button, value);
-            }
-            // Motions are not held, so that they do not change.
-            Change::Axis { .. } => {}
+        if let Some(event) = of_driver(change) {
+            self.pads.send(event);
+        } else if let Change::Button { switch, down } = change {
+            self.send_button(switch, down);
         }
     }
 
-    fn send_button(&mut self, Line { button, pad }: Line, down: bool) {
+    /// What the state says already, in the tick in which it happens, with what games saw before and see after it.
+    ///
+    /// Bevy's system for gamepads would read a `RawGamepadEvent` in the next frame, when it may be over, and press and tell
+    /// everything once more: that one is not sent. Those for keys and mouse write nothing but the state, which
+    /// [`settle`](super::direct::settle) takes back.
+    pub fn tell(&mut self, change: Change, before: Reading, after: Reading) {
+        match of_driver(change) {
+            // A driver says nothing of what stays as it is.
+            Some(_) if before == after => {}
+            Some(event) => {
+                self.pads.send_part(&event);
+                self.pads.process(&event, before, after);
+            }
+            None => self.send(change),
+        }
+    }
+
+    /// [`send`](Self::send) of what the state says already, where Bevy's own systems go on with it: that for gamepads finds
+    /// nothing changed and says nothing.
+    pub fn send_and_tell(&mut self, change: Change, before: Reading, after: Reading) {
+        if let Some(event) = of_driver(change).filter(|_| before != after) {
+            self.pads.process(&event, before, after);
+        }
+        self.send(change);
+    }
+
+    fn send_button(&mut self, Switch { button, .. }: Switch, down: bool) {
         let (state, window) = (if down { ButtonState::Pressed } else { ButtonState::Released }, self.window());
         match button {
             VirtualButton::Key(key_code) => {
@@ -65,18 +84,9 @@ impl InputMessages<'_, '_> {
             VirtualButton::Mouse(button) => {
                 self.mouse.write(MouseButtonInput { button, state, window });
             }
-            VirtualButton::Gamepad(button) => {
-                if let Some(pad) = pad {
-                    self.send_pad_button(pad, button, if down { 1.0 } else { 0.0 });
-                }
-            }
+            // Only one without a gamepad comes here.
+            VirtualButton::Gamepad(_) => {}
         }
-    }
-
-    fn send_pad_button(&mut self, pad: Entity, button: GamepadButton, value: f32) {
-        let event = RawGamepadButtonChangedEvent::new(pad, button, value);
-        self.pad_buttons.write(event);
-        self.pads.write(event.into());
     }
 
     /// Pixels to the right and downwards; lines of the wheel.
@@ -92,8 +102,6 @@ impl InputMessages<'_, '_> {
 
     pub fn send_connection(&mut self, pad: Entity, name: String) {
         let connection = GamepadConnection::Connected { name, vendor_id: None, product_id: None };
-        let event = GamepadConnectionEvent::new(pad, connection);
-        self.connections.write(event.clone());
-        self.pads.write(event.into());
+        self.pads.send(GamepadConnectionEvent::new(pad, connection).into());
     }
 }

@@ -48,6 +48,7 @@ mod direct;
 #[cfg(feature = "bevy_enhanced_input")]
 pub mod enhanced_input;
 mod gamepad;
+mod gamepad_messages;
 mod held;
 mod input_state;
 #[cfg(feature = "leafwing-input-manager")]
@@ -57,6 +58,7 @@ mod messages;
 mod names;
 mod person;
 mod plugin;
+mod route;
 
 pub use action_axis::ActionAxis;
 pub use axis::VirtualAxis;
@@ -66,4 +68,5 @@ pub use devices::VirtualDevices;
 pub use gamepad::VirtualGamepad;
 pub use held::HeldInput;
 pub use person::PressesForPeople;
-pub use plugin::{InputRoute, VirtualInputPlugin};
+pub use plugin::VirtualInputPlugin;
+pub use route::InputRoute;

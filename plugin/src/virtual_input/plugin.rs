@@ -1,10 +1,11 @@
-//! The plugin of virtual input, and its two routes.
+//! The plugin of virtual input.
 
 use bevy::{
     input::{
         InputPlugin, InputSystems,
         gamepad::{
-            GamepadConnectionEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
+            GamepadAxisChangedEvent, GamepadButtonChangedEvent, GamepadButtonStateChangedEvent, GamepadConnectionEvent,
+            GamepadEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
             gamepad_connection_system, gamepad_event_processing_system,
         },
         keyboard::{Key, KeyboardInput, keyboard_input_system},
@@ -17,26 +18,20 @@ use bevy::{
 };
 
 use super::{
-    act,
+    act::{self, Hands},
     claims::check_claims,
     devices::VirtualDevices,
     direct::{self, DirectInput},
     gamepad::connect_gamepads,
+    route::InputRoute,
 };
-use crate::{action::check_actions, fault::Faults, panics::note_actions, systems::PlaybotSystems};
-
-/// The way from an action to the game.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
-pub enum InputRoute {
-    /// For ticks that are frames: in `PreUpdate`, before [`InputSystems`], messages are sent as a window would, and Bevy's
-    /// own systems, input managers and the game do the rest in the same frame.
-    Messages,
-    /// For fixed ticks: in `FixedPreUpdate` what games read is written at once, so that a game in `FixedUpdate` sees
-    /// `just_pressed` in the same tick, and exactly once, however many ticks a frame runs. Systems in `Update` see
-    /// everything that happened in the frame. Of gamepads the state changes and no messages are sent.
-    #[default]
-    Direct,
-}
+use crate::{
+    action::check_actions,
+    episode::{EpisodeEnded, StartEpisode},
+    fault::Faults,
+    panics::note_actions,
+    systems::PlaybotSystems,
+};
 
 /// Lets the actions of agents with a [`VirtualInput`](super::VirtualInput) play through Bevy's own input. Needs
 /// [`InputPlugin`], which is part of Bevy's `DefaultPlugins`.
@@ -48,13 +43,15 @@ pub struct VirtualInputPlugin {
 
 impl Plugin for VirtualInputPlugin {
     fn build(&self, app: &mut App) {
+        let route = self.route;
         add_what_is_written(app);
         app.init_resource::<VirtualDevices>()
             .init_resource::<DirectInput>()
-            .add_observer(act::release_at_start)
-            .add_observer(act::release_at_end)
+            // Lets go of everything at the end of an episode, and at the start of one, so that it begins with nothing held.
+            .add_observer(move |event: On<StartEpisode>, mut hands: Hands| hands.release(event.entity, route))
+            .add_observer(move |event: On<EpisodeEnded>, mut hands: Hands| hands.release(event.entity, route))
             .add_systems(PreUpdate, connect_gamepads.before(InputSystems).before(act::send_messages));
-        match self.route {
+        match route {
             InputRoute::Messages => {
                 app.add_systems(
                     PreUpdate,
@@ -110,6 +107,10 @@ fn add_what_is_written(app: &mut App) {
         .add_message::<RawGamepadEvent>()
         .add_message::<RawGamepadButtonChangedEvent>()
         .add_message::<RawGamepadAxisChangedEvent>()
+        .add_message::<GamepadEvent>()
+        .add_message::<GamepadButtonChangedEvent>()
+        .add_message::<GamepadButtonStateChangedEvent>()
+        .add_message::<GamepadAxisChangedEvent>()
         .init_resource::<ButtonInput<KeyCode>>()
         .init_resource::<ButtonInput<Key>>()
         .init_resource::<ButtonInput<MouseButton>>()

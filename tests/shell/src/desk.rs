@@ -2,15 +2,14 @@
 #![allow(clippy::disallowed_methods, reason = "a window lives by the clock")]
 
 use std::{
-    io::{BufRead, BufReader},
     path::Path,
     process::{Child, Command, ExitStatus, Output, Stdio},
     thread::sleep,
     time::{Duration, Instant},
 };
 
-/// Nothing takes longer, not even on a machine that draws in software and has other things to do.
-const PATIENCE: Duration = Duration::from_secs(180);
+use crate::waiting::{Heard, PATIENCE, comes, output};
+
 const NEEDS: &str = "this test opens a window on a display of its own and needs Xvfb, xdotool and a Vulkan driver: \
                      `apt-get install xvfb xdotool mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0`";
 
@@ -40,10 +39,13 @@ impl Desk {
             .stderr(Stdio::null())
             .spawn()
             .expect(NEEDS);
-        let mut number = String::new();
-        let said = BufReader::new(server.stdout.take().expect("piped")).read_line(&mut number);
-        assert!(said.is_ok() && !number.is_empty(), "Xvfb does not start");
-        Self { program, server, display: format!(":{}", number.trim()), folder }
+        let number = Heard::of(server.stdout.take().expect("piped"));
+        let mut desk = Self { program, server, display: String::new(), folder };
+        comes(PATIENCE, || number.text().ends_with('\n') || number.is_over());
+        let number = number.text();
+        assert!(number.ends_with('\n'), "Xvfb does not start");
+        desk.display = format!(":{}", number.trim());
+        desk
     }
 
     /// The program with these arguments, on this display.
@@ -58,8 +60,9 @@ impl Desk {
         // Out of the way of the window, which would otherwise have the keyboard before it is given it.
         self.xdotool(&["mousemove", "1000", "790"]);
         let mut command = self.command(folder, args);
-        let program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
-        let mut seat = Seat { desk: self, program, window: String::new() };
+        let mut program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+        let errors = Heard::of(program.stderr.take().expect("piped"));
+        let mut seat = Seat { desk: self, program, errors, window: String::new() };
         seat.wait("a window", |seat| {
             // Only the words for people begin like this: the window has started to play.
             let found = seat.desk.xdotool(&["search", "--name", &format!("^{} .* tick", args[1])]);
@@ -78,7 +81,9 @@ impl Desk {
     }
 
     fn xdotool(&self, args: &[&str]) -> Output {
-        Command::new("xdotool").args(args).env("DISPLAY", &self.display).output().expect(NEEDS)
+        let mut command = Command::new("xdotool");
+        command.args(args).env("DISPLAY", &self.display);
+        output(&mut command).unwrap_or_else(|error| panic!("xdotool {args:?}: {error}; {NEEDS}"))
     }
 
     /// The pixels of the screen's upper left square, `side` × `side`.
@@ -100,6 +105,8 @@ impl Desk {
 pub struct Seat<'a> {
     desk: &'a Desk,
     program: Child,
+    /// Its words for people.
+    errors: Heard,
     window: String,
 }
 
@@ -166,8 +173,8 @@ impl Seat<'_> {
         let start = Instant::now();
         while !done(self) {
             let gone = self.program.try_wait().expect("a child of this test");
-            assert!(gone.is_none(), "the program has ended ({gone:?}) before {what}: {}", self.errors());
-            assert!(start.elapsed() < PATIENCE, "no {what} in {PATIENCE:?}; the title is `{}`", self.title());
+            assert!(gone.is_none(), "the program has ended ({gone:?}) before {what}: {}", self.errors.to_end());
+            assert!(start.elapsed() < PATIENCE, "no {what} in {PATIENCE:?}; {}", self.state());
             sleep(Duration::from_millis(50));
         }
     }
@@ -177,11 +184,11 @@ impl Seat<'_> {
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
             if let Some(status) = self.program.try_wait().expect("a child of this test") {
-                return (status, self.errors());
+                return (status, self.errors.to_end());
             }
             sleep(Duration::from_millis(50));
         }
-        panic!("the program does not end; the title is `{}`", self.title());
+        panic!("the program does not end; {}", self.state());
     }
 
     /// Ends the program as a crash would.
@@ -190,8 +197,8 @@ impl Seat<'_> {
         self.program.wait().expect("it has ended");
     }
 
-    fn errors(&mut self) -> String {
-        let stderr = self.program.stderr.take().expect("piped, and read once");
-        std::io::read_to_string(stderr).unwrap_or_default()
+    /// What is known of a program that does not do what it should.
+    fn state(&self) -> String {
+        format!("the title is `{}`, and it said so far: {}", self.title(), self.errors.text())
     }
 }

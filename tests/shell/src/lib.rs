@@ -12,6 +12,7 @@ mod run_folder;
 mod shell;
 mod tests;
 mod trained;
+mod waiting;
 
 pub use at_work::{at_work, kill};
 pub use desk::{Desk, Seat};
@@ -19,3 +20,4 @@ pub use game_program::GameProgram;
 pub use output::{code, ended, errors, json_lines, lines, said};
 pub use run_folder::{logged, results, steps};
 pub use shell::Shell;
+pub use waiting::output;

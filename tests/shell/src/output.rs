@@ -4,6 +4,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
+use crate::waiting;
+
 /// Its exit code.
 #[track_caller]
 pub fn code(output: &Output) -> i32 {
@@ -32,10 +34,13 @@ pub fn json_lines(text: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()
 }
 
-/// Runs a program, which must end with this exit code, and returns its data and messages.
+/// Runs a program, which must end with this exit code, and in three minutes, and returns its data and messages.
 #[track_caller]
 pub fn ended(mut command: Command, wanted: i32) -> (String, String) {
-    let output = command.output().expect("the program starts");
+    let output = match waiting::output(&mut command) {
+        Ok(output) => output,
+        Err(error) => panic!("{command:?}: {error}"),
+    };
     let (out, err) = (said(&output), errors(&output));
     assert_eq!(code(&output), wanted, "{command:?}: {out}{err}");
     (out, err)

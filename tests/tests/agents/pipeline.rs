@@ -5,15 +5,16 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use bevy_playbot::demo::file::{DemoFault, DemoReader};
+use bevy_playbot::demo::file::{DemoFault, DemoReader, DemoWriter};
 use playbot_lab::prelude::*;
 use playbot_lab::{
+    demo::demonstration::DemonstrationPlan,
     eval::Player,
     pipeline::{self, PipelineError},
     train::{Algorithm, Experiment, config_file::parse_experiment},
 };
 use playbot_learner::{DeviceKind, PolicyFile};
-use playbot_tests::{Corridor, corridor_plugin, spawn_walker};
+use playbot_tests::{Corridor, as_corridor};
 
 const EXPERIMENT: &str = r#"(
     game: "corridor", train: "plain:0..7", test: "plain:8..15",
@@ -27,33 +28,12 @@ const EXPERIMENT: &str = r#"(
 struct Shown;
 
 impl Game for Shown {
-    fn name(&self) -> &'static str {
-        Corridor.name()
-    }
-    fn version(&self) -> u32 {
-        Corridor.version()
-    }
-    fn modes(&self) -> &'static [&'static str] {
-        Corridor.modes()
-    }
-    fn tick_hz(&self) -> f64 {
-        Corridor.tick_hz()
-    }
-    fn actions(&self) -> ActionSpace {
-        Corridor.actions()
-    }
-    fn observation(&self) -> ObservationSpace {
-        Corridor.observation()
-    }
-    fn build(&self, app: &mut App, _mode: &str) {
-        corridor_plugin(app);
-    }
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        spawn_walker(world, index)
-    }
+    as_corridor!();
+
     fn demonstrator(&self) -> Option<&'static str> {
         Some("right")
     }
+
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, _noise: f64) {
         world.entity_mut(agent).insert(BlindBot::Constant(ActionValue::Discrete(1)));
     }
@@ -103,6 +83,26 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     assert_eq!((measured.method.as_str(), measured.split.as_str()), ("learned", "plain:8..15"));
     assert_eq!(measured.episodes, 8 * u64::from(experiment.eval.episodes_per_level));
     assert_eq!(measure(&shipped), measured, "what is shipped plays as what was trained");
+}
+
+#[test]
+fn a_number_of_steps_is_recorded_over_the_levels_again_and_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("six.demo");
+    let (mode, levels) = ("plain".to_owned(), vec![0, 1]);
+    let plan = DemonstrationPlan { mode, levels, noise: 0.0, seed: 1, steps: Some(6), keep_observations: true };
+    let writer = DemoWriter::create(&path, plan.header(&Shown)).expect("a fresh file");
+    let (mut world, _) = plan.stage(&Shown, writer);
+    while world.resource::<Recorder>().steps() < 6 {
+        world.tick().expect("sound");
+    }
+    let reader = DemoReader::open(&path).expect("a recording");
+    let header = reader.header();
+    assert_eq!(header.demonstrator, "right");
+    assert_eq!(header.observation_names, Corridor.observation().names);
+    let recorded: Vec<_> = reader.map(|episode| episode.expect("whole")).collect();
+    let recorded: Vec<_> = recorded.iter().map(|episode| (episode.level_seed, episode.len())).collect();
+    assert_eq!(recorded, [(0, 2), (1, 3), (0, 1)], "level 0 starts two cells from the exit, level 1 three");
 }
 
 #[test]

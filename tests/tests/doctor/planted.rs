@@ -44,6 +44,11 @@ fn likeliest(finding: &Finding) -> CauseKind {
     finding.causes.first().expect("every difference has usual causes").kind
 }
 
+/// Names of the observed values that never changed.
+fn constant(report: &DoctorReport) -> Vec<&str> {
+    report.observation.constant.iter().map(|it| it.name.as_str()).collect()
+}
+
 #[test]
 fn a_healthy_game_has_no_findings() {
     let report = examined(&Fault::None, 60, &[]);
@@ -64,7 +69,7 @@ fn what_reflection_sees_and_what_it_does_not_see_is_said() {
     }
     let hidden = report.types.not_reflected.len() + report.types.unnamed;
     assert_eq!(hidden, 2, "`Secret` and `Planted` are not reflected: {:?}", report.types);
-    assert_eq!(report.observation.constant, ["gardens"]);
+    assert_eq!(constant(&report), ["gardens"]);
     assert!(report.observation.state_hash);
 }
 
@@ -152,7 +157,7 @@ fn a_panic_is_a_finding_and_ends_only_the_examination() {
 fn an_observation_that_never_changes_is_a_finding() {
     let (finding, report) = finding(Fault::Blind);
     assert_eq!(finding.kind, FindingKind::Blind);
-    assert_eq!(report.observation.constant, ["x", "tallest", "gardens"]);
+    assert_eq!(constant(&report), ["x", "tallest", "gardens"]);
 }
 
 #[test]
@@ -167,6 +172,23 @@ fn the_report_names_the_cause_and_what_to_do() {
         "`Restart::Rebuild`, which builds the World anew",
         "a field with #[reflect(ignore)]",
         "1 finding.",
+    ] {
+        assert!(text.contains(words), "`{words}` is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn the_report_says_how_much_was_compared_and_how_to_compare_more() {
+    let report = examined(&Fault::None, 60, &[]);
+    assert!(report.comparisons.iter().all(|comparison| comparison.episodes >= 1), "{report}");
+    assert_eq!(report.safety.window.comparisons, [Comparison::Repeat, Comparison::Clock, Comparison::Archetypes]);
+    let text = report.to_string();
+    for words in [
+        "no difference in 60 ticks, ",
+        "yes (compared: twice in one thread, on two threads)",
+        "no difference was found in 60 ticks of this one level",
+        "`--ticks 600` plays longer, `--seed 1` another level",
+        "No findings: the same actions played the same game for 60 ticks.",
     ] {
         assert!(text.contains(words), "`{words}` is missing in:\n{text}");
     }

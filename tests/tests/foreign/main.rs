@@ -1,9 +1,11 @@
 //! Games that know nothing of the plugin, and their adapters.
 
+mod actions;
 mod experiments;
 mod faults;
 mod headless;
 mod lines;
+mod loading;
 mod namesakes;
 mod play;
 mod rebuild;

@@ -1,8 +1,10 @@
 //! The games of a program are told apart by their names.
 
+use std::path::Path;
+
 use playbot_lab::{
     game::Game,
-    games::{Games, GamesError},
+    games::{Artifact, Games, GamesError},
 };
 use playbot_tests::{Corridor, faulty::Fault, foreign::catch::catch_game};
 
@@ -16,6 +18,21 @@ fn games_are_found_by_name_in_the_order_in_which_they_were_given() {
     assert_eq!(games.get("corridor").map(Game::name).ok(), Some("corridor"));
     let error = games.get("coridor").map(Game::name).expect_err("no such game").to_string();
     assert!(error.contains("corridor") && error.contains("catch"), "{error}");
+}
+
+#[test]
+fn a_file_of_a_game_that_the_program_does_not_have_is_named_with_what_to_do() {
+    let all: [&dyn Game; 1] = [&Corridor];
+    let games = Games::new(&all).expect("one name");
+    let path = Path::new("runs/first");
+    assert_eq!(games.of_file(Artifact::Run, path, "corridor").map(Game::name).ok(), Some("corridor"));
+    let words = |kind| games.of_file(kind, path, "lander").map(Game::name).expect_err("no such game").to_string();
+    assert_eq!(
+        words(Artifact::Run),
+        "runs/first: a run of the game `lander`, which this program does not have (it has corridor): use the program \
+         of that game"
+    );
+    assert!(words(Artifact::Experiment).contains("correct `game` in it"), "{}", words(Artifact::Experiment));
 }
 
 #[test]

@@ -54,6 +54,32 @@ fn keys_and_buttons_come_in_any_order() {
 }
 
 #[test]
+fn keys_can_be_said_by_name() {
+    let named = bare().keys_by_name([vec![], vec!["Space"]]);
+    assert_eq!(pressed(&named), VirtualInput::keys(KEYS.map(<[_]>::to_vec)));
+    assert_eq!(Game::action_names(&named), ["nothing", "Space"]);
+    assert!(named.key_bindings().is_some(), "a person plays with these keys");
+    let mixed = bare().keys_by_name([vec!["KeyA".to_owned(), "MouseLeft".to_owned()]]);
+    let both = VirtualInput::keys([vec![KeyCode::KeyA]]).mouse_buttons([vec![MouseButton::Left]]);
+    assert_eq!(pressed(&mixed), both);
+    assert_eq!(Game::action_names(&mixed), ["KeyA+MouseLeft"]);
+    assert!(mixed.key_bindings().is_none(), "keys alone do not play it");
+}
+
+#[test]
+fn a_key_that_does_not_exist_is_told_with_its_action_and_the_nearest_name() {
+    let wrong = bare().keys_by_name([vec![], vec!["Space", "ArowLeft"], vec!["Anykey"]]);
+    let text = wrong.problem().expect("there is no such key");
+    for part in ["the game `bare`", "in action 1", "`ArowLeft`", "did you mean `ArrowLeft`?"] {
+        assert!(text.contains(part), "`{part}` is missing in: {text}");
+    }
+    // Whoever plays it hears of it.
+    let (mut world, _) = build_world(&wrong, "default", 0, 0, 1);
+    assert!(world.tick().expect_err("a problem").to_string().contains("`ArowLeft`"));
+    assert_eq!(keys(wrong).problem(), None, "what was said last counts");
+}
+
+#[test]
 fn buttons_join_an_input_that_was_said_as_a_whole() {
     let whole = || VirtualInput::keys(KEYS.map(<[_]>::to_vec));
     let expected = whole().mouse_buttons(MOUSE.map(<[_]>::to_vec));

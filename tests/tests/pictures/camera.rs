@@ -1,6 +1,7 @@
 //! Camera sensors.
 
 mod errors;
+mod foreign;
 mod of;
 mod sensor;
 mod ticks;

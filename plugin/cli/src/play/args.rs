@@ -26,7 +26,7 @@ Examples:
 pub struct Args {
     /// Name of the game.
     pub(super) game: String,
-    /// Mode of the game; its last one unless the levels name one.
+    /// Mode of the game; the one that `train` trains in unless the levels name one.
     #[arg(long)]
     pub(super) mode: Option<String>,
     /// Level to begin with; the first of the levels if none is named.

@@ -12,7 +12,7 @@ use playbot_lab::{game::Game, split::LevelSplit};
 
 use super::Args;
 use crate::{
-    defaults::mode_to_show,
+    defaults::usual_mode,
     demo::deciders,
     error::{CliError, Outcome},
     interrupt,
@@ -45,7 +45,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 
 fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
     let named = args.mode.as_deref();
-    let mode = named.unwrap_or_else(|| mode_to_show(game));
+    let mode = named.unwrap_or_else(|| usual_mode(game));
     let levels = match args.levels.as_deref() {
         Some(text) if text.contains(':') => text.parse()?,
         Some(text) => format!("{mode}:{text}").parse()?,

@@ -41,7 +41,8 @@ pub(super) fn write_report(
     };
     let table = ResultTable {
         caption: format!(
-            "Return per episode on {}, each level {} times; steps/s are those of the training where there was one",
+            "Return per episode on {}, each level {} times, ± one standard error over the levels; steps/s are those of the \
+             training where there was one",
             experiment.test, experiment.eval.episodes_per_level
         ),
         rows: rows.to_vec(),

@@ -96,7 +96,9 @@ fn why_not(metric: &str) -> &'static str {
 fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
     let (mut seen, mut runs) = (Vec::new(), Vec::new());
     for folder in paths {
-        for path in find_runs(folder)? {
+        // What is not there is spoken of as a run, as whoever compares two of them does.
+        let found = if folder.is_dir() { find_runs(folder)? } else { vec![folder.clone()] };
+        for path in found {
             let same = fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
             if seen.contains(&same) {
                 continue;

@@ -78,7 +78,7 @@ fn row(run: &RunRecord) -> Vec<String> {
         run.info.algorithm.name().to_owned(),
         run.info.seed.to_string(),
         whole(run.curves.last_step() as f64),
-        whole(run.experiment.steps as f64),
+        whole(run.experiment.whole_steps() as f64),
         number(run.curves.last(EPISODIC_RETURN)),
         number(run.curves.last(SUCCESS_RATE)),
         run.curves.steps_per_s().map_or(UNKNOWN.to_owned(), whole),

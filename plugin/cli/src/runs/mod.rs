@@ -6,7 +6,7 @@ mod show;
 
 use std::path::Path;
 
-use playbot_lab::train::run_dir::write_atomically;
+use playbot_lab::{games::Games, train::run_dir::write_atomically};
 
 use super::error::{CliError, Outcome};
 
@@ -33,10 +33,10 @@ enum Verb {
     Compare(compare::Args),
 }
 
-pub fn run(args: Args) -> Result<Outcome, CliError> {
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Ls(args) => ls::run(&args),
-        Verb::Show(args) => show::run(&args),
+        Verb::Show(args) => show::run(&args, games),
         Verb::Compare(args) => compare::run(&args),
     }
 }

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use playbot_lab::{
+    games::Games,
     report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whole},
-    runs::{RunRecord, changed_settings},
+    runs::{RunRecord, changed_settings, with_defaults},
     train::{
+        Experiment,
         checkpoint::Checkpoint,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     },
@@ -14,6 +16,7 @@ use serde_json::{Value, json};
 
 use super::{
     super::{
+        defaults::usual_experiment,
         error::{CliError, Outcome, print_line},
         output,
     },
@@ -24,7 +27,7 @@ use super::{
 /// Characters of a curve drawn as text.
 const SPARKS: usize = 60;
 
-/// Shows the settings of a run that are not the defaults, its curves and all its metrics.
+/// Shows in which settings a run differs from what it would be without options, its curves and all its metrics.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs show runs/first
@@ -44,7 +47,7 @@ pub struct Args {
     json: bool,
 }
 
-pub fn run(args: &Args) -> Result<Outcome, CliError> {
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let run = RunRecord::read(&args.run)?;
     run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
     let curves = curves(&run, &args.metric)?;
@@ -57,7 +60,7 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     if args.json {
         print_line(full_json(&run))?;
     } else {
-        print_head(&run)?;
+        print_head(&run, games)?;
         print_curves(&curves)?;
         print_line(metrics(&run).to_text().trim_end())?;
     }
@@ -79,7 +82,7 @@ fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurv
     Ok(usual.into_iter().map(|tag| (tag, run.curves.curve(tag))).filter(|(_, curve)| !curve.is_empty()).collect())
 }
 
-fn print_head(run: &RunRecord) -> Result<(), CliError> {
+fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
     let (info, experiment) = (&run.info, &run.experiment);
     print_line(format!(
         "{}: {} on {} with version {} of its rules, seed {}, by playbot {} ({}) on {}{}",
@@ -96,22 +99,36 @@ fn print_head(run: &RunRecord) -> Result<(), CliError> {
     let state = if run.is_finished() { "finished" } else { "not finished" };
     let speed = run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", whole(speed)));
     let age = age_s(run).map_or(String::new(), |age| format!(", updated {} ago", duration(age)));
-    let (done, planned) = (whole(run.curves.last_step() as f64), whole(experiment.steps as f64));
+    let (done, planned) = (whole(run.curves.last_step() as f64), whole(experiment.whole_steps() as f64));
     print_line(format!("{done} of {planned} steps, {state}{speed}{age}"))?;
     print_line(format!(
         "trained on {}, held out {}, {} arenas in {} Worlds",
         experiment.train, experiment.test, experiment.arenas, experiment.worlds
     ))?;
-    let changed: Vec<String> =
-        changed_settings(experiment).iter().map(|(key, value)| format!("{key}={value}")).collect();
-    if !changed.is_empty() {
-        print_line(format!("not the default: {}", changed.join(", ")))?;
-    }
+    print_line(describe_settings(experiment, games))?;
     for Checkpoint { path, summary } in &run.checkpoints {
         let value = summary.episodic_return.map_or("no episode yet".to_owned(), |value| format!("return {value:.2}"));
         print_line(format!("checkpoint: {} ({value})", path.display()))?;
     }
     print_line("")
+}
+
+/// What sets an experiment apart from one that nobody changed: that of the program, that of the game, or the defaults of all
+/// keys, whichever is nearest. A run does not say which of them it was built on.
+fn describe_settings(experiment: &Experiment, games: &Games) -> String {
+    let own = games.get(&experiment.game).ok().and_then(usual_experiment);
+    let usual = usual_experiment(games.first()).into_iter().chain(own);
+    let defaults = ("the defaults".to_owned(), with_defaults(experiment));
+    let bases = usual.map(|usual| (usual.origin, usual.experiment)).chain([defaults]);
+    let nearest = bases
+        .map(|(origin, base)| (origin, changed_settings(experiment, &base)))
+        .min_by_key(|(_, changed)| changed.len());
+    let (origin, changed) = nearest.unwrap_or_default();
+    let changed: Vec<String> = changed.iter().map(|(key, value)| format!("{key}={value}")).collect();
+    match changed.is_empty() {
+        true => format!("settings: those of {origin}"),
+        false => format!("settings: those of {origin}, but for {}", changed.join(", ")),
+    }
 }
 
 fn print_curves(curves: &[TaggedCurve]) -> Result<(), CliError> {
@@ -176,5 +193,29 @@ fn chart(run: &RunRecord, tag: &str, curve: &[(u64, f64)]) -> Chart {
         curves: vec![Curve::new("", points)],
         y_range: range_of(tag),
         marks: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use playbot_lab::{foreign::ForeignGame, game::Game};
+
+    use super::*;
+    use crate::experiment::ExperimentArgs;
+
+    #[test]
+    fn only_what_somebody_set_is_named() {
+        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
+        let games = [&game as &dyn Game];
+        let games = Games::new(&games).expect("one game");
+        let usual = ExperimentArgs::default().load(&games, []).expect("that of the game");
+        assert_eq!(describe_settings(&usual, &games), "settings: those of the experiment of runner");
+        let changed = usual.with_set(&["ppo.gamma=0.5", "seed=7"]).expect("valid");
+        let words = "settings: those of the experiment of runner, but for ppo.gamma=0.5, seed=7";
+        assert_eq!(describe_settings(&changed, &games), words);
+        // Of a game that the program does not have.
+        let foreign = changed.with_set(&["game=chess", "train=a:0..3", "test=a:4..7", "demos=d", "steps=9"]);
+        let words = "settings: those of the defaults, but for ppo.gamma=0.5, seed=7";
+        assert_eq!(describe_settings(&foreign.expect("valid"), &games), words);
     }
 }

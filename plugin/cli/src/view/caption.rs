@@ -1,8 +1,9 @@
 //! What stands under a picture: tick, action, value, and the skill as bars.
 
 use super::{
+    colours::{DOWN, FAINT, UP, WORDS},
     font,
-    screen::{Colour, Screen},
+    screen::Screen,
     stage::Shot,
 };
 
@@ -18,11 +19,6 @@ const ENLARGED: usize = 2;
 const ROOMY: usize = 300;
 /// No picture is too narrow for its caption.
 pub const NARROWEST: usize = 160;
-
-const WORDS: Colour = [235, 235, 235];
-const FAINT: Colour = [120, 120, 130];
-const UP: Colour = [90, 190, 255];
-const DOWN: Colour = [255, 150, 80];
 
 /// Where things are in captions of a width.
 pub struct Caption {
@@ -42,7 +38,7 @@ impl Caption {
 
     /// Pixels from top to bottom.
     pub fn height(&self) -> usize {
-        let bars = if self.skills > 0 { 2 * BAR + 1 + MARGIN } else { 0 };
+        let bars = if self.skills > 0 { self.line() + 2 * BAR + 1 + MARGIN } else { 0 };
         MARGIN + 2 * self.line() + bars
     }
 
@@ -68,7 +64,8 @@ impl Caption {
         if skill.is_empty() {
             return;
         }
-        let (middle, room) = (top + BAR, screen.width - 2 * MARGIN);
+        font::write(screen, &format!("skill, bars full at ±{FULL}"), self.letter, (MARGIN, top), FAINT);
+        let (middle, room) = (top + self.line() + BAR, screen.width - 2 * MARGIN);
         screen.block(MARGIN, middle, room, 1, FAINT);
         let step = room / skill.len();
         for (number, z) in skill.iter().enumerate() {

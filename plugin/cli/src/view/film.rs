@@ -5,13 +5,12 @@ use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
 
 use super::{
     caption::{Caption, NARROWEST},
+    colours::BACKGROUND,
     numbers::Numbers,
-    screen::{Colour, Screen},
+    screen::Screen,
     stage::Shot,
 };
 use crate::error::CliError;
-
-const BACKGROUND: Colour = [24, 24, 28];
 
 /// The bytes of a file, and its width and height in pixels.
 pub type Png = (Vec<u8>, [usize; 2]);

@@ -163,13 +163,3 @@ impl Stage {
         self.world.get::<Replay>(self.agent)?.divergence()
     }
 }
-
-/// How an episode ended.
-pub fn describe_end(ended: EpisodeEnded) -> &'static str {
-    match ended.end {
-        EpisodeEnd::Terminated { success: true } => "won",
-        EpisodeEnd::Terminated { success: false } => "lost",
-        EpisodeEnd::Truncated if ended.success => "reached the goal, time was up",
-        EpisodeEnd::Truncated => "out of time",
-    }
-}

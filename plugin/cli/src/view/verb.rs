@@ -3,24 +3,27 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
-    demo::file::DemoReader,
+    demo::file::{DemoEpisode, DemoFileError, DemoReader},
     vision::{ObservationConfig, ObservationKind},
 };
-use playbot_lab::games::Games;
 use playbot_lab::sensors::GameSensors;
-use playbot_lab::{eval::Player, game::Game};
-use serde_json::json;
+use playbot_lab::{
+    eval::Player,
+    game::Game,
+    games::{Artifact, Games},
+};
 
 use super::{
     film::Film,
-    numbers::Numbers,
+    numbers::{Numbers, Reach},
     options,
-    stage::{self, Shot, Stage},
+    stage::{Shot, Stage},
+    told::Written,
 };
 use crate::{
-    defaults::mode_to_show,
-    error::{CliError, Outcome, print_line},
-    interrupt, output,
+    defaults::usual_mode,
+    error::{CliError, Outcome},
+    interrupt, open, output,
     player::{Chosen, PlayerArgs},
     progress,
 };
@@ -29,7 +32,8 @@ use crate::{
 ///
 /// That is a PNG: of one observation, or with --episode an animated one of a whole episode, with tick, action, value
 /// and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it. Of a game that
-/// has a camera of its own it is what that sees; of one that cannot be drawn, the numbers, with a bar for each.
+/// has a camera of its own it is what that sees; of one that cannot be drawn, the numbers. Each has a bar, and behind it,
+/// as ±, what fills the bar: the largest value of the episode, or of its ticks up to the one that is shown, rounded up.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot view GAME --seed 5
@@ -42,12 +46,12 @@ Animated PNGs play in browsers and in most viewers of pictures.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; its last one, or that of the recording.
+    /// Mode of the game; the one that it is trained in, or that of the recording.
     #[arg(long, conflicts_with = "demo")]
     mode: Option<String>,
     /// Seed of the level.
     #[arg(long, default_value_t = 0, conflicts_with = "demo")]
-    seed: u32,
+    seed: u64,
     /// Tick of the episode, from 0, whose observation is written.
     #[arg(long, default_value_t = 0, conflicts_with = "episode")]
     tick: u32,
@@ -85,13 +89,13 @@ const MOST_BYTES: usize = 1 << 30;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let (mut stage, observation_config, name) = open_stage(game, &args)?;
+    let Opened { mut stage, observation_config, mode, player } = open_stage(game, &args, games)?;
     let pictures = observation_config
         .is_image()
         .then(|| Film::new(observation_config.image, args.scale, game.tick_hz()))
         .transpose()?;
-    let shots = take(&mut stage, &args)?;
-    let numbers = || Numbers::new(game.observation().names, args.scale, &shots);
+    let (shots, reach) = take(&mut stage, &args)?;
+    let numbers = || Numbers::new(game.observation().names, args.scale, &reach);
     let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
     let (bytes, size) = if args.episode {
         let bar = progress::bar("draw", shots.len() as u64, "frames");
@@ -104,33 +108,79 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         film.captioned(&shots[0])?
     };
     output::write(&args.out, &bytes)?;
-    let written = Written { player: &name, frames: shots.len(), bytes: bytes.len(), size };
-    report(&stage, &args, &written)
+    let written = Written {
+        path: &args.out,
+        game,
+        mode: &mode,
+        is_mode_named: args.mode.is_some() || args.demo.is_some(),
+        level: stage.level(),
+        player: &player,
+        demo: args.demo.as_deref(),
+        tick: (!args.episode).then_some(args.tick),
+        frames: shots.len(),
+        bytes: bytes.len(),
+        size,
+        ticks: stage.ticks(),
+        end: stage.end(),
+        divergence: stage.divergence(),
+    };
+    written.tell(args.json)?;
+    match stage.divergence() {
+        None => Ok(Outcome::Pass),
+        Some(divergence) => {
+            tell!("from there on it is not the game that was recorded: {divergence}");
+            Ok(Outcome::Findings)
+        }
+    }
 }
 
 /// A World with the player, or with the recording.
-fn open_stage(game: &dyn Game, args: &Args) -> Result<(Stage, ObservationConfig, String), CliError> {
+struct Opened {
+    stage: Stage,
+    observation_config: ObservationConfig,
+    /// Mode that is played.
+    mode: String,
+    /// Name of the player.
+    player: String,
+}
+
+fn open_stage(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, CliError> {
     if let Some(path) = &args.demo {
-        let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
+        let reader = open_recording(game, path, games)?;
         let mode = reader.header().mode.clone();
-        game.check_mode(&mode)?;
+        game.check_mode(&mode).map_err(|error| CliError::Usage(format!("{}: {error}", path.display())))?;
         let observation_config = observation_config(game, args, None)?;
         let episode = episode(reader, path, args.episode_number)?;
         let stage = Stage::replaying(game, &mode, &observation_config, episode)?;
-        return Ok((stage, observation_config, "recording".to_owned()));
+        return Ok(Opened { stage, observation_config, mode, player: "recording".to_owned() });
     }
-    let mode = args.mode.as_deref().unwrap_or_else(|| mode_to_show(game));
+    let mode = args.mode.as_deref().unwrap_or_else(|| usual_mode(game));
     game.check_mode(mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,
         None => Chosen::usual(game)?,
     };
     let observation_config = observation_config(game, args, Some(&chosen))?;
-    Ok((
-        Stage::playing(game, mode, &observation_config, args.seed.into(), &chosen.player)?,
-        observation_config,
-        chosen.name,
-    ))
+    let stage = Stage::playing(game, mode, &observation_config, args.seed, &chosen.player)?;
+    Ok(Opened { stage, observation_config, mode: mode.to_owned(), player: chosen.name })
+}
+
+/// A recording of this game and these rules.
+fn open_recording(game: &dyn Game, path: &Path, games: &Games) -> Result<DemoReader, CliError> {
+    let reader = DemoReader::open(path).map_err(open::missing_recording)?;
+    let (header, name) = (reader.header(), game.name());
+    let recorded = games.of_file(Artifact::Recording, path, &header.game)?.name();
+    if recorded != name {
+        return Err(CliError::Usage(format!(
+            "{0}: a recording of the game `{recorded}`, not of `{name}`: look at it with \
+             `playbot view {recorded} --demo {0}`",
+            path.display()
+        )));
+    }
+    match header.check_game(name, game.version(), None) {
+        Ok(()) => Ok(reader),
+        Err(fault) => Err(DemoFileError { path: path.into(), fault }.into()),
+    }
 }
 
 /// Whether this build has the sensor for the camera of a game.
@@ -167,7 +217,7 @@ fn observation_config(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> 
     Ok(observation_config)
 }
 
-fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<bevy_playbot::demo::file::DemoEpisode, CliError> {
+fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<DemoEpisode, CliError> {
     for (index, episode) in reader.enumerate() {
         let episode = episode?;
         if index == number {
@@ -181,13 +231,14 @@ fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<bevy_playbo
 }
 
 /// Plays until the tick that is asked for, or to the end.
-fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
+fn take(stage: &mut Stage, args: &Args) -> Result<(Vec<Shot>, Reach), CliError> {
     interrupt::listen();
     let bar = progress::bar("play", 0, "ticks");
-    let (mut shots, mut kept) = (Vec::new(), 0);
+    let (mut shots, mut reach, mut kept) = (Vec::new(), Reach::default(), 0);
     while let Some(shot) = stage.next()? {
         bar.set_length(u64::from(shot.tick) + 1);
         bar.set_position(u64::from(shot.tick) + 1);
+        reach.see(&shot.vector);
         if args.episode {
             kept += shot.image.len() + size_of_val(shot.vector.as_slice());
             if kept > MOST_BYTES {
@@ -211,39 +262,5 @@ fn take(stage: &mut Stage, args: &Args) -> Result<Vec<Shot>, CliError> {
         let ticks = stage.ticks();
         return Err(CliError::Usage(format!("there is no tick {}: the episode has {ticks} ticks, from 0", args.tick)));
     }
-    Ok(shots)
-}
-
-struct Written<'a> {
-    player: &'a str,
-    frames: usize,
-    bytes: usize,
-    size: [usize; 2],
-}
-
-fn report(stage: &Stage, args: &Args, written: &Written) -> Result<Outcome, CliError> {
-    let ([width, height], path) = (written.size, args.out.display());
-    if args.json {
-        print_line(json!({
-            "path": path.to_string(), "bytes": written.bytes, "width": width, "height": height,
-            "frames": written.frames, "ticks": stage.ticks(), "end": stage.end().map(|ended| ended.end), "player": written.player,
-            "level": stage.level(), "divergence": stage.divergence().map(ToString::to_string),
-        }))?;
-    } else {
-        let how = stage.end().map_or("still running", stage::describe_end);
-        tell!(
-            "{path}: {width} × {height}, {} frames of level {} played by {}; after {} ticks: {how}",
-            written.frames,
-            stage.level(),
-            written.player,
-            stage.ticks()
-        );
-    }
-    match stage.divergence() {
-        None => Ok(Outcome::Pass),
-        Some(divergence) => {
-            tell!("from there on it is not the game that was recorded: {divergence}");
-            Ok(Outcome::Findings)
-        }
-    }
+    Ok((shots, reach))
 }

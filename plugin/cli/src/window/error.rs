@@ -30,7 +30,10 @@ pub enum WindowError {
     )]
     NoAdapter(String),
     /// The keyboard means nothing to the game.
-    #[error("{0} has no keys for a person to play with")]
+    #[error(
+        "{0} has no keys for a person to play with: let the game name them (`key_bindings`), or watch a bot play with \
+         `playbot view {0} --episode`"
+    )]
     NoKeys(&'static str),
     /// What a person does is nothing that a recording could hold.
     #[error(

@@ -1,5 +1,6 @@
-//! Recordings in the laboratory: checking them by replay, and reading them back for learning.
+//! Recordings in the laboratory: making them of a demonstrator, checking them by replay, and reading them back for learning.
 
 pub mod dataset;
+pub mod demonstration;
 mod replay_observations;
 pub mod verify;

@@ -31,7 +31,7 @@ impl CauseKind {
     pub fn describe(self) -> &'static str {
         match self {
             Self::Randomness => "random numbers without a seed",
-            Self::HashOrder => "iteration over a HashMap or HashSet of std, whose order is another one in every run",
+            Self::HashOrder => "iteration over a HashMap or HashSet of std, whose order differs from run to run",
             Self::WallClock => "the clock on the wall: Time<Real>, Instant or SystemTime",
             Self::ArchetypeOrder => {
                 "the order in which queries go over archetypes, which depends on how many archetypes there were before: a \

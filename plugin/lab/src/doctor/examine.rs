@@ -83,16 +83,12 @@ pub fn examine(
 /// A game that differs from itself differs everywhere, and no comparison could tell why.
 fn reason_to_skip(comparison: Comparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
     if comparison == Comparison::Arenas && game.arenas_per_world() == Some(1) {
-        return Some("the game has one arena per World, by its own word".to_owned());
+        return Some("a World of this game holds only one arena (its `arenas_per_world` is 1)".to_owned());
     }
-    let differs = |of: Comparison| done.iter().find(|report| report.comparison == of && report.same() == Some(false));
-    if comparison == Comparison::Clock && differs(Comparison::Archetypes).is_some() {
-        return Some("another clock brings archetypes, of which the game already depends on the number".to_owned());
-    }
-    let broken = differs(Comparison::Repeat)?;
+    let broken = done.iter().find(|of| of.comparison == Comparison::Repeat && of.same() == Some(false))?;
     Some(match broken.fault.is_some() {
-        true => "the game has a fault, which comes first".to_owned(),
-        false => "the game already differs from itself, which comes first".to_owned(),
+        true => "the game has a fault, which must be mended first".to_owned(),
+        false => "the game already differs from itself without this, which must be mended first".to_owned(),
     })
 }
 
@@ -101,6 +97,7 @@ fn skipped(comparison: Comparison, why: String) -> ComparisonReport {
         comparison,
         skipped: Some(why),
         ticks: 0,
+        episodes: 0,
         first: None,
         others: Vec::new(),
         effect: None,

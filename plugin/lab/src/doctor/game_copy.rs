@@ -117,14 +117,19 @@ impl GameCopy {
     pub fn outcome(&self, agent: usize) -> Outcome {
         let entity = self.agents[agent];
         let observation = self.world.get::<Observation>(entity).cloned().unwrap_or_default();
-        let ends = &self.world.resource::<Ends>().0;
         Outcome {
             observation: observation.vector,
             image: observation.image,
             reward: self.world.get::<Reward>(entity).map_or(0.0, Reward::get),
             hash: self.world.get::<StateHash>(entity).map_or(0, |hash| hash.0),
-            end: ends.iter().find(|(ended, _)| *ended == entity).map(|(_, end)| *end),
+            end: self.end(agent),
         }
+    }
+
+    /// How an agent's episode ended in this tick, if it did.
+    pub fn end(&self, agent: usize) -> Option<EpisodeEnd> {
+        let (entity, ends) = (self.agents[agent], &self.world.resource::<Ends>().0);
+        ends.iter().find(|(ended, _)| *ended == entity).map(|(_, end)| *end)
     }
 
     /// Names of the values that agents observe.

@@ -4,15 +4,24 @@ use serde::Serialize;
 
 use super::game_copy::Outcome;
 
+/// A value that never changed while it was watched.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConstantValue {
+    /// Its name.
+    pub name: String,
+    /// What it was.
+    pub value: f32,
+}
+
 /// What one agent observed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObservationReport {
-    /// Number of values, by the game's own word.
+    /// Number of values that the game says there are: those that its sensor names.
     pub values: usize,
     /// Ticks that were watched.
     pub ticks: u32,
-    /// Names of the values that were the same in all of them.
-    pub constant: Vec<String>,
+    /// Those that were the same in all of them.
+    pub constant: Vec<ConstantValue>,
     /// The first value that was no finite number: the tick, from 0, its name and what it was.
     pub not_finite: Option<(u32, String, String)>,
     /// The first tick, from 0, with another number of values, and that number.
@@ -60,8 +69,14 @@ impl Watch {
     /// What there was to see. Nothing can be said to be constant that was seen only once.
     pub fn report(mut self) -> ObservationReport {
         if self.report.ticks > 1 {
-            let same = self.names.into_iter().zip(self.changed).filter(|(_, changed)| !changed);
-            self.report.constant = same.map(|(name, _)| name).collect();
+            let values = self.first.map(|first| first.observation).unwrap_or_default();
+            let all = self.names.into_iter().zip(self.changed).enumerate();
+            let constant = all.filter(|(_, (_, changed))| !changed).map(|(at, (name, _))| ConstantValue {
+                name,
+                // A value that was not there at first is not known, and the report says so elsewhere.
+                value: values.get(at).copied().unwrap_or(f32::NAN),
+            });
+            self.report.constant = constant.collect();
         }
         self.report
     }
@@ -90,7 +105,8 @@ mod tests {
     #[test]
     fn constant_values_are_named() {
         let report = watch(&[&[1.0, 5.0], &[2.0, 5.0]]);
-        assert_eq!((report.constant.as_slice(), report.is_blind()), (&["y".to_owned()][..], false));
+        let always_five = ConstantValue { name: "y".to_owned(), value: 5.0 };
+        assert_eq!((report.constant.as_slice(), report.is_blind()), (&[always_five][..], false));
         assert!(watch(&[&[1.0, 5.0], &[1.0, 5.0]]).is_blind());
         assert!(!watch(&[&[1.0, 5.0]]).is_blind(), "one tick proves nothing");
     }

@@ -101,6 +101,8 @@ pub struct ComparisonReport {
     pub skipped: Option<String>,
     /// Ticks compared.
     pub ticks: u32,
+    /// Episodes that began in these ticks, in the copy on the left; the last one need not have come to its end.
+    pub episodes: u32,
     /// The first difference, the one nearest to its cause if a tick has several.
     pub first: Option<Difference>,
     /// Further differences of that tick, a few of them.

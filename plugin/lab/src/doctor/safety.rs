@@ -7,13 +7,15 @@ use super::{
     report::{Comparison, ComparisonReport},
 };
 
-/// Whether the game is safe for something.
+/// Whether the game is safe for something, as far as a few ticks can show.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
     /// `None` if that was not looked at.
     pub safe: Option<bool>,
     /// Why, or under which condition.
     pub why: String,
+    /// What it rests on: it is safe as far as none of these comparisons found a difference in the ticks that they played.
+    pub comparisons: Vec<Comparison>,
 }
 
 /// What the game is safe for.
@@ -51,7 +53,7 @@ pub(super) fn judge(comparisons: &[ComparisonReport], observation: &ObservationR
     let mut recording = verdict(&[Comparison::Repeat, Comparison::Archetypes, Comparison::Restart]);
     for verdict in [&mut recording, &mut resume] {
         if verdict.safe == Some(true) && !observation.state_hash {
-            verdict.why = "but the game writes no StateHash, so that a replay proves little".to_owned();
+            verdict.why = "but the game writes no StateHash, so that a replay compares little".to_owned();
         }
     }
     Safety {
@@ -64,16 +66,17 @@ pub(super) fn judge(comparisons: &[ComparisonReport], observation: &ObservationR
 }
 
 /// Safe if all these comparisons found nothing, unsafe if one of them did.
-fn verdict(comparisons: &[ComparisonReport], needed: &[Comparison]) -> Verdict {
-    let mut of_needed = comparisons.iter().filter(|report| needed.contains(&report.comparison));
+fn verdict(reports: &[ComparisonReport], needed: &[Comparison]) -> Verdict {
+    let comparisons = needed.to_vec();
+    let mut of_needed = reports.iter().filter(|report| needed.contains(&report.comparison));
     if let Some(bad) = of_needed.clone().find(|report| report.same() == Some(false)) {
         let why = format!("differs {}", bad.comparison.describe());
         let why =
             if bad.fault.is_some() && bad.difference().is_none() { "the game has a fault".to_owned() } else { why };
-        return Verdict { safe: Some(false), why };
+        return Verdict { safe: Some(false), why, comparisons };
     }
     match of_needed.find_map(|report| report.skipped.clone()) {
-        Some(why) => Verdict { safe: None, why },
-        None => Verdict { safe: Some(true), why: String::new() },
+        Some(why) => Verdict { safe: None, why, comparisons },
+        None => Verdict { safe: Some(true), why: String::new(), comparisons },
     }
 }

@@ -7,35 +7,44 @@ use bevy::{
 
 use bevy_playbot::renewal::Renewal;
 
-/// `Time<Real>` as it was before this frame.
+/// `Time<Real>` as it was before this frame, and whether it runs slower in this World.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
-struct Before(Time<Real>);
+struct WallClock {
+    before: Time<Real>,
+    is_slow: bool,
+}
 
-/// Lets `Time<Real>` of a World run slower than its ticks say, by a little more in some frames than in others.
+/// Lets `Time<Real>` of a World run slower than its ticks say if `is_slow`, by a little more in some frames than in others.
 ///
 /// A World without a window takes the length of a tick for that of a frame, so that reading the wall clock changes
 /// nothing in it, and everything in a window.
-pub(super) fn slow_down(world: &mut World) {
-    Renewal::set_up(world, slow_down_one);
+///
+/// A World whose clock is not slow gets the same resource and systems, so that two Worlds differ in nothing but the clock:
+/// not in the number of their archetypes either.
+pub(super) fn add_wall_clock(world: &mut World, is_slow: bool) {
+    Renewal::set_up(world, move |world| add_one(world, is_slow));
 }
 
-fn slow_down_one(world: &mut World) {
+fn add_one(world: &mut World, is_slow: bool) {
     let Some(now) = world.get_resource::<Time<Real>>() else { return };
-    let before = Before(*now);
-    world.insert_resource(before);
+    let clock = WallClock { before: *now, is_slow };
+    world.insert_resource(clock);
     let mut schedules = world.resource_mut::<Schedules>();
     schedules.add_systems(First, (keep.before(TimeSystems), slow.after(TimeSystems)));
 }
 
-fn keep(real: Res<Time<Real>>, mut before: ResMut<Before>) {
-    before.0 = *real;
+fn keep(real: Res<Time<Real>>, mut clock: ResMut<WallClock>) {
+    clock.before = *real;
 }
 
-fn slow(mut real: ResMut<Time<Real>>, before: Res<Before>, mut frame: Local<u32>) {
-    let delta = real.delta();
+fn slow(mut real: ResMut<Time<Real>>, clock: Res<WallClock>, mut frame: Local<u32>) {
     *frame += 1;
-    let mut slower = before.0;
+    if !clock.is_slow {
+        return;
+    }
+    let delta = real.delta();
+    let mut slower = clock.before;
     slower.advance_by(delta + delta / 8 * (1 + *frame % 3));
     // What the next frame counts from stays as it was: game time goes on as ever.
     *slower.context_mut() = *real.context();
@@ -48,16 +57,36 @@ mod tests {
 
     use super::*;
 
+    /// A World with the usual clock and one with the slow one, after five ticks.
+    fn ticked() -> [World; 2] {
+        [false, true].map(|is_slow| {
+            let mut world = into_world(headless_app());
+            add_wall_clock(&mut world, is_slow);
+            (0..5).for_each(|_| tick_world(&mut world).expect("there is no agent"));
+            world
+        })
+    }
+
     #[test]
     fn only_the_wall_clock_is_slower() {
-        let mut worlds = [into_world(headless_app()), into_world(headless_app())];
-        slow_down(&mut worlds[1]);
-        for world in &mut worlds {
-            (0..5).for_each(|_| tick_world(world).expect("there is no agent"));
-        }
+        let worlds = ticked();
         let [usual, slower] = worlds.each_ref().map(|world| world.resource::<Time<Real>>().elapsed());
         assert!(slower > usual, "{slower:?} against {usual:?}");
         let [usual, same] = worlds.each_ref().map(|world| world.resource::<Time<Virtual>>().elapsed());
         assert_eq!(usual, same);
+    }
+
+    #[test]
+    fn the_usual_clock_is_as_it_is_without_this() {
+        let mut bare = into_world(headless_app());
+        (0..5).for_each(|_| tick_world(&mut bare).expect("there is no agent"));
+        let [usual, _] = ticked();
+        assert_eq!(usual.resource::<Time<Real>>().elapsed(), bare.resource::<Time<Real>>().elapsed());
+    }
+
+    #[test]
+    fn both_worlds_have_the_same_archetypes() {
+        let [usual, slower] = ticked().map(|world| world.archetypes().len());
+        assert_eq!(usual, slower);
     }
 }

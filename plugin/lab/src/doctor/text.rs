@@ -4,17 +4,16 @@ use std::fmt::{self, Display, Formatter};
 
 use super::{
     finding::Finding,
-    report::{ComparisonReport, Difference, DoctorReport},
-    types::TypesReport,
+    report::{Comparison, ComparisonReport, Difference, DoctorReport},
+    safety::Verdict,
 };
-
-/// Most names in a list.
-const LISTED: usize = 12;
 
 impl Display for DoctorReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { game, version, mode, seed, ticks, .. } = self;
-        writeln!(f, "{game} (version {version}), mode {mode}, level {seed}, random actions for {ticks} ticks\n")?;
+        writeln!(f, "{game} (version {version}), mode {mode}, level {seed}\n")?;
+        writeln!(f, "Copies of the game played this level for {ticks} ticks with the same random actions, and were")?;
+        writeln!(f, "compared after each tick. When an episode ended, the same level began again.")?;
         for report in &self.comparisons {
             writeln!(f, "  {:<26}{}", report.comparison.describe(), outcome(report))?;
         }
@@ -22,19 +21,13 @@ impl Display for DoctorReport {
         for (number, finding) in self.findings.iter().enumerate() {
             self.write_finding(f, number + 1, finding)?;
         }
-        writeln!(f, "Safe for")?;
-        for (what, verdict) in self.safety.all() {
-            let word = verdict.safe.map_or("not known", |safe| if safe { "yes" } else { "NO" });
-            let why = if verdict.why.is_empty() { String::new() } else { format!(": {}", verdict.why) };
-            writeln!(f, "  {what:<26}{word}{why}")?;
-        }
-        self.write_observation(f)?;
-        write_types(f, &self.types)?;
+        self.write_safety(f)?;
+        write!(f, "{}{}", self.observation, self.types)?;
         if let Some(speed) = self.ticks_per_second {
             writeln!(f, "Speed: {speed:.0} ticks per second of one arena in one World")?;
         }
         let end = match self.findings.len() {
-            0 => "No findings: the same actions play the same game.".to_owned(),
+            0 => format!("No findings: the same actions played the same game for {ticks} ticks."),
             1 => "1 finding.".to_owned(),
             count => format!("{count} findings."),
         };
@@ -43,6 +36,27 @@ impl Display for DoctorReport {
 }
 
 impl DoctorReport {
+    fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { seed, ticks, .. } = self;
+        writeln!(f, "Safe for")?;
+        let verdicts = self.safety.all();
+        for (what, verdict) in verdicts {
+            writeln!(f, "  {what:<26}{}", in_words(verdict))?;
+        }
+        if verdicts.iter().any(|(_, verdict)| verdict.safe == Some(true)) {
+            let (longer, other) = (ticks.saturating_mul(10), seed.wrapping_add(1));
+            writeln!(
+                f,
+                "  \"yes\" means that no difference was found in {ticks} ticks of this one level, not that there"
+            )?;
+            writeln!(
+                f,
+                "  is none: `--ticks {longer}` plays longer, `--seed {other}` another level with other actions."
+            )?;
+        }
+        Ok(())
+    }
+
     fn write_finding(&self, f: &mut Formatter<'_>, number: usize, finding: &Finding) -> fmt::Result {
         writeln!(f, "{number}. {}", finding.what)?;
         let report = finding.comparison.and_then(|comparison| self.of(comparison));
@@ -69,17 +83,6 @@ impl DoctorReport {
         }
         writeln!(f)
     }
-
-    fn write_observation(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let seen = &self.observation;
-        write!(f, "Observation: {} values", seen.values)?;
-        match seen.constant.len() {
-            0 => writeln!(f, ", all of which changed in {} ticks", seen.ticks),
-            count => {
-                writeln!(f, ", {count} of which never changed in {} ticks: {}", seen.ticks, listed(&seen.constant))
-            }
-        }
-    }
 }
 
 fn outcome(report: &ComparisonReport) -> String {
@@ -91,7 +94,24 @@ fn outcome(report: &ComparisonReport) -> String {
         (Some(why), ..) => format!("not compared: {why}"),
         (_, Some(difference), _) => format!("DIFFERS at tick {}{unmatched}", difference.tick),
         (_, _, Some(_)) => format!("ended by a fault at tick {}", report.ticks),
-        _ => format!("the same for {} ticks{unmatched}", report.ticks),
+        _ => {
+            let episodes = if report.episodes == 1 { "episode" } else { "episodes" };
+            format!("no difference in {} ticks, {} {episodes}{unmatched}", report.ticks, report.episodes)
+        }
+    }
+}
+
+/// Whether it is safe, and what was compared to find out.
+fn in_words(verdict: &Verdict) -> String {
+    let Verdict { safe, why, comparisons } = verdict;
+    match safe {
+        None => format!("not compared: {why}"),
+        Some(false) => format!("NO: {why}"),
+        Some(true) => {
+            let compared: Vec<_> = comparisons.iter().map(|comparison: &Comparison| comparison.describe()).collect();
+            let but = if why.is_empty() { String::new() } else { format!("; {why}") };
+            format!("yes (compared: {}){but}", compared.join(", "))
+        }
     }
 }
 
@@ -99,32 +119,4 @@ fn in_one_line(difference: &Difference) -> String {
     let Difference { name, entity, field, left, right, .. } = difference;
     let of = entity.as_ref().map_or_else(String::new, |entity| format!(" of {entity}"));
     format!("`{name}{field}`{of}: {left} against {right}")
-}
-
-fn write_types(f: &mut Formatter<'_>, types: &TypesReport) -> fmt::Result {
-    writeln!(f, "State: {} types of components and resources were compared field by field", types.compared.len())?;
-    let hidden = types.not_reflected.len() + types.unnamed;
-    if hidden > 0 {
-        let names =
-            if types.not_reflected.is_empty() { String::new() } else { format!(": {}", listed(&types.not_reflected)) };
-        writeln!(
-            f,
-            "  {hidden} types of the game are not reflected{names}; a difference in them shows only later, in observation, \
-             reward, end and state hash. Derive `Reflect` with `#[reflect(Component)]` or `#[reflect(Resource)]` to have \
-             it named, or let the state hash depend on it (`StateHash`, or `.state_hash` of a `ForeignGame`)."
-        )?;
-    }
-    if types.unnamed > 0 {
-        writeln!(f, "  The names of {} of them are known only to a Bevy with its feature `debug`.", types.unnamed)?;
-    }
-    if !types.incomparable.is_empty() {
-        writeln!(f, "  Values of these types cannot be compared: {}", listed(&types.incomparable))?;
-    }
-    Ok(())
-}
-
-fn listed(names: &[String]) -> String {
-    let shown: Vec<_> = names.iter().take(LISTED).map(|name| format!("`{name}`")).collect();
-    let more = names.len().saturating_sub(LISTED);
-    if more > 0 { format!("{} and {more} more", shown.join(", ")) } else { shown.join(", ") }
 }

@@ -6,7 +6,7 @@ use super::{
     game_copy::{GameCopy, Outcome, Plan},
     observed::Watch,
     report::{Comparison, ComparisonReport, Difference, DifferenceKind},
-    slow_clock::slow_down,
+    slow_clock::add_wall_clock,
     types::TypeBook,
 };
 use crate::{game::Game, parallel::on_threads};
@@ -38,7 +38,10 @@ impl Trial {
             Comparison::Arenas => (vec![one(0), one(1), GameCopy::new(game, plan, 0, 2)], vec![(0, 2), (1, 2)]),
         };
         match comparison {
-            Comparison::Clock => slow_down(&mut copies[1].world),
+            // Both get the same resource and systems, so that they differ in the clock alone.
+            Comparison::Clock => {
+                copies.iter_mut().zip([false, true]).for_each(|(copy, slow)| add_wall_clock(&mut copy.world, slow));
+            }
             Comparison::Archetypes => {
                 copies.iter_mut().zip(0..).for_each(|(copy, count)| add_archetypes(&mut copy.world, count));
             }
@@ -55,6 +58,7 @@ impl Trial {
             comparison: self.comparison,
             skipped: None,
             ticks: 0,
+            episodes: 0,
             first: None,
             others: Vec::new(),
             effect: None,
@@ -62,6 +66,7 @@ impl Trial {
             fault: None,
         };
         let mut incomparable = Default::default();
+        let mut is_over = true;
         for tick in 0..ticks {
             self.tick();
             if let Some(watch) = &mut watch {
@@ -72,6 +77,8 @@ impl Trial {
                 break;
             }
             report.ticks += 1;
+            report.episodes += u32::from(is_over);
+            is_over = self.copies[0].end(0).is_some();
             self.copies.iter().for_each(|copy| book.learn(&copy.world));
             if report.first.is_none() {
                 let mut comparer = Comparer { book, comparison: self.comparison, ignored, incomparable };

@@ -37,6 +37,7 @@ impl ForeignGame {
             levels: None,
             input: Input::default(),
             act: None,
+            agent: Vec::new(),
             names: Vec::new(),
             observe: None,
             paths: Vec::new(),
@@ -67,7 +68,27 @@ impl ForeignGame {
 
     /// Discrete actions: the keys that each of them holds.
     pub fn keys(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
-        self.with(|description| description.input.keys = lists(sets))
+        self.with(|description| description.input.set_keys(sets))
+    }
+
+    /// [`keys`](Self::keys) by their names, such as those in a settings file: `ArrowLeft`, `KeyW`, `Space`, and those that
+    /// [`VirtualButton`](bevy_playbot::virtual_input::VirtualButton) has for buttons of mouse and gamepad. With a name that
+    /// does not exist the game has a [`problem`](crate::game::Game::problem), and nobody can play it.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_lab::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let game = |key: &str| {
+    ///     let game = ForeignGame::new("walk", 1, |_: &mut App| {}).observe(["x"], || [0.0]);
+    ///     game.keys_by_name([vec![], vec![key]])
+    /// };
+    /// assert_eq!(game("ArrowRight").problem(), None);
+    /// let problem = game("ArowRight").problem().expect("there is no such key");
+    /// assert!(problem.contains("in action 1") && problem.contains("did you mean `ArrowRight`?"));
+    /// ```
+    pub fn keys_by_name(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = impl AsRef<str>>>) -> Self {
+        self.with(|description| description.input.name_keys(sets))
     }
 
     /// Mouse buttons that discrete actions hold besides, in the order of the actions.
@@ -101,6 +122,35 @@ impl ForeignGame {
             description.input.space = Some(space);
             description.act = Some(SystemFactory::new(system, |()| ()));
         })
+    }
+
+    /// Gives the agent components, whenever it is spawned: in each World, and in each that [`Restart::Rebuild`] builds. Said
+    /// more than once, all of it is done.
+    ///
+    /// So an agent drives actions of an input manager that no key is bound to: with the feature `leafwing-input-manager` of
+    /// this crate by `LeafwingActions`, with `bevy_enhanced_input` by an `EnhancedAction`. The game's function adds their
+    /// plugins, for `InputRoute::Messages`, and [`actions`](Self::actions) with a system that does nothing says how many
+    /// actions the agent has.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+    ///
+    /// /// Where the agent's next step leads.
+    /// #[derive(Component, Debug, PartialEq)]
+    /// struct Stride(f32);
+    ///
+    /// let game = ForeignGame::new("walk", 1, |_: &mut App| {})
+    ///     .actions(ActionSpace::Discrete(2), || {})
+    ///     .observe(["x"], || [0.0])
+    ///     .agent(|agent| {
+    ///         agent.insert(Stride(0.5));
+    ///     });
+    /// let (world, agents) = build_world(&game, "default", 0, 0, 1);
+    /// assert_eq!(world.get::<Stride>(agents[0]), Some(&Stride(0.5)));
+    /// ```
+    pub fn agent(self, equip: impl Fn(&mut EntityWorldMut) + Send + Sync + 'static) -> Self {
+        self.with(|description| description.agent.push(Arc::new(equip)))
     }
 
     /// Names of the actions, for people. Those of keys name themselves.
@@ -165,6 +215,8 @@ impl ForeignGame {
     }
 
     /// Whether a level can be played, asked in each frame from the second after the restart on. Until then no tick passes.
+    /// The first tick then finds the clock where it is two frames after the restart, however many it has taken: timers stay
+    /// as they are, and a time that the game noted meanwhile may lie ahead.
     pub fn ready<M: 'static>(self, system: impl IntoSystem<(), bool, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.ready = Some(SystemFactory::new(system, |is_ready| is_ready)))
     }
@@ -197,7 +249,8 @@ impl ForeignGame {
     }
 
     /// What a replay compares after each tick, instead of the transforms of everything that the game has spawned: for games
-    /// in which some of those come by the clock. Observation and reward are compared in any case.
+    /// that spawn or move some of it by the clock on the wall, or when a file is loaded. Observation and reward are compared
+    /// in any case.
     pub fn state_hash<M: 'static>(self, system: impl IntoSystem<(), u64, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.hash = Some(SystemFactory::new(system, |hash| hash)))
     }

@@ -2,15 +2,15 @@
 
 use bevy::prelude::*;
 
-use super::kept::Built;
+use super::kept::Baseline;
 use bevy_playbot::{observation::Observation, reward::Reward, state_hash::StateHash};
 
 /// A hash of where everything of the game is. Neither the numbers of entities nor their order in memory count.
-pub(super) fn of_transforms(world: &World, built: &Built) -> u64 {
+pub(super) fn of_transforms(world: &World, baseline: &Baseline) -> u64 {
     let mut sum = 0_u64;
-    for entity in built.spawned(world) {
+    for entity in baseline.spawned(world) {
         let Some(transform) = world.get::<Transform>(entity) else { continue };
-        if !built.is_placed(world, entity) {
+        if !baseline.is_placed(world, entity) {
             continue;
         }
         let Transform { translation, rotation, scale } = transform;

@@ -41,6 +41,9 @@ pub(super) struct Description {
     pub(super) levels: Option<u64>,
     pub(super) input: Input,
     pub(super) act: Option<SystemFactory<()>>,
+    /// What is done to an agent when it is spawned.
+    pub(super) agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
+    /// Names of the values that `observe` returns.
     pub(super) names: Vec<String>,
     pub(super) observe: Option<SystemFactory<Vec<f32>>>,
     pub(super) paths: Vec<String>,
@@ -48,10 +51,11 @@ pub(super) struct Description {
     /// With whether it pays the growth of its value.
     pub(super) rewards: Vec<(SystemFactory<f32>, bool)>,
     pub(super) end: Option<SystemFactory<Option<EpisodeEnd>>>,
+    /// Ticks after which an episode is truncated.
     pub(super) limit: Option<u32>,
     pub(super) restart: Restart,
     pub(super) ready: Option<SystemFactory<bool>>,
-    /// Frames that a level may take.
+    /// Frames that a level may take to be ready.
     pub(super) patience: u32,
     pub(super) level: Option<SystemFactory<()>>,
     pub(super) demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
@@ -139,8 +143,8 @@ impl Game for ForeignGame {
 
     fn problem(&self) -> Option<String> {
         let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
-        if let Some(clash) = input.clash() {
-            return Some(format!("the game `{name}` {clash}"));
+        if let Some(problem) = input.problem() {
+            return Some(format!("the game `{name}` {problem}"));
         }
         if has_no_actions(&input.space()) {
             return Some(format!(
@@ -190,6 +194,7 @@ impl Game for ForeignGame {
         if let Some(input) = self.description.input.pressed() {
             agent.insert(input);
         }
+        self.description.agent.iter().for_each(|equip| equip(&mut agent));
         agent.id()
     }
 

@@ -7,14 +7,16 @@ use bevy_playbot::{
     action::ActionSpace,
     control::Control,
     key_bindings::KeyBindings,
-    virtual_input::{ActionAxis, VirtualInput},
+    virtual_input::{ActionAxis, HeldInput, UnknownInput, VirtualButton, VirtualInput},
 };
 
 /// The way from an action into the game, part by part: in which order they were said does not matter.
 #[derive(Clone, Default)]
 pub(super) struct Input {
-    /// The keys of each discrete action.
-    pub(super) keys: Vec<Vec<KeyCode>>,
+    /// The keys of each discrete action; other buttons among them, where they were said by name.
+    pub(super) keys: Vec<Vec<VirtualButton>>,
+    /// The first name that no key has, and its action.
+    pub(super) unknown_key: Option<(usize, UnknownInput)>,
     /// The mouse buttons of each discrete action.
     pub(super) mouse: Vec<Vec<MouseButton>>,
     /// The gamepad buttons of each discrete action.
@@ -30,6 +32,29 @@ pub(super) struct Input {
 }
 
 impl Input {
+    /// Takes the keys of each action.
+    pub(super) fn set_keys(&mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) {
+        self.keys = sets.into_iter().map(|set| set.into_iter().map(VirtualButton::Key).collect()).collect();
+        self.unknown_key = None;
+    }
+
+    /// Takes the keys of each action by their names. A name that no key has becomes the [`problem`](Self::problem).
+    pub(super) fn name_keys(&mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = impl AsRef<str>>>) {
+        (self.keys, self.unknown_key) = (Vec::new(), None);
+        for (action, names) in sets.into_iter().enumerate() {
+            let mut keys = Vec::new();
+            for name in names {
+                match name.as_ref().parse::<VirtualButton>() {
+                    Ok(key) => keys.push(key),
+                    Err(unknown) => {
+                        self.unknown_key.get_or_insert((action, unknown));
+                    }
+                }
+            }
+            self.keys.push(keys);
+        }
+    }
+
     pub(super) fn space(&self) -> ActionSpace {
         let pressed = || self.pressed().map(|pressed| pressed.space());
         self.space.or_else(pressed).unwrap_or(ActionSpace::Discrete(0))
@@ -41,7 +66,7 @@ impl Input {
         let base = match (&self.whole, &self.axes) {
             (Some(whole), _) => whole.clone(),
             (None, Some(axes)) => VirtualInput::axes(axes.iter().cloned()),
-            (None, None) if is_discrete => VirtualInput::keys(self.keys.clone()),
+            (None, None) if is_discrete => VirtualInput::discrete(self.keys.iter().cloned().map(HeldInput::new)),
             (None, None) => return None,
         };
         match base.space() {
@@ -50,8 +75,12 @@ impl Input {
         }
     }
 
-    /// What was said of the input and does not go together.
-    pub(super) fn clash(&self) -> Option<String> {
+    /// What is wrong with what was said of the input: a key does not exist, or parts do not go together. To be read after
+    /// the name of the game.
+    pub(super) fn problem(&self) -> Option<String> {
+        if let Some((action, unknown)) = &self.unknown_key {
+            return Some(format!("names a key that does not exist, in action {action}: {unknown}"));
+        }
         let said =
             [("`.keys`", !self.keys.is_empty()), ("`.axes`", self.axes.is_some()), ("`.input`", self.whole.is_some())];
         let said: Vec<&str> = said.into_iter().filter_map(|(name, is_said)| is_said.then_some(name)).collect();
@@ -74,9 +103,9 @@ impl Input {
 
     /// Names as given, or those of the keys.
     pub(super) fn names(&self) -> Vec<String> {
-        let of_keys = |keys: &Vec<KeyCode>| match keys.as_slice() {
+        let of_keys = |keys: &Vec<VirtualButton>| match keys.as_slice() {
             [] => "nothing".to_owned(),
-            keys => keys.iter().map(|key| format!("{key:?}")).collect::<Vec<_>>().join("+"),
+            keys => keys.iter().map(VirtualButton::to_string).collect::<Vec<_>>().join("+"),
         };
         let is_of_keys = self.names.is_empty() && self.space() == ActionSpace::Discrete(self.keys.len());
         if is_of_keys { self.keys.iter().map(of_keys).collect() } else { self.names.clone() }
@@ -84,10 +113,16 @@ impl Input {
 
     /// What a person's keys mean: for games that are played with nothing else.
     pub(super) fn bindings(&self) -> Option<KeyBindings> {
+        let key = |button: &VirtualButton| match button {
+            VirtualButton::Key(key) => Some(*key),
+            VirtualButton::Mouse(_) | VirtualButton::Gamepad(_) => None,
+        };
+        let sets = self.keys.iter().map(|set| set.iter().map(key).collect::<Option<Vec<KeyCode>>>());
+        let sets: Vec<Vec<KeyCode>> = sets.collect::<Option<_>>()?;
         let is_keys = self.space.is_none()
-            && !self.keys.is_empty()
-            && self.pressed() == Some(VirtualInput::keys(self.keys.clone()));
-        is_keys.then(|| KeyBindings::of_sets(&self.keys))
+            && !sets.is_empty()
+            && self.pressed() == Some(VirtualInput::keys(sets.iter().cloned()));
+        is_keys.then(|| KeyBindings::of_sets(&sets))
     }
 }
 

@@ -6,7 +6,7 @@ use super::{
     demonstrator,
     game::ForeignGame,
     input,
-    kept::Built,
+    kept::Baseline,
     outcome, ready, restart,
     runtime::{Foreign, ForeignCell, LevelSeed},
     sense,
@@ -38,7 +38,7 @@ impl Plugin for ForeignPlugin {
             .add_observer(restart::start)
             .add_observer(restart::announce)
             .init_schedule(BeforeGame)
-            .add_systems(BeforeGame, note_what_is_built);
+            .add_systems(BeforeGame, note_baseline);
         let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
         app.add_systems(
             decide,
@@ -78,9 +78,9 @@ fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
 }
 
 /// Whatever is there now is not the game's.
-fn note_what_is_built(world: &mut World) {
-    let built = Built::of(world);
+fn note_baseline(world: &mut World) {
+    let baseline = Baseline::of(world);
     if let Some(cell) = world.get_resource::<ForeignCell>().cloned() {
-        cell.lock().built = Some(built);
+        cell.lock().baseline = Some(baseline);
     }
 }

@@ -11,16 +11,16 @@ use bevy::{
 
 use bevy_playbot::agent::Agent;
 
-/// A World before its game has begun.
-pub(super) struct Built {
+/// A World before its game has begun: what is there later and was not there then belongs to the game.
+pub(super) struct Baseline {
     entities: EntityHashSet,
     /// Components of entities that never belong to the game, where they exist.
     kept: Vec<TypeId>,
-    /// Components beneath which a scene is loaded by the clock.
+    /// Components of roots of scenes. What is beneath them comes when its file is loaded, and not in a certain tick.
     scenes: Vec<ComponentId>,
 }
 
-impl Built {
+impl Baseline {
     /// To be made before the first systems of the game run.
     pub(super) fn of(world: &mut World) -> Self {
         let kept = vec![
@@ -43,8 +43,8 @@ impl Built {
         all(world).filter(|entity| !self.entities.contains(entity) && !is_kept(*entity)).collect()
     }
 
-    /// Whether an entity of the game is where and when the game wants it: not part of a scene that a file brings, which
-    /// comes when the disk is ready.
+    /// Whether an entity of the game is where and when the game wants it: not part of a scene, which comes when its file is
+    /// loaded.
     pub(super) fn is_placed(&self, world: &World, entity: Entity) -> bool {
         let mut entity = entity;
         while let Some(parent) = world.get::<ChildOf>(entity).map(ChildOf::parent) {

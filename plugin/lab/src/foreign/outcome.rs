@@ -32,7 +32,7 @@ pub(super) fn judge(world: &mut World) {
         let end = end.or(time_is_up.then_some(EpisodeEnd::Truncated));
         let state = match &mut foreign.hash {
             Some(system) => system.demand(world)?,
-            None => foreign.built.as_ref().map_or(0, |built| fingerprint::of_transforms(world, built)),
+            None => foreign.baseline.as_ref().map_or(0, |baseline| fingerprint::of_transforms(world, baseline)),
         };
         Ok((reward, end, state))
     });

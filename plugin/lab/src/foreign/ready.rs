@@ -2,8 +2,11 @@
 
 use bevy::prelude::*;
 
-use super::runtime::{active_agent, with_foreign};
-use bevy_playbot::{control::Control, episode::Episode};
+use super::{
+    restart::leave_loading_out,
+    runtime::{active_agent, with_foreign},
+};
+use bevy_playbot::episode::Episode;
 
 /// Asks the game whether its level is ready. Each restart is given one frame to settle: commands, states and transforms.
 pub(super) fn check(world: &mut World) {
@@ -30,6 +33,9 @@ pub(super) fn check(world: &mut World) {
             }
             return Ok(false);
         }
+        if foreign.ready.is_some() {
+            leave_loading_out(world);
+        }
         // What a reward grows from is its value before the first tick.
         for part in foreign.rewards.iter_mut().filter(|part| part.is_delta) {
             part.last = part.system.run(world)?;
@@ -43,12 +49,11 @@ pub(super) fn check(world: &mut World) {
             }
         }
         Some(false) => {}
-        // The agent was stopped; its level was never played.
+        // The fault has stopped the agent; its level was never played.
         None => {
             if let Some(mut episode) = world.get_mut::<Episode>(agent) {
                 episode.abandon();
             }
-            world.entity_mut(agent).insert(Control::Idle);
         }
     }
 }

@@ -80,8 +80,8 @@ pub(super) fn announce(event: On<EpisodeAhead>, cell: Res<ForeignCell>, mut seed
 
 /// Despawns what the game has spawned, and does again what is done once when a program starts.
 fn start_again(world: &mut World, foreign: &Foreign) {
-    let Some(built) = &foreign.built else { return };
-    for entity in built.spawned(world) {
+    let Some(baseline) = &foreign.baseline else { return };
+    for entity in baseline.spawned(world) {
         // Some have gone along with their parents.
         if let Ok(entity) = world.get_entity_mut(entity) {
             entity.despawn();
@@ -108,5 +108,29 @@ fn set_clock_back(world: &mut World) {
     }
     if let Some(mut clock) = world.get_resource_mut::<Time>() {
         *clock = Time::default();
+    }
+}
+
+/// The clock of the first tick after a level has been waited for, however many frames that took: the game has entered the
+/// level in the frame before, and that counts as the first with a length. The clock goes on at its own speed.
+pub(super) fn leave_loading_out(world: &mut World) {
+    let Some(clock) = world.get_resource::<Time<Virtual>>() else { return };
+    let (frame, mut fresh) = (clock.delta(), Time::new_with(*clock.context()));
+    fresh.advance_by(frame);
+    fresh.advance_by(frame);
+    set_clock_back(world);
+    if let Some(mut clock) = world.get_resource_mut::<Time<Fixed>>() {
+        let step = clock.timestep();
+        clock.accumulate_overstep(frame);
+        while clock.overstep() >= step {
+            clock.discard_overstep(step);
+            clock.advance_by(step);
+        }
+    }
+    if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>() {
+        *clock = fresh;
+    }
+    if let Some(mut clock) = world.get_resource_mut::<Time>() {
+        *clock = fresh.as_generic();
     }
 }

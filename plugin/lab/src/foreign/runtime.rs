@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use bevy::{ecs::schedule::InternedScheduleLabel, prelude::*};
 
 use super::{
-    factory::OwnedSystem,
+    factory::{OwnedSystem, SystemFactory},
     game::ForeignGame,
-    kept::Built,
+    kept::Baseline,
     paths::ObservedPath,
     restart_kind::{Own, Restart},
 };
@@ -68,7 +68,7 @@ pub(super) struct Foreign {
     pub(super) bot: Option<OwnedSystem<ActionValue>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World as it was before the game began.
-    pub(super) built: Option<Built>,
+    pub(super) baseline: Option<Baseline>,
     /// What runs once when a program starts, in its order.
     pub(super) startup: Vec<InternedScheduleLabel>,
     /// Frames since the last restart.
@@ -87,7 +87,7 @@ impl Foreign {
             },
             Restart::Startup | Restart::Rebuild => None,
         };
-        let part = |(system, is_delta): &(super::factory::SystemFactory<f32>, bool)| RewardPart {
+        let part = |(system, is_delta): &(SystemFactory<f32>, bool)| RewardPart {
             system: system.make(),
             is_delta: *is_delta,
             last: None,
@@ -103,7 +103,7 @@ impl Foreign {
             bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
             hash: description.hash.as_ref().map(|system| system.make()),
             game: game.clone(),
-            built: None,
+            baseline: None,
             startup,
             frames: 0,
             has_begun: false,

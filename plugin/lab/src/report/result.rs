@@ -14,7 +14,7 @@ pub struct ResultRow {
     /// Mean of the undiscounted returns.
     #[serde(deserialize_with = "null_is_nan")]
     pub return_mean: f64,
-    /// Standard error of that mean.
+    /// Standard error of that mean, over levels.
     #[serde(deserialize_with = "null_is_nan")]
     pub return_se: f64,
     /// Share of the episodes that succeeded, 0 to 1.

@@ -45,14 +45,14 @@ pub struct TrainingResult {
     pub episodic_return: Option<f64>,
 }
 
-/// A measurement on held-out levels, each played equally often. Standard errors are over episodes, taken as independent.
+/// A measurement on held-out levels, each played equally often. Standard errors are over levels, as in [`EvalSummary`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TestResult {
     /// Episodes.
     pub episodes: u64,
     /// Share of episodes that reached the level's aim.
     pub success: f64,
-    /// Its standard error √(p (1 − p) / n).
+    /// Its standard error.
     pub success_se: f64,
     /// Mean return.
     pub return_mean: f64,
@@ -64,11 +64,10 @@ pub struct TestResult {
 
 impl From<&EvalSummary> for TestResult {
     fn from(summary: &EvalSummary) -> Self {
-        let p = summary.success;
         Self {
             episodes: summary.episodes,
-            success: p,
-            success_se: (p * (1.0 - p) / summary.episodes as f64).sqrt(),
+            success: summary.success,
+            success_se: summary.success_se,
             return_mean: summary.return_mean,
             return_se: summary.return_se,
             length_mean: summary.length_mean,

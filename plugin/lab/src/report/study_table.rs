@@ -19,7 +19,7 @@ impl StudyReport {
         let mut page = format!("# {}: {}\n\n", experiment.game, self.variants().join(", "));
         let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
         page += "![Success over environment steps](curves.svg)\n\n## Each seed\n\n";
-        let _ = write!(page, "± is the standard error over the episodes of a measurement.\n\n{}\n", self.every_seed());
+        let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
         page += "## The experiment\n\n";
         for variant in &experiment.variants {
             let changes = variant.set.iter().map(|set| format!("`{set}`")).collect::<Vec<_>>();

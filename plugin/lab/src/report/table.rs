@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent};
 use super::result::{Rank, ResultRow, ResultTable, rank_key, ranks};
+use super::text_table::{NO_SUCCESS, has_no_success};
 use crate::escape::escape;
 
 /// A table of text.
@@ -87,9 +88,9 @@ fn results(table: &ResultTable) -> String {
     let decimals = decimals_for(all().map(|r| r.return_se));
     let speed = all().any(|r| r.steps_per_s.is_some());
     let mut head = String::from("<tr><th></th><th>Method</th><th>Levels</th>");
-    for (number, name) in
-        [(true, "Episodes"), (true, "Return ± s.e."), (false, ""), (true, "Success"), (true, "Length")]
-    {
+    let hides_success = has_no_success(all());
+    let columns = [(true, "Episodes"), (true, "Return ± s.e."), (false, ""), (true, "Success"), (true, "Length")];
+    for (number, name) in columns.into_iter().filter(|(_, name)| *name != "Success" || !hides_success) {
         let _ = write!(head, "<th{}>{name}</th>", if number { " class=\"number\"" } else { "" });
     }
     head += if speed { "<th class=\"number\">Steps/s</th></tr>" } else { "</tr>" };
@@ -117,7 +118,9 @@ fn results(table: &ResultTable) -> String {
         let _ = write!(body, "<td class=\"number\">{episodes}</td>");
         let _ = write!(body, "<td class=\"number\">{}</td>", mean_and_error(row.return_mean, row.return_se, decimals));
         let _ = write!(body, "<td>{}</td>", bars.draw(row));
-        let _ = write!(body, "<td class=\"number\">{}</td>", percent(row.success));
+        if !hides_success {
+            let _ = write!(body, "<td class=\"number\">{}</td>", percent(row.success));
+        }
         let _ = write!(body, "<td class=\"number\">{}</td>", fixed(row.length_mean, 1));
         if speed {
             let text = row.steps_per_s.map_or(UNKNOWN.to_owned(), |s| fixed(s, 0));
@@ -131,6 +134,9 @@ fn results(table: &ResultTable) -> String {
     let mut key: Vec<String> = rank_key(&ranks, "★", "≈").into_iter().collect();
     if !table.references.is_empty() {
         key.push("rows in italics are references, not measured here".to_owned());
+    }
+    if hides_success {
+        key.push(NO_SUCCESS.to_owned());
     }
     wrapped(&table.caption, &head, &body, (!key.is_empty()).then(|| key.join("; ") + "."))
 }
@@ -205,6 +211,15 @@ mod tests {
         assert!(html.contains("<caption>a &amp; b</caption>"));
         assert!(html.contains("SCORE-PPO (paper) &lt;b&gt;"));
         assert!(html.contains("rows in italics are references"));
+        assert!(html.contains("Success") && !html.contains(NO_SUCCESS));
+    }
+
+    #[test]
+    fn a_game_without_wins_has_no_column_of_them() {
+        let mut rows = sample_rows();
+        rows.iter_mut().for_each(|row| row.success = 0.0);
+        let html = Table::from(ResultTable { rows, ..Default::default() }).to_html();
+        assert!(!html.contains("Success") && !html.contains("0.0%") && html.contains(NO_SUCCESS), "{html}");
     }
 
     #[test]

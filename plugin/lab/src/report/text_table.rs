@@ -5,11 +5,14 @@ use super::result::{Rank, ResultRow, ResultTable, rank_key, ranks};
 use crate::escape::one_line;
 
 const HEADINGS: [&str; 7] = ["method", "split", "episodes", "return", "success", "length", "steps/s"];
+/// The column of successes.
+const SUCCESS: usize = 4;
 /// The first columns are words, the others numbers.
 const WORDS: usize = 2;
 
 /// The rows as an aligned table for the console: the best row of each split is marked with `*`, those
-/// that are not clearly worse with `~`. A column that is unknown in all rows is left out.
+/// that are not clearly worse with `~`. A column that is unknown in all rows is left out, and so is that of successes
+/// where no row has any: most likely the game has none to report.
 ///
 /// Ends with a line feed; without rows it says so.
 pub fn to_text_table(rows: &[ResultRow]) -> String {
@@ -32,8 +35,11 @@ fn render(rows: &[ResultRow], references: &[ResultRow]) -> String {
     let all = || rows.iter().chain(references);
     let decimals = decimals_for(all().map(|r| r.return_se));
     let cells: Vec<[String; 7]> = all().map(|row| cells(row, decimals)).collect();
-    let shown: Vec<usize> =
-        (0..HEADINGS.len()).filter(|&c| c < WORDS || cells.iter().any(|row| row[c] != UNKNOWN)).collect();
+    let hides_success = has_no_success(all());
+    let shown: Vec<usize> = (0..HEADINGS.len())
+        .filter(|&c| c < WORDS || cells.iter().any(|row| row[c] != UNKNOWN))
+        .filter(|&c| c != SUCCESS || !hides_success)
+        .collect();
     let width = |c: usize| cells.iter().map(|row| row[c].chars().count()).fold(HEADINGS[c].len(), usize::max);
     let line = |sign: char, cell: &dyn Fn(usize) -> String| {
         let mut line = format!("{sign} ");
@@ -58,10 +64,22 @@ fn render(rows: &[ResultRow], references: &[ResultRow]) -> String {
     if !references.is_empty() {
         key.push("> reference, not measured here".to_owned());
     }
+    if hides_success {
+        key.push(NO_SUCCESS.to_owned());
+    }
     if !key.is_empty() {
         out += &format!("{}\n", key.join("; "));
     }
     out
+}
+
+/// What stands in place of a column of successes.
+pub(super) const NO_SUCCESS: &str = "no episode was reported as a success";
+
+/// Whether successes are known and there are none.
+pub(super) fn has_no_success<'a>(rows: impl Iterator<Item = &'a ResultRow>) -> bool {
+    let known: Vec<f64> = rows.map(|row| row.success).filter(|success| !success.is_nan()).collect();
+    !known.is_empty() && known.iter().all(|success| *success == 0.0)
 }
 
 fn cells(row: &ResultRow, decimals: usize) -> [String; 7] {
@@ -96,6 +114,18 @@ mod tests {
         ]
         .join("\n");
         assert_eq!(to_text_table(&sample_rows()), expected);
+    }
+
+    #[test]
+    fn a_game_without_wins_has_no_column_of_them() {
+        let mut rows = sample_rows();
+        rows.iter_mut().for_each(|row| row.success = 0.0);
+        let text = to_text_table(&rows);
+        let head = text.lines().next().unwrap_or_default();
+        assert!(!head.contains("success") && !text.contains("0.0%"), "{text}");
+        assert!(text.ends_with("; no episode was reported as a success\n"), "{text}");
+        rows[0].success = 0.5;
+        assert!(to_text_table(&rows).contains("success"));
     }
 
     #[test]

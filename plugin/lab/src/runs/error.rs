@@ -11,11 +11,11 @@ use bevy_playbot::unknown_name::UnknownName;
 #[derive(Debug, Error)]
 pub enum RunsError {
     /// There is no such folder.
-    #[error("there is no folder {}", .0.display())]
+    #[error(
+        "there is no folder {}: name the one that your runs are in, or train one with `playbot train --run {}`",
+        .0.display(), .0.join("first").display()
+    )]
     Missing(PathBuf),
-    /// The folder is not that of a run.
-    #[error("{} is not the folder of a run: it has no run.json; `playbot runs ls` lists runs", .0.display())]
-    NotARun(PathBuf),
     /// No run in the folder or below it.
     #[error("no runs in {}: train one with `playbot train --run {}`", .0.display(), .0.join("first").display())]
     NoRuns(PathBuf),
@@ -38,7 +38,7 @@ pub enum RunsError {
         /// The system's answer.
         source: io::Error,
     },
-    /// The run's description is damaged.
+    /// There is no such run, or its description is damaged.
     #[error(transparent)]
     Run(#[from] RunError),
 }

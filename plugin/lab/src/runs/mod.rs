@@ -20,4 +20,4 @@ pub use find::find_runs;
 pub use group::{RunGroup, group_runs};
 pub use group_statistics::{GroupStatistics, mean_and_spread};
 pub use record::RunRecord;
-pub use settings::{changed_settings, settings};
+pub use settings::{changed_settings, settings, with_defaults};

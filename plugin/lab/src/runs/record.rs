@@ -40,13 +40,6 @@ impl RunRecord {
     ///
     /// [`RunsError`] if the folder is not that of a run or a file of it is damaged.
     pub fn read(path: &Path) -> Result<Self, RunsError> {
-        if !path.is_dir() {
-            return Err(RunsError::Missing(path.into()));
-        }
-        let description = path.join("run.json");
-        if !description.is_file() {
-            return Err(RunsError::NotARun(path.into()));
-        }
         let OpenedRun { run, experiment, info } = RunDir::open(path)?;
         let log = run.metrics_log();
         let modified = |file: &Path| fs::metadata(file).and_then(|data| data.modified()).ok();
@@ -56,7 +49,7 @@ impl RunRecord {
             info,
             curves: RunCurves::read(path)?,
             checkpoints: checkpoint::list(path)?,
-            updated: modified(log.metrics_file()).or_else(|| modified(&description)),
+            updated: modified(log.metrics_file()).or_else(|| modified(&path.join("run.json"))),
         })
     }
 

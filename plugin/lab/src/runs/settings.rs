@@ -13,17 +13,19 @@ pub fn settings(experiment: &Experiment) -> BTreeMap<String, String> {
     found
 }
 
-/// The settings that differ from their defaults; those without a default are not among them.
-pub fn changed_settings(experiment: &Experiment) -> BTreeMap<String, String> {
-    let mut changed = settings(experiment);
+/// The settings of an experiment that another one has not, or not with this value.
+pub fn changed_settings(experiment: &Experiment, base: &Experiment) -> BTreeMap<String, String> {
+    let (mut changed, base) = (settings(experiment), settings(base));
+    changed.retain(|key, value| base.get(key) != Some(value));
+    changed
+}
+
+/// An experiment with the default of every key that has one; game, levels, recordings and steps stay.
+pub fn with_defaults(experiment: &Experiment) -> Experiment {
     let required = ["game", "train", "test", "demos", "steps"];
     let all = json!(experiment);
     let least: Value = required.into_iter().map(|key| (key.to_owned(), all[key].clone())).collect();
-    if let Ok(default) = serde_json::from_value(least) {
-        let default = settings(&default);
-        changed.retain(|key, value| default.get(key) != Some(value));
-    }
-    changed
+    serde_json::from_value(least).unwrap_or_else(|_| experiment.clone())
 }
 
 fn flatten(value: &Value, path: String, found: &mut BTreeMap<String, String>) {
@@ -58,8 +60,9 @@ pub(super) mod tests {
         let experiment = experiment("seed: 7, ppo: (gamma: 0.5)");
         let all = settings(&experiment);
         assert_eq!((all["game"].as_str(), all["train"].as_str(), all["seed"].as_str()), ("coinrun", "hard:0..63", "7"));
-        let changed = changed_settings(&experiment);
+        let changed = changed_settings(&experiment, &with_defaults(&experiment));
         let expected = [("ppo.gamma", "0.5"), ("seed", "7")];
         assert_eq!(changed.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect::<Vec<_>>(), expected);
+        assert!(changed_settings(&experiment, &experiment).is_empty());
     }
 }

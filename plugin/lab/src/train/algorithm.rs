@@ -26,6 +26,9 @@ impl Algorithm {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac, Self::BehaviourCloning];
 
+    /// Those that learn from play, see [`is_trained`](Self::is_trained).
+    pub const TRAINED: [Self; 4] = [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac];
+
     /// Name on the command line, in files and in results.
     pub fn name(self) -> &'static str {
         match self {
@@ -82,5 +85,16 @@ impl TryFrom<String> for Algorithm {
 impl From<Algorithm> for String {
     fn from(algorithm: Algorithm) -> Self {
         algorithm.name().to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn those_that_are_trained_are_all_but_cloning() {
+        let trained: Vec<_> = Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()).collect();
+        assert_eq!(trained, Algorithm::TRAINED);
     }
 }

@@ -111,7 +111,8 @@ fn default_worlds() -> u32 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EvalConfig {
-    /// Episodes on each level; every level is played equally often.
+    /// Episodes on each level; every level is played equally often. More levels tell more than more episodes on the same
+    /// ones.
     pub episodes_per_level: u32,
     /// Take the most probable action instead of drawing one.
     pub greedy: bool,
@@ -119,7 +120,7 @@ pub struct EvalConfig {
 
 impl Default for EvalConfig {
     fn default() -> Self {
-        Self { episodes_per_level: 4, greedy: false }
+        Self { episodes_per_level: 1, greedy: false }
     }
 }
 
@@ -182,6 +183,12 @@ impl Experiment {
     /// Rollouts, and so updates, of the whole training.
     pub fn updates(&self) -> u64 {
         self.steps.div_ceil(self.steps_per_update())
+    }
+
+    /// Environment steps that are trained: [`steps`](Self::steps), rounded up to whole rollouts.
+    pub fn whole_steps(&self) -> u64 {
+        // A rollout of no steps is no experiment that can be run, and no reason to fail here.
+        self.steps.checked_next_multiple_of(self.steps_per_update()).unwrap_or(self.steps)
     }
 
     /// The experiment as RON, all defaults filled in.

@@ -5,10 +5,14 @@ use crate::{experiment_text::ExperimentText, game::Game, games::Games};
 /// Levels to train on, and as many behind them to test on, of a game that names no experiment of its own.
 const LEVELS: u64 = 64;
 
-/// The experiment of a program's first game. A game that has none of its own gets the plainest: SCORE-PPO in its first mode,
-/// from recordings in `demos/` and the game's name.
+/// The experiment of a program's first game, see [`experiment_of`].
 pub fn default_experiment(games: &Games) -> ExperimentText {
-    let game = games.first();
+    experiment_of(games.first())
+}
+
+/// The experiment of a game where none is named. A game that has none of its own gets the plainest: SCORE-PPO in its first
+/// mode, from recordings in `demos/` and the game's name.
+pub fn experiment_of(game: &dyn Game) -> ExperimentText {
     game.experiment().unwrap_or_else(|| ExperimentText {
         origin: format!("the experiment of {}", game.name()).into(),
         text: plainest(game).into(),

@@ -18,6 +18,7 @@ pub mod json_lines;
 pub mod learner;
 mod memory;
 pub mod metrics_log;
+mod missing_run;
 pub mod presets;
 pub(crate) mod progress;
 mod replaced_run;

@@ -26,6 +26,7 @@ use super::{
     config_file::read_experiment,
     learner::TrainedLearner,
     metrics_log::MetricsLog,
+    missing_run::check_is_run,
     progress::Progress,
     replaced_run::ReplacedRun,
     run_lock::RunLock,
@@ -143,8 +144,9 @@ impl RunDir {
     ///
     /// # Errors
     ///
-    /// [`RunError`] if its files are missing or damaged.
+    /// [`RunError::NoRun`] if there is none; another [`RunError`] if its files are damaged.
     pub fn open(path: &Path) -> Result<OpenedRun, RunError> {
+        check_is_run(path)?;
         let experiment = read_experiment(&path.join("experiment.ron"))?;
         let info_path = path.join("run.json");
         let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;

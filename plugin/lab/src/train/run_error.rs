@@ -16,6 +16,14 @@ pub enum RunError {
     /// The folder exists already.
     #[error("{} exists already: choose another --run, go on with --resume, or overwrite with --force", .0.display())]
     Exists(PathBuf),
+    /// There is no run to look at or to go on with.
+    #[error("no run at {}: {advice}", path.display())]
+    NoRun {
+        /// Where it was looked for.
+        path: PathBuf,
+        /// What is there instead, and what to do.
+        advice: String,
+    },
     /// The folder to overwrite is something else.
     #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
     NotARun(PathBuf),

@@ -22,14 +22,17 @@ pub enum TrainError {
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// The algorithm needs a skill model.
-    #[error("{0} needs a skill model: learn one first with `playbot learn-skills`")]
+    #[error(
+        "{0} needs a skill model: learn one with `playbot learn-skills --out skills.safetensors`, and pass it on with \
+         `--skills skills.safetensors`"
+    )]
     NoSkills(Algorithm),
     /// The algorithm does not learn from play.
-    #[error("{0} is not trained: measure its skill model with `playbot eval --skills`")]
+    #[error("{0} is not trained: measure its skill model with `playbot eval --skills FILE`")]
     NotTrained(Algorithm),
     /// The skill model was learned for another game.
     #[error(
-        "the skill model was learned for {} and {model_actions:?}, but `{game}` has {} and {game_actions:?}: learn one \
+        "the skill model was learned for {} and {model_actions}, but `{game}` has {} and {game_actions}: learn one \
          from demonstrations of this game", .model_obs.describe(), .game_obs.describe()
     )]
     ForeignSkills {

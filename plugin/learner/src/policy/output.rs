@@ -92,7 +92,7 @@ impl PolicyOutput {
             (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n => {
                 Ok(gaussian_log_prob(self.head(row), self.stds(row), a))
             }
-            (space, action) => Err(LearnError::Action(format!("{action:?} in {space:?}"))),
+            (space, action) => Err(LearnError::Action(format!("{action:?} among {space}"))),
         }
     }
 

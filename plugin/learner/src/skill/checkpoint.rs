@@ -76,7 +76,11 @@ impl SkillTrainer {
             return Err(file.format(format!("reads {reads}, the demonstrations are {found}")));
         }
         if skill.action_space != dataset.action_space() {
-            return Err(file.format(format!("acts in {:?}, the demonstrations do not", skill.action_space)));
+            return Err(file.format(format!(
+                "acts with {}, the demonstrations with {}",
+                skill.action_space,
+                dataset.action_space()
+            )));
         }
         let nets = SkillNets::stored(&skill, &mut file, &device.plain())?;
         let trainer = Self::with_nets(skill.config, dataset, &nets, header.seed, device);

@@ -1,12 +1,13 @@
-//! Five steps of Adam on one matrix, in four variants.
+//! Steps of Adam on one parameter of any shape, in several variants.
 
 use crate::case::{Case, host};
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::Tensor;
 use playbot_learner::DeviceKind;
 use playbot_learner::nn::{Adam, AdamConfig, NamedGrads, ParamVisitor, Parameters, tracked};
 
+/// All numbers of the parameter in a row: Adam treats each by itself.
 #[derive(Clone)]
-struct One(Tensor<2>);
+struct One(Tensor<1>);
 
 impl Parameters for One {
     fn visit<V: ParamVisitor>(&mut self, _: &str, visitor: &mut V) {
@@ -18,12 +19,12 @@ impl Parameters for One {
 fn golden_adam_steps() {
     let case = Case::load("adam_steps");
     // One gradient of the parameter's shape for each step.
-    let (gradients, shape) = (case.f32s("in.grads"), case.shape("param.p").to_vec());
-    let numbers: usize = shape.iter().product();
-    assert_eq!(case.shape("in.grads")[1..], shape);
+    let (start, gradients) = (case.f32s("param.p"), case.f32s("in.grads"));
+    assert_eq!(case.shape("in.grads")[1..], *case.shape("param.p"));
     let variants = case.hyper("variants").as_object().expect("variants").clone();
     for kind in DeviceKind::ALL {
         let device = kind.plain();
+        let flat = |values: &[f32]| Tensor::<1>::from_floats(values, &device);
         for (variant, hyper) in &variants {
             let config = AdamConfig {
                 beta1: case.number("beta1"),
@@ -32,12 +33,11 @@ fn golden_adam_steps() {
                 weight_decay: hyper["weight_decay"].as_f64().expect("weight decay"),
             };
             let mut adam = Adam::new(config);
-            let mut network = tracked(&One(case.tensor("param.p", &device)));
+            let mut network = tracked(&One(flat(&start)));
             let (mut p, mut m, mut v) = (Vec::new(), Vec::new(), Vec::new());
-            for (step, gradient) in gradients.chunks_exact(numbers).enumerate() {
+            for (step, gradient) in gradients.chunks_exact(start.len()).enumerate() {
                 // The gradient of sum(p * g) is g.
-                let g = Tensor::<2>::from_data(TensorData::new(gradient.to_vec(), shape.clone()), &device);
-                let grads = (network.0.clone() * g).sum().backward();
+                let grads = (network.0.clone() * flat(gradient)).sum().backward();
                 let grads = NamedGrads::read(&mut network, "", &grads).expect("readable");
                 let lr = hyper["lr"][step].as_f64().expect("lr");
                 adam.step(&mut network, "", &grads, lr, 1.0).expect("finite");
@@ -51,4 +51,8 @@ fn golden_adam_steps() {
             case.check(&format!("out.{variant}.v"), &v);
         }
     }
+    // The corrected moments are nowhere to be seen: the parameter shows whether they are right.
+    let hidden = |variant: &String| [format!("out.{variant}.m_hat"), format!("out.{variant}.v_hat")];
+    let hidden: Vec<String> = variants.keys().flat_map(hidden).chain(["bias_correction".to_owned()]).collect();
+    case.finish(&hidden.iter().map(String::as_str).collect::<Vec<_>>());
 }

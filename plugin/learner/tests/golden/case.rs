@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 /// A case, with a record of what was compared.
 pub struct Case {
-    name: String,
+    pub name: String,
     json: Value,
     tensors: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
     checked: RefCell<BTreeSet<String>>,

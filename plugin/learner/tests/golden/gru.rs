@@ -9,8 +9,8 @@ use playbot_learner::rng::Streams;
 fn check(case: &Case, stack: &str, weights: &str, kind: DeviceKind) {
     let device = kind.plain();
     let (inputs, hidden, steps) = (case.dim("I"), case.dim("H"), case.dim("T"));
-    let directions = if weights == "uni" { 1 } else { 2 };
-    let layers = if weights == "bi2" { 2 } else { 1 };
+    let directions = if case.has(&format!("param.{weights}.weight_ih_l0_reverse")) { 2 } else { 1 };
+    let layers = (0..).take_while(|k| case.has(&format!("param.{weights}.weight_ih_l{k}"))).count();
     let mut rng = Streams::new(0).stream("gru", 0);
     let mut gru = Gru::new(inputs, hidden, layers, directions == 2, &mut rng, &device);
     case.fill(&mut gru, "param.", &format!("gru.{weights}"), kind);
@@ -50,6 +50,9 @@ fn check(case: &Case, stack: &str, weights: &str, kind: DeviceKind) {
 #[test]
 fn golden_gru_stack() {
     let case = Case::load("gru_stack");
+    case.assert_fixed("gates", "rows r, z, n");
+    case.assert_fixed("reset_after", true);
+    case.assert_fixed("batch_first", true);
     for kind in DeviceKind::ALL {
         for (stack, weights) in [("uni", "uni"), ("bi", "bi"), ("bi2", "bi2"), ("bi2_h0", "bi2")] {
             check(&case, stack, weights, kind);

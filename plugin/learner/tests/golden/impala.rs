@@ -2,9 +2,7 @@
 
 use crate::case::{Case, host, number};
 use burn::tensor::Tensor;
-use playbot_learner::nn::{
-    ActionBatch, Activation, CnnKind, Dist, ImageNet, NamedGrads, ObsBatch, parameter_count, tracked,
-};
+use playbot_learner::nn::{ActionBatch, CnnKind, Dist, ImageNet, NamedGrads, ObsBatch, parameter_count, tracked};
 use playbot_learner::policy::{Actor, NetShape};
 use playbot_learner::rng::Streams;
 use playbot_learner::{ActionSpace, DeviceKind, ImageShape, StdKind};
@@ -13,6 +11,7 @@ use playbot_learner::{ActionSpace, DeviceKind, ImageShape, StdKind};
 fn actor(case: &Case, device: DeviceKind) -> Actor {
     let [channels, height, width] = case.sizes("image")[..] else { panic!("an image has three sizes") };
     let kind = CnnKind::Impala { channels: case.sizes("channels"), feature: case.dim("feat") };
+    case.assert_fixed("decoder_input", "[skill, feature]");
     let mut rng = Streams::new(0).stream("nets", 0);
     let image = ImageShape { channels, height, width };
     let mut cnn = ImageNet::new(&kind, image, &mut rng, &device.plain()).expect("it fits");
@@ -20,7 +19,7 @@ fn actor(case: &Case, device: DeviceKind) -> Actor {
         obs_dim: cnn.features(),
         latent: case.dim("skill"),
         hidden: case.hidden_layers("param.dec"),
-        activation: Activation::Relu,
+        activation: case.activation(),
     };
     let space = ActionSpace::Discrete(case.dim("K"));
     let mut actor = Actor::new(&shape, space, StdKind::Vector, &mut rng, &device.plain());

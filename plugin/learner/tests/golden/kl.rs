@@ -31,6 +31,7 @@ fn decoder(case: &Case, kind: DeviceKind) -> Dist {
 }
 
 fn check(case: &Case, kinds: &[(&str, ConfidenceKind)]) {
+    case.assert_fixed("legacy_clamp", 100.0);
     for device in DeviceKind::ALL {
         let decoder = decoder(case, device);
         let rows = decoder.clone().to_host().expect("readable");

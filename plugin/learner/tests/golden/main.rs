@@ -4,6 +4,7 @@
 
 mod adam;
 mod case;
+mod fixed;
 mod gae;
 mod generated;
 mod gru;

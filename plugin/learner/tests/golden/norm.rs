@@ -1,7 +1,7 @@
 //! Running normalisation of observations and rewards.
 
 use crate::case::Case;
-use playbot_learner::norm::{ObsNormalizer, RewardNormalizer, RewardReset};
+use playbot_learner::norm::{ObsNormalizer, RewardNormalizer, RewardReset, RunningStats};
 
 fn normalized(normalizer: &ObsNormalizer, rows: &[f32], dim: usize) -> Vec<f32> {
     let stats = normalizer.snapshot();
@@ -14,11 +14,28 @@ fn f32s(values: &[f64]) -> Vec<f32> {
     values.iter().map(|&x| x as f32).collect()
 }
 
+/// Statistics that have seen nothing, as the case has them.
+fn fresh(case: &Case, dim: usize) -> RunningStats {
+    case.assert_fixed("clip", 10.0);
+    case.assert_fixed("eps", 1e-8);
+    RunningStats {
+        mean: vec![case.number("mean_init"); dim],
+        var: vec![case.number("var_init"); dim],
+        count: case.number("count_init"),
+    }
+}
+
+#[test]
+fn statistics_start_with_a_normal_distribution_of_next_to_no_weight() {
+    assert_eq!(RunningStats::new(2), RunningStats { mean: vec![0.0; 2], var: vec![1.0; 2], count: 1e-4 });
+}
+
 #[test]
 fn golden_norm_obs() {
     let case = Case::load("norm_obs");
+    case.assert_fixed("order", "update the statistics, then normalise");
     let dim = case.dim("D");
-    let mut normalizer = ObsNormalizer::new(dim);
+    let mut normalizer = ObsNormalizer { stats: fresh(&case, dim) };
     for i in 0..case.dim("batches") {
         let batch = case.f32s(&format!("in.batch{i}"));
         normalizer.update(&batch);
@@ -35,7 +52,8 @@ fn golden_norm_obs() {
 fn golden_norm_reward() {
     let case = Case::load("norm_reward");
     for (reset, variant) in [(RewardReset::AfterStep, "reset_after"), (RewardReset::SameStep, "reset_same_step")] {
-        check_rewards(&case, RewardNormalizer { reset, ..RewardNormalizer::new(case.number("gamma")) }, variant);
+        let usual = RewardNormalizer::new(case.number("gamma"));
+        check_rewards(&case, RewardNormalizer { reset, stats: fresh(&case, 1), ..usual }, variant);
     }
     case.finish(&[]);
 }

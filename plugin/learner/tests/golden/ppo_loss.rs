@@ -8,6 +8,8 @@ use playbot_learner::ppo::{PpoBatch, normalize_advantages, ppo_loss, ratio_stats
 
 fn check(name: &str) {
     let case = Case::load(name);
+    case.assert_fixed("adv_eps", 1e-8);
+    case.assert_fixed("adv_std", "unbiased");
     for kind in DeviceKind::ALL {
         let device = kind.plain();
         let leaf = |t: Tensor<2>| t.autodiff().require_grad();

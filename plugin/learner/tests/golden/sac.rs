@@ -21,6 +21,7 @@ fn leaf<const D: usize>(tensor: Tensor<D>) -> Tensor<D> {
 #[test]
 fn golden_sac_logprob() {
     let case = Case::load("sac_logprob");
+    case.assert_fixed("eps_inside_log", 1e-6);
     let list = |name: &str| -> Vec<f32> {
         let list = case.hyper(name).as_array().expect("a list");
         list.iter().map(|x| x.as_f64().expect("a number") as f32).collect()
@@ -176,9 +177,11 @@ impl Continuous {
         case.check_number("mean_min_q_actor", -alpha * step.entropy - step.actor_loss);
 
         let (noise, target) = (self.noise("in.noise_alpha"), case.number("target_entropy"));
-        let settings =
-            SacConfig { entropy: EntropyCoef::Auto { initial: 1.0, target_scale: None }, ..Default::default() };
-        assert_eq!(settings.target_entropy(ActionSpace::Continuous(case.dim("A"))), Some(target));
+        let dim = case.dim("A");
+        let entropy = EntropyCoef::Auto { initial: 1.0, target_scale: Some(-target / dim as f64) };
+        let settings = SacConfig { entropy, ..SacConfig::default() };
+        let set = settings.target_entropy(ActionSpace::Continuous(dim)).expect("tuned");
+        assert!((set - target).abs() < 1e-12, "{set}, not {target}");
         let (mut copy, mut adam) = (nets.clone(), Adam::new(still));
         temperature_step(&mut copy, &mut adam, &batch, Some(&noise), target, 0.0).expect("finite");
         case.check_number("alpha_grad", f64::from(adam.moments("log_alpha").expect("updated").0[0]));
@@ -201,12 +204,23 @@ impl Continuous {
 #[test]
 fn golden_sac_update_continuous() {
     let mut case = Case::load("sac_update_continuous");
+    case.assert_fixed("action_scale", 1.0);
+    case.assert_fixed("action_bias", 0.0);
+    case.assert_fixed("eps_inside_log", 1e-6);
+    case.assert_fixed("critic_input", "[obs, action]");
     for kind in DeviceKind::ALL {
         let update = Continuous { case, kind };
         update.run();
         case = update.case;
     }
     case.finish(&[]);
+}
+
+#[test]
+fn the_usual_target_entropy_is_minus_the_number_of_dimensions() {
+    let entropy = EntropyCoef::Auto { initial: 1.0, target_scale: None };
+    let settings = SacConfig { entropy, ..SacConfig::default() };
+    assert_eq!(settings.target_entropy(ActionSpace::Continuous(3)), Some(-3.0));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Whole updates: two epochs of four minibatches, with every loss, the weights after, and Adam's moments.
+//! Whole updates: epochs of minibatches, with every loss, the weights after, and Adam's moments.
 
 use crate::case::{Case, host};
 use burn::tensor::{Tensor, TensorData};
@@ -9,10 +9,13 @@ use playbot_learner::ppo::{
 };
 use playbot_learner::rng::Streams;
 use playbot_learner::score::{TeacherBatch, confidences};
-use playbot_learner::{ActionSpace, Actions, ConfidenceKind, DeviceKind, PpoConfig, ScoreConfig, StdKind};
+use playbot_learner::{ActionSpace, Actions, ConfidenceKind, DeviceKind, KlDirection, PpoConfig, ScoreConfig, StdKind};
 
 fn check(name: &str) {
     let case = Case::load(name);
+    case.assert_fixed("adv_eps", 1e-8);
+    case.assert_fixed("adv_std", "unbiased");
+    case.assert_fixed("actor_input", if case.has("in.skill") { "[skill, obs]" } else { "obs" });
     for kind in DeviceKind::ALL {
         Update::new(&case, kind).run();
     }
@@ -54,9 +57,16 @@ impl<'a> Update<'a> {
         let score = decoder.is_some().then(|| ScoreConfig {
             kl_coef: case.number("kl_coef"),
             confidence: match case.hyper("alpha").as_str() {
-                Some("prob_own_sample") => ConfidenceKind::OwnSample,
+                Some("off") => ConfidenceKind::Off,
+                Some("score_own_sample" | "prob_own_sample") => ConfidenceKind::OwnSample,
                 Some("score_policy_action" | "prob_policy_action") => ConfidenceKind::PolicyAction,
+                Some("density_policy_action") => ConfidenceKind::Density,
                 other => panic!("unknown alpha {other:?}"),
+            },
+            kl_direction: match case.hyper("kl_direction").as_str() {
+                Some("decoder||policy") => KlDirection::DecoderPolicy,
+                Some("policy||decoder") => KlDirection::PolicyDecoder,
+                other => panic!("unknown kl_direction {other:?}"),
             },
             ..ScoreConfig::default()
         });
@@ -80,8 +90,12 @@ impl<'a> Update<'a> {
             ..AdamConfig::default()
         };
         let mut adam = Adam::new(adam);
-        let size = case.dim("minibatch");
-        for (i, rows) in case.indices("in.permutations").chunks_exact(size).enumerate() {
+        let (size, count) = (case.dim("minibatch"), case.number("minibatches") as usize);
+        let permutations = case.indices("in.permutations");
+        let epochs = permutations.chunks_exact(case.shape("in.permutations")[1]);
+        let minibatches: Vec<&[usize]> = epochs.flat_map(|epoch| epoch.chunks(size).take(count)).collect();
+        assert_eq!(case.expected("grad_norm").as_array().map(Vec::len), Some(minibatches.len()));
+        for (i, &rows) in minibatches.iter().enumerate() {
             let batch = self.minibatch(rows);
             if i == 0 {
                 self.check_first_gradients(&batch);

@@ -2,7 +2,7 @@
 
 use crate::case::{Case, host, norm, number};
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionBatch, CnnKind, Dist, NamedGrads, ObsBatch, parameter_count, tracked};
+use playbot_learner::nn::{ActionBatch, Activation, CnnKind, Dist, NamedGrads, ObsBatch, parameter_count, tracked};
 use playbot_learner::rng::Streams;
 use playbot_learner::skill::{SkillForward, SkillNets, skill_loss};
 use playbot_learner::{
@@ -21,9 +21,26 @@ fn observation(case: &Case) -> ObsKind {
     ObsKind::Image(ImageShape { channels, height, width })
 }
 
+/// What the skill model does whatever its settings are.
+fn check_fixed(case: &Case) {
+    if !case.hyper("activation").is_null() {
+        assert_eq!(case.activation(), Activation::Relu, "{}: the library's skill model knows only ReLU", case.name);
+    }
+    case.assert_fixed("legacy_clamp", 100.0);
+    case.assert_fixed("log_std_clamp", vec![-10.0, 2.0]);
+    if is_image(case) {
+        case.assert_fixed("action_scale", 1.0 / (case.dim("K") - 1) as f64);
+    }
+}
+
 fn config(case: &Case) -> SkillConfig {
     let hidden = case.dim("hidden");
-    let std = if case.hyper("head") == "state" { StdKind::State } else { StdKind::Vector };
+    let std = match case.hyper("head").as_str() {
+        Some("state") => StdKind::State,
+        Some("vector") => StdKind::Vector,
+        None if is_image(case) => StdKind::Vector,
+        other => panic!("{}: unknown head {other:?}", case.name),
+    };
     SkillConfig {
         latent: case.dim("latent"),
         window: case.dim("T"),
@@ -42,7 +59,11 @@ fn config(case: &Case) -> SkillConfig {
             CnnKind::default()
         },
         action_input: ActionInput::ScaledIndex,
-        reduction: if case.hyper("reduction") == "legacy" { Reduction::Legacy } else { Reduction::Standard },
+        reduction: match case.hyper("reduction").as_str() {
+            Some("legacy") => Reduction::Legacy,
+            Some("standard") => Reduction::Standard,
+            other => panic!("{}: unknown reduction {other:?}", case.name),
+        },
         ..SkillConfig::default()
     }
 }
@@ -206,6 +227,7 @@ fn is_paper_size(case: &Case) -> bool {
 
 fn check(name: &str) {
     let case = Case::load(name);
+    check_fixed(&case);
     for kind in DeviceKind::ALL {
         let run = Run::new(&case, kind);
         if is_paper_size(&case) {

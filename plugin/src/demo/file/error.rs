@@ -145,7 +145,7 @@ pub enum DemoFault {
     #[error("the episode was not written: {0}")]
     RefusedEpisode(EpisodeFault),
     /// The recording is of another game.
-    #[error("a recording of the game `{found}`, not of `{expected}`")]
+    #[error("a recording of the game `{found}`, not of `{expected}`: choose recordings of `{expected}`")]
     ForeignGame {
         /// Game of the file.
         found: String,

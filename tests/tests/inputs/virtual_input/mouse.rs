@@ -9,7 +9,7 @@ use bevy_playbot::{
     virtual_input::{ActionAxis, InputRoute, VirtualInput},
 };
 
-use super::scripted::{STEP, Script, app_with, frames_of};
+use super::scripted::{STEP, Script, actions, app_with, frames_of};
 
 #[derive(Resource, Default)]
 struct Motions {
@@ -67,4 +67,28 @@ fn a_motion_by_messages_lasts_one_frame() {
         app.update();
     }
     assert_eq!(app.world().resource::<Motions>().frames, [Vec2::new(10.0, 0.0), Vec2::ZERO]);
+}
+
+/// What is wrong when agent 4 has this input, too.
+fn second(input: VirtualInput, other: VirtualInput, script: Vec<ActionValue>) -> String {
+    let (mut app, _) = app_with(InputRoute::Direct, input, script);
+    let second = app.world_mut().spawn((Agent::new(4, other.space()), other, Control::Policy)).id();
+    let fault = app.tick().expect_err("both claim it").to_string();
+    assert_eq!(app.world().get::<Control>(second), Some(&Control::Idle), "only one of them plays on");
+    fault
+}
+
+#[test]
+fn two_agents_that_claim_one_mouse_button_are_a_fault_that_names_both() {
+    let click = |button| VirtualInput::keys([vec![], vec![]]).mouse_buttons([vec![], vec![button]]);
+    let other = click(MouseButton::Left).mouse_buttons([vec![MouseButton::Right]]);
+    let fault = second(click(MouseButton::Right), other, actions(&[0]));
+    assert!(fault.contains("agents 0 and 4 both claim MouseRight"), "{fault}");
+}
+
+#[test]
+fn two_agents_that_claim_one_motion_are_a_fault_that_names_both() {
+    let other = VirtualInput::axes([ActionAxis::mouse_y(1.0), ActionAxis::wheel(1.0)]);
+    let fault = second(mouse(), other, vec![ActionValue::Continuous(vec![0.0, 0.0])]);
+    assert!(fault.contains("agents 0 and 4 both claim WheelY"), "{fault}");
 }

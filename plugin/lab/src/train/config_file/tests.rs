@@ -23,7 +23,7 @@ fn values(text: &str) -> String {
 fn defaults_fill_in() {
     let experiment = good(GOOD);
     assert_eq!(experiment.ppo.gamma, 0.99);
-    assert_eq!(experiment.eval.episodes_per_level, 4);
+    assert_eq!(experiment.eval.episodes_per_level, 1);
     assert_eq!(experiment.check(), Ok(()));
     assert_eq!(good(&experiment.to_ron().expect("Unicode")), experiment, "it reads back as it was");
 }
@@ -115,7 +115,7 @@ fn presets_lie_below_one_another_and_below_the_file() {
     assert_eq!(experiment.steps, 1000, "the file's own");
     assert_eq!((experiment.arenas, experiment.ppo.num_steps), (1, 2048), "the later preset's");
     assert_eq!(experiment.ppo.ent_coef, 0.0, "the later preset's");
-    assert_eq!(experiment.eval.episodes_per_level, 4, "the default");
+    assert_eq!(experiment.eval.episodes_per_level, 1, "the default");
     // The file gives the default of a value that a preset changes: it is the file's all the same.
     let experiment = good(&text.replace("gamma: 0.99", "lr: 0.0005"));
     assert_eq!((experiment.ppo.lr, experiment.ppo.gamma), (0.0005, 0.99));

@@ -1,0 +1,24 @@
+//! Games that play like the corridor, but for what their tests are about.
+
+/// What [`Game`](playbot_lab::prelude::Game) asks of every game, answered as the [`Corridor`](crate::Corridor) does: for
+/// the `impl Game` of a game that adds something to it.
+#[macro_export]
+macro_rules! as_corridor {
+    () => {
+        $crate::as_corridor! {
+            fn name() -> &'static str;
+            fn version() -> u32;
+            fn modes() -> &'static [&'static str];
+            fn tick_hz() -> f64;
+            fn actions() -> ::playbot_lab::prelude::ActionSpace;
+            fn observation() -> ::playbot_lab::prelude::ObservationSpace;
+            fn build(app: &mut ::bevy::prelude::App, mode: &str);
+            fn spawn_agent(world: &mut ::bevy::prelude::World, index: u32) -> ::bevy::prelude::Entity;
+        }
+    };
+    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)+) => {
+        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
+            ::playbot_lab::prelude::Game::$name(&$crate::Corridor, $($argument),*)
+        })+
+    };
+}

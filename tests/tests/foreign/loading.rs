@@ -1,0 +1,51 @@
+//! However long a level takes to load, its first tick finds the same clock.
+
+use std::time::Duration;
+
+use bevy::prelude::*;
+use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+
+/// Frames that the level still takes.
+#[derive(Resource)]
+struct Left(u32);
+
+/// A game whose level takes this many frames, with fixed steps that take three, and an agent that sees the clocks.
+fn slow(frames: u32) -> ForeignGame {
+    let game = move |app: &mut App| {
+        app.insert_resource(Left(frames))
+            .insert_resource(Time::<Fixed>::from_hz(20.0))
+            .add_systems(Update, |mut left: ResMut<Left>| left.0 = left.0.saturating_sub(1));
+    };
+    ForeignGame::new("slow", 1, game)
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["elapsed", "delta", "overstep", "fixed"], |time: Res<Time>, fixed: Res<Time<Fixed>>| {
+            [time.elapsed_secs(), time.delta_secs(), fixed.overstep().as_secs_f32(), fixed.elapsed_secs()]
+        })
+        .time_limit(5)
+        .level(move |mut left: ResMut<Left>| left.0 = frames)
+        .ready(|left: Res<Left>| left.0 == 0)
+}
+
+/// What is seen in each tick of two episodes.
+fn clocks(frames: u32) -> Vec<Vec<f32>> {
+    let (mut world, agents) = build_world(&slow(frames), "default", 0, 0, 1);
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([1, 2])));
+    let tick = |_| {
+        world.tick().expect("sound");
+        world.get::<Observation>(agents[0]).expect("an agent").vector.clone()
+    };
+    (0..10).map(tick).collect()
+}
+
+#[test]
+fn the_first_tick_finds_the_same_clock_however_long_the_level_took() {
+    let quick = clocks(0);
+    let frame = Duration::from_secs_f64(1.0 / 60.0);
+    assert_eq!(quick[0], [(2 * frame).as_secs_f32(), frame.as_secs_f32(), frame.as_secs_f32(), 0.0]);
+    assert_eq!(quick[..5], quick[5..], "in each episode");
+    assert!(quick[4][3] > 0.0, "there are fixed steps");
+    for frames in [1, 2, 5, 37] {
+        assert_eq!(clocks(frames), quick, "{frames} frames");
+    }
+}
