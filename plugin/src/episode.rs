@@ -241,7 +241,10 @@ pub(crate) fn begin_episodes(
 }
 
 /// Counts the tick and its reward.
-pub(crate) fn judge(mut agents: Query<(&Agent, &Control, &mut Reward, &mut Episode)>, mut faults: ResMut<Faults>) {
+pub(crate) fn count_tick_and_reward(
+    mut agents: Query<(&Agent, &Control, &mut Reward, &mut Episode)>,
+    mut faults: ResMut<Faults>,
+) {
     for (agent, control, mut reward, mut episode) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;

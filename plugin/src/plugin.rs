@@ -123,7 +123,7 @@ fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
         schedule,
         (
-            (episode::judge, skill_prior::count_down_skills).chain().in_set(PlaybotSystems::Judge),
+            (episode::count_tick_and_reward, skill_prior::count_down_skills).chain().in_set(PlaybotSystems::Judge),
             (demo::recorder::record_ticks, demo::replay::check_replays).chain().in_set(PlaybotSystems::Record),
             episode::end_episodes.in_set(PlaybotSystems::Reset),
         ),

@@ -7,7 +7,7 @@ use playbot_lab::{
     prelude::*,
     train::{
         Experiment, Trainer,
-        checkpoint::Which,
+        checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir, RunInfo},
     },
 };
@@ -51,7 +51,7 @@ pub fn last_success_rate(mut trainer: Trainer) -> Option<f64> {
 
 /// What a run has written: its metrics, and learner and arenas of its last checkpoint.
 pub fn written(folder: &Path) -> [Vec<u8>; 3] {
-    let last = RunDir::open(folder).expect("a run").run.checkpoint(Which::Last).expect("saved");
+    let last = RunDir::open(folder).expect("a run").run.checkpoint(CheckpointChoice::Last).expect("saved");
     [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
         .map(|path| std::fs::read(path).expect("written"))
 }

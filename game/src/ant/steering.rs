@@ -25,15 +25,15 @@ pub fn key_bindings() -> KeyBindings {
     KeyBindings::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; JOINTS]), help)
 }
 
-/// Something that holds an agent's ant.
-pub trait HoldsAnt: Component {
+/// A component that holds an agent's ant.
+pub trait AntComponent: Component {
     /// Where the ant is and how it moves.
     fn state(&self) -> AntState;
 }
 
 /// Walks for people in the direction of their keys. Runs after [`PlaybotSystems::Decide`], when the keyboard has written an
 /// action that does nothing, in apps with a keyboard.
-pub fn steer<C: HoldsAnt>(
+pub fn steer<C: AntComponent>(
     keys: Res<ButtonInput<KeyCode>>,
     order: Res<AgentOrder>,
     mut ants: Query<(&Control, &Episode, &C, &mut Action), With<KeyBindings>>,

@@ -7,7 +7,7 @@ use playbot_lab::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState, steering::HoldsAnt};
+use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState, steering::AntComponent};
 
 /// How near a goal is near enough, in metres.
 pub const GOAL_RADIUS: f32 = 0.5;
@@ -112,7 +112,7 @@ impl Walker {
     }
 }
 
-impl HoldsAnt for Walker {
+impl AntComponent for Walker {
     fn state(&self) -> AntState {
         self.body.state()
     }

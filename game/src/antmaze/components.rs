@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 
 use super::{level::AntMazeLevel, mode::AntMazeMode};
-use crate::ant::{AntBody, AntState, steering::HoldsAnt};
+use crate::ant::{AntBody, AntState, steering::AntComponent};
 
 /// Mode in which levels are made.
 #[derive(Resource, Clone, Debug, PartialEq, Reflect)]
@@ -25,7 +25,7 @@ pub struct InMaze(pub Arc<AntMazeLevel>);
 #[reflect(Component)]
 pub struct MazeAnt(pub AntBody);
 
-impl HoldsAnt for MazeAnt {
+impl AntComponent for MazeAnt {
     fn state(&self) -> AntState {
         self.0.state()
     }

@@ -33,7 +33,7 @@ pub(super) fn start_episode(
 /// Replaces whatever is in the arena by this level, with the player at its start.
 pub fn build(commands: &mut Commands, arena: Entity, player: Entity, level: Arc<Level>) {
     commands.entity(player).insert((PlayerBody(Body::player()), PlayerMemory(PlayerState::default())));
-    commands.entity(arena).despawn_related::<super::components::Inhabitants>();
+    commands.entity(arena).despawn_related::<super::components::ArenaEntities>();
     for spawn in &level.spawns {
         match *spawn {
             Spawn::Saw(cell) => commands.spawn((Saw, ArenaBody(Body::block(cell)), InArena(arena))),

@@ -20,7 +20,7 @@ pub struct CoinRunMode(pub Mode);
 #[derive(Component, Debug, Reflect)]
 #[reflect(from_reflect = false)]
 #[reflect(Component)]
-#[require(Inhabitants)]
+#[require(ArenaEntities)]
 pub struct Arena {
     /// The level as it was generated.
     #[reflect(ignore)]
@@ -38,14 +38,14 @@ pub struct Tiles(pub TileGrid);
 /// The arena something is in, the player excepted: it stays when the level changes.
 #[derive(Component, Debug, Reflect)]
 #[reflect(Component)]
-#[relationship(relationship_target = Inhabitants)]
+#[relationship(relationship_target = ArenaEntities)]
 pub struct InArena(pub Entity);
 
 /// Everything in an arena that goes with its level, in the order in which it was made.
 #[derive(Component, Debug, Default, Reflect)]
 #[reflect(Component)]
 #[relationship_target(relationship = InArena, linked_spawn)]
-pub struct Inhabitants(Vec<Entity>);
+pub struct ArenaEntities(Vec<Entity>);
 
 /// The agent's body and what it remembers between steps. Belongs to the entity with the
 /// [`Agent`](bevy_playbot::agent::Agent).
@@ -66,7 +66,7 @@ pub struct PlayerMemory(pub PlayerState);
 #[reflect(Component)]
 pub struct PlaysIn(pub Entity);
 
-/// Position, velocity and size of an inhabitant.
+/// Position, velocity and size of something in an arena.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]

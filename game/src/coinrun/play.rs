@@ -6,7 +6,7 @@ use playbot_lab::prelude::*;
 use super::{
     Outcome,
     components::{
-        Arena, ArenaBody, Crate, Enemy, Inhabitants, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
+        Arena, ArenaBody, ArenaEntities, Crate, Enemy, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
     },
     rules::{Body, COIN_REWARD, begin_step, hash_state, move_player, patrol, touch},
 };
@@ -17,13 +17,13 @@ pub const NOTHING: u8 = 4;
 /// Everything that lives in arenas, and how to find it.
 #[derive(SystemParam)]
 pub(super) struct Arenas<'w, 's> {
-    arenas: Query<'w, 's, (&'static Arena, &'static Tiles, &'static Inhabitants)>,
+    arenas: Query<'w, 's, (&'static Arena, &'static Tiles, &'static ArenaEntities)>,
     bodies: Query<'w, 's, (&'static mut ArenaBody, Has<Crate>, Has<Saw>, Has<Enemy>)>,
 }
 
 /// Bodies of one arena by kind, each in the order in which they were made. Reused from arena to arena.
 #[derive(Default)]
-pub(super) struct Gathered {
+pub(super) struct ArenaBodies {
     crates: Vec<Body>,
     saws: Vec<Body>,
     enemies: Vec<Body>,
@@ -31,13 +31,13 @@ pub(super) struct Gathered {
 }
 
 impl Arenas<'_, '_> {
-    fn gather(&self, arena: Entity, into: &mut Gathered) -> Option<(&Arena, &Tiles)> {
-        let (arena, tiles, inhabitants) = self.arenas.get(arena).ok()?;
+    fn gather(&self, arena: Entity, into: &mut ArenaBodies) -> Option<(&Arena, &Tiles)> {
+        let (arena, tiles, entities) = self.arenas.get(arena).ok()?;
         into.crates.clear();
         into.saws.clear();
         into.enemies.clear();
         into.enemy_entities.clear();
-        for entity in inhabitants.iter() {
+        for entity in entities.iter() {
             match self.bodies.get(entity) {
                 Ok((body, true, ..)) => into.crates.push(body.0),
                 Ok((body, _, true, _)) => into.saws.push(body.0),
@@ -51,8 +51,8 @@ impl Arenas<'_, '_> {
         Some((arena, tiles))
     }
 
-    fn write_enemies(&mut self, gathered: &Gathered) {
-        for (&entity, body) in gathered.enemy_entities.iter().zip(&gathered.enemies) {
+    fn write_enemies(&mut self, bodies: &ArenaBodies) {
+        for (&entity, body) in bodies.enemy_entities.iter().zip(&bodies.enemies) {
             if let Ok((mut enemy, ..)) = self.bodies.get_mut(entity) {
                 enemy.0 = *body;
             }
@@ -74,15 +74,15 @@ pub(super) fn play(
         &mut LastOutcome,
     )>,
     mut arenas: Arenas,
-    mut gathered: Local<Gathered>,
+    mut bodies: Local<ArenaBodies>,
 ) {
     for (control, action, plays_in, mut episode, mut body, mut memory, mut reward, mut hash, mut last) in &mut players {
         if !control.is_active() || !episode.is_running() {
             continue;
         }
-        let Some((arena, tiles)) = arenas.gather(plays_in.0, &mut gathered) else { continue };
+        let Some((arena, tiles)) = arenas.gather(plays_in.0, &mut bodies) else { continue };
         let (player, memory) = (&mut body.0, &mut memory.0);
-        let Gathered { crates, saws, enemies, .. } = &mut *gathered;
+        let ArenaBodies { crates, saws, enemies, .. } = &mut *bodies;
         let action = action.discrete().and_then(|index| u8::try_from(index).ok()).unwrap_or(NOTHING);
         let step = begin_step(player, memory, &tiles.0, action);
         for enemy in enemies.iter_mut() {
@@ -94,7 +94,7 @@ pub(super) fn play(
         hash.0 = hash_state(player, enemies.iter(), steps);
         last.0 = outcome;
         finish(outcome, &mut episode, &mut reward);
-        arenas.write_enemies(&gathered);
+        arenas.write_enemies(&bodies);
     }
 }
 
@@ -115,21 +115,21 @@ fn finish(outcome: Option<Outcome>, episode: &mut Episode, reward: &mut Reward) 
 pub(super) fn observe(
     mut players: Query<(&Episode, &PlaysIn, &PlayerBody, &PlayerMemory, &mut Observation), With<VectorSensor>>,
     arenas: Arenas,
-    mut gathered: Local<Gathered>,
+    mut bodies: Local<ArenaBodies>,
 ) {
     for (episode, plays_in, body, memory, mut observation) in &mut players {
         if !episode.is_running() {
             continue;
         }
-        let Some((arena, tiles)) = arenas.gather(plays_in.0, &mut gathered) else { continue };
+        let Some((arena, tiles)) = arenas.gather(plays_in.0, &mut bodies) else { continue };
         let scene = super::view::Scene {
             tiles: &tiles.0,
             player: &body.0,
             memory: memory.0,
             coin: arena.level.coin,
-            crates: &gathered.crates,
-            saws: &gathered.saws,
-            enemies: &gathered.enemies,
+            crates: &bodies.crates,
+            saws: &bodies.saws,
+            enemies: &bodies.enemies,
         };
         scene.fill(&mut observation.vector);
     }

@@ -42,11 +42,11 @@ pub(super) fn play(
         let steps = episode.tick + 1;
         hash.0 = hash_state(ball, steps);
         paid.add(reward(ball.position, level.goal(), mode.sparse));
-        judge(mode, is_at_goal(ball.position, level.goal()), steps, &mut episode);
+        end_if_over(mode, is_at_goal(ball.position, level.goal()), steps, &mut episode);
     }
 }
 
-fn judge(mode: &Maze2dMode, at_goal: bool, steps: u32, episode: &mut Episode) {
+fn end_if_over(mode: &Maze2dMode, at_goal: bool, steps: u32, episode: &mut Episode) {
     if at_goal {
         episode.reach();
         if mode.end_at_goal {

@@ -60,15 +60,15 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.arenas == 0 || args.threads == 0 || !args.arenas.is_multiple_of(args.threads as u32) {
         return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
     }
-    let all: Vec<_> = games.iter().flat_map(|game| cases(game)).collect();
-    let wanted: Vec<_> = all.iter().filter(|(name, ..)| name.contains(&args.case)).collect();
+    let all: Vec<_> = games.iter().flat_map(cases).collect();
+    let wanted: Vec<_> = all.iter().filter(|case| case.name.contains(&args.case)).collect();
     if wanted.is_empty() {
-        let names: Vec<_> = all.iter().map(|(name, ..)| name.as_str()).collect();
+        let names: Vec<_> = all.iter().map(|case| case.name.as_str()).collect();
         return Err(CliError::Usage(format!("no case is called `{}`; cases: {}", args.case, names.join(", "))));
     }
-    for (name, game, case) in wanted {
-        let measure = if case.train { train } else { simulate };
-        let measured = match measure(*game, case.mode, case.observation, &args, games) {
+    for Case { name, game, benchmark } in wanted {
+        let measure = if benchmark.train { train } else { simulate };
+        let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
             Err(CliError::Vision(error)) if args.case.is_empty() => {
                 tell!("{name}: {error}");
                 continue;
@@ -91,9 +91,22 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// The measurements of a game: their names, the game that is played, and how.
-fn cases(game: &dyn Game) -> Vec<(String, &dyn Game, Benchmark)> {
-    let of = |case: Benchmark| (case.name(game.name()), game.benchmarked(&case).unwrap_or(game), case);
+/// One measurement.
+struct Case<'a> {
+    name: String,
+    /// The game that is played.
+    game: &'a dyn Game,
+    /// How it is played.
+    benchmark: Benchmark,
+}
+
+/// The measurements of a game.
+fn cases(game: &dyn Game) -> Vec<Case<'_>> {
+    let of = |benchmark: Benchmark| Case {
+        name: benchmark.name(game.name()),
+        game: game.benchmarked(&benchmark).unwrap_or(game),
+        benchmark,
+    };
     game.benchmarks().into_iter().map(of).collect()
 }
 

@@ -22,11 +22,11 @@ use super::{
   playbot config presets skill-paper")]
 pub struct Args {
     #[command(subcommand)]
-    what: What,
+    verb: Verb,
 }
 
 #[derive(Subcommand)]
-enum What {
+enum Verb {
     /// Print the experiment with all its values, as it would be run, in RON.
     Show {
         #[command(flatten)]
@@ -53,13 +53,13 @@ fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Resul
 }
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
-    match args.what {
-        What::Show { from } => {
+    match args.verb {
+        Verb::Show { from } => {
             let experiment = from.load(games, [])?;
             check(&experiment, &from, games)?;
             print_line(experiment.to_ron().map_err(|error| CliError::Usage(error.to_string()))?)?;
         }
-        What::Presets { name, json } => {
+        Verb::Presets { name, json } => {
             let chosen_by_name = name.is_some();
             let chosen = match &name {
                 Some(name) => vec![Preset::find(name)?],

@@ -15,7 +15,7 @@ use playbot_lab::{
     split::LevelSplit,
     train::{
         Experiment,
-        checkpoint::Which,
+        checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
 };
@@ -50,7 +50,7 @@ pub struct Args {
     run: Vec<PathBuf>,
     /// Checkpoint of the runs: last, best (highest return in training), or its number of environment steps.
     #[arg(long, default_value = "last")]
-    checkpoint: Which,
+    checkpoint: CheckpointChoice,
     /// Skill model: measures behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Vec<PathBuf>,

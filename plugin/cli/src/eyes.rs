@@ -126,8 +126,8 @@ fn check_picture(game: &dyn Game) -> Result<(), CliError> {
 
 /// One World for each eye, played alike; every frame of both is kept until its level is over.
 fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args) -> Result<Vec<Compared>, CliError> {
-    let mut raster = Looker::new(game, levels, args.size, ObservationKind::Raster)?;
-    let mut camera = Looker::new(game, levels, args.size, ObservationKind::Camera)?;
+    let mut raster = SensorWorld::new(game, levels, args.size, ObservationKind::Raster)?;
+    let mut camera = SensorWorld::new(game, levels, args.size, ObservationKind::Camera)?;
     let bar = progress::bar("comparing", levels.len(), "levels");
     let (mut compared, mut level): (Vec<Compared>, Vec<Compared>) = (Vec::new(), Vec::new());
     while let (Some(by_raster), Some(by_camera)) = (raster.tick()?, camera.tick()?) {
@@ -167,12 +167,12 @@ struct Seen {
 }
 
 /// A World with one agent that plays the levels in turn.
-struct Looker {
+struct SensorWorld {
     world: World,
     agent: Entity,
 }
 
-impl Looker {
+impl SensorWorld {
     fn new(game: &dyn Game, levels: &LevelSplit, size: u32, kind: ObservationKind) -> Result<Self, CliError> {
         let observation_config =
             ObservationConfig { kind, image: ImageOptions { width: size, height: size, ..default() } };

@@ -14,7 +14,7 @@ use playbot_lab::{
     game::Game,
     train::{
         Algorithm, Experiment, TrainedLearner,
-        checkpoint::Which,
+        checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
 };
@@ -37,7 +37,7 @@ pub struct PlayerArgs {
     bot: Option<String>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
     #[arg(long, default_value = "last", requires = "run")]
-    checkpoint: Which,
+    checkpoint: CheckpointChoice,
     /// The policy takes its most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
@@ -102,7 +102,7 @@ impl Chosen {
         run: &RunDir,
         experiment: &Experiment,
         algorithm: Algorithm,
-        checkpoint: Which,
+        checkpoint: CheckpointChoice,
         draw: ActionDraw,
         device: DeviceKind,
     ) -> Result<Self, CliError> {

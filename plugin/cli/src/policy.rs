@@ -10,7 +10,7 @@ use playbot_lab::{
     policy_export::{Provenance, export_policy, policy_file},
     train::{
         Experiment, TrainedLearner,
-        checkpoint::Which,
+        checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
 };
@@ -62,7 +62,7 @@ struct Export {
     run: Option<PathBuf>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
     #[arg(long, default_value = "last", conflicts_with = "skills")]
-    checkpoint: Which,
+    checkpoint: CheckpointChoice,
     /// Skill model: exports behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Option<PathBuf>,
@@ -88,7 +88,7 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
     }
     prepare(&args.out)?;
-    let (game, experiment, file) = match (&args.run, &args.skills) {
+    let PolicySource { game, experiment, file } = match (&args.run, &args.skills) {
         (Some(run), _) => from_run(run, args.checkpoint, games)?,
         (None, Some(skills)) => from_skills(skills, &args.from, games)?,
         (None, None) => return Err(CliError::Usage("nothing to export: name a --run or a --skills file".to_owned())),
@@ -104,12 +104,17 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-type Exported<'a> = (&'a dyn Game, Experiment, PolicyFile);
+/// A policy to export, and what it was trained by.
+struct PolicySource<'a> {
+    game: &'a dyn Game,
+    experiment: Experiment,
+    file: PolicyFile,
+}
 
-fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<'a>, CliError> {
+fn from_run<'a>(path: &Path, choice: CheckpointChoice, games: &'a Games) -> Result<PolicySource<'a>, CliError> {
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
     let game = games.of_file(Artifact::Run, path, &experiment.game)?;
-    let checkpoint = run.checkpoint(which)?;
+    let checkpoint = run.checkpoint(choice)?;
     let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
     let training = format!(
         "{} of {} steps on {}, seed {}",
@@ -120,10 +125,10 @@ fn from_run<'a>(path: &Path, which: Which, games: &'a Games) -> Result<Exported<
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
     file.card.game_version = info.game_version;
-    Ok((game, experiment, file))
+    Ok(PolicySource { game, experiment, file })
 }
 
-fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Result<Exported<'a>, CliError> {
+fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Result<PolicySource<'a>, CliError> {
     let experiment = from.load(games, [])?;
     let game = open::game(games, from, &experiment)?;
     let model = SkillModel::load(path, DeviceKind::default())?;
@@ -136,7 +141,7 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     let observation_config = check_skills(path, &model, game, from, games)?;
     experiment.check_train(game)?;
     let file = policy_file(game, &observation_config, model.policy(), Some(cloning_skills(&model, &experiment)), about);
-    Ok((game, experiment, file))
+    Ok(PolicySource { game, experiment, file })
 }
 
 /// What trained a policy: playbot, whatever the game is, which has a version of its own in the card.

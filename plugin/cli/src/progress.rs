@@ -17,9 +17,9 @@ static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 /// Time between two plain lines.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// What is told in plain lines.
-static TOLD: Mutex<Vec<Told>> = Mutex::new(Vec::new());
-static TELLER: Once = Once::new();
+/// What is reported in plain lines.
+static TEXT_PROGRESS: Mutex<Vec<TextProgress>> = Mutex::new(Vec::new());
+static REPORTER: Once = Once::new();
 
 /// A bar with a title, a count, the time left and room for a message. A length that grows with the position says nothing.
 pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
@@ -28,8 +28,8 @@ pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     let bar = BARS.add(ProgressBar::new(length)).with_style(style.with_key("left", left).progress_chars("=> "));
     bar.enable_steady_tick(Duration::from_millis(250));
     if !stderr().is_terminal() {
-        told().push(Told { title: title.to_owned(), unit: unit.to_owned(), bar: bar.downgrade() });
-        TELLER.call_once(|| drop(thread::spawn(tell)));
+        text_progress().push(TextProgress { title: title.to_owned(), unit: unit.to_owned(), bar: bar.downgrade() });
+        REPORTER.call_once(|| drop(thread::spawn(report)));
     }
     bar
 }
@@ -45,14 +45,14 @@ fn describe_left(left: Duration) -> String {
     if left < Duration::from_secs(1) { String::new() } else { format!("{:#} left", HumanDuration(left)) }
 }
 
-/// A bar that nobody sees, and how it is spoken of.
-struct Told {
+/// A bar that nobody sees, whose progress is reported in lines.
+struct TextProgress {
     title: String,
     unit: String,
     bar: WeakProgressBar,
 }
 
-impl Told {
+impl TextProgress {
     /// Where the work is, as `record: 1200 of 20000 steps`; `None` if it is over.
     fn line(&self) -> Option<String> {
         let bar = self.bar.upgrade().filter(|bar| !bar.is_finished())?;
@@ -73,17 +73,17 @@ impl Told {
     }
 }
 
-fn told() -> MutexGuard<'static, Vec<Told>> {
-    TOLD.lock().unwrap_or_else(PoisonError::into_inner)
+fn text_progress() -> MutexGuard<'static, Vec<TextProgress>> {
+    TEXT_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Tells of all work that goes on, again and again.
-fn tell() {
+/// Reports all work that goes on, again and again.
+fn report() {
     loop {
         thread::park_timeout(PAUSE);
         let mut lines = String::new();
-        told().retain(|told| {
-            let line = told.line();
+        text_progress().retain(|progress| {
+            let line = progress.line();
             line.iter().for_each(|line| lines.extend([line, "\n"]));
             line.is_some()
         });
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn words(bar: &ProgressBar) -> Option<String> {
-        Told { title: "record".to_owned(), unit: "steps".to_owned(), bar: bar.downgrade() }.line()
+        TextProgress { title: "record".to_owned(), unit: "steps".to_owned(), bar: bar.downgrade() }.line()
     }
 
     #[test]

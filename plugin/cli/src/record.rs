@@ -11,7 +11,7 @@ use super::{
     defaults::{first_levels, usual_held_out},
     error::{CliError, Outcome},
     interrupt, progress,
-    recording::Existing,
+    recording::OverwriteArgs,
 };
 
 /// Record the game's demonstrator.
@@ -56,7 +56,7 @@ pub struct Args {
     #[arg(long)]
     observations: bool,
     #[command(flatten)]
-    existing: Existing,
+    overwrite: OverwriteArgs,
 }
 
 /// The last of the levels from 0 that are recorded where none are named.
@@ -88,8 +88,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         steps: args.steps,
         keep_observations: args.observations,
     };
-    let writer = args.existing.open(&args.out, plan.header(game))?;
-    let (mut world, agent) = plan.stage(game, writer);
+    let writer = args.overwrite.open(&args.out, plan.header(game))?;
+    let (mut world, agent) = plan.build_world(game, writer);
     let finished = play(&mut world, agent, count, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
@@ -103,13 +103,13 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return Ok(Outcome::Pass);
     }
     let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
-    let rest = Rest { level, steps, left_out };
-    tell!("stopped, so the recording is incomplete: {}", rest.how_to_go_on(&args, &levels));
+    let stopped = StoppedRecording { level, steps, left_out };
+    tell!("stopped, so the recording is incomplete: {}", stopped.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
 }
 
 /// Where a recording was stopped.
-struct Rest {
+struct StoppedRecording {
     /// The level that was being played, unless every level has been played already.
     level: Option<u64>,
     /// Steps that this call has recorded.
@@ -118,7 +118,7 @@ struct Rest {
     left_out: Option<LevelSplit>,
 }
 
-impl Rest {
+impl StoppedRecording {
     /// What is to be changed in the call. Each call begins with the first of its levels, counts its own steps, and draws
     /// the same noise from the same seed.
     fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {

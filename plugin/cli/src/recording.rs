@@ -8,7 +8,7 @@ use super::{error::CliError, output::make_folder_of};
 
 /// What becomes of a recording that exists.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
-pub struct Existing {
+pub struct OverwriteArgs {
     /// Add to a recording that exists.
     #[arg(long, conflicts_with = "force")]
     append: bool,
@@ -17,7 +17,7 @@ pub struct Existing {
     force: bool,
 }
 
-impl Existing {
+impl OverwriteArgs {
     /// Opens the file, and makes the folder it lies in.
     ///
     /// # Errors

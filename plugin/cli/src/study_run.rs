@@ -16,7 +16,7 @@ use playbot_lab::{
     split::LevelSplit,
     train::{
         Experiment, Trainer,
-        checkpoint::Which,
+        checkpoint::CheckpointChoice,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
         run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, is_unstarted, write_atomically},
         run_lock::RunLock,
@@ -49,18 +49,35 @@ pub struct Runner<'a> {
     /// Skill models that this process has learned already.
     learned: BTreeSet<PathBuf>,
     /// The recordings that were read last, and what they are.
-    demos: Option<(Recordings, Dataset)>,
+    demos: Option<(RecordingsKey, Dataset)>,
 }
 
-/// Game, path, the levels that must not be among them, what is seen, and how many steps at most.
-type Recordings = (String, PathBuf, LevelSplit, ObservationConfig, Option<u64>);
+/// What the contents of a dataset depend on.
+#[derive(PartialEq)]
+struct RecordingsKey {
+    game: String,
+    path: PathBuf,
+    /// Levels that must not be among them.
+    held_out: LevelSplit,
+    observation_config: ObservationConfig,
+    /// How many steps at most.
+    steps: Option<u64>,
+}
 
 /// The folder of a run, locked.
-enum Place {
+enum RunFolder {
     /// What is there is gone on with.
     Begun(RunDir),
     /// What is there, if anything, is replaced.
     New(RunLock),
+}
+
+/// A run whose training is over.
+struct TrainedRun {
+    dir: RunDir,
+    player: Player,
+    training: Option<TrainingResult>,
+    curve: SuccessCurve,
 }
 
 /// What came of a run, or `None` after Ctrl-C.
@@ -85,9 +102,10 @@ impl<'a> Runner<'a> {
         }
         fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
         let lock = RunLock::take(&folder)?;
-        let dir = if is_saved { Place::Begun(RunDir::open_with(lock)?.run) } else { Place::New(lock) };
+        let dir = if is_saved { RunFolder::Begun(RunDir::open_with(lock)?.run) } else { RunFolder::New(lock) };
         // Nobody else writes there until the result is written.
-        let Some((_dir, player, training, curve)) = self.player(game, run, dir, title, on_step)? else {
+        let Some(TrainedRun { dir: _dir, player, training, curve }) = self.player(game, run, dir, title, on_step)?
+        else {
             return Ok(None);
         };
         let experiment = &run.experiment;
@@ -175,13 +193,13 @@ impl<'a> Runner<'a> {
         &mut self,
         game: &dyn Game,
         run: &StudyRun,
-        place: Place,
+        run_folder: RunFolder,
         title: &str,
         mut on_step: impl FnMut(u64),
-    ) -> Result<Option<(RunDir, Player, Option<TrainingResult>, SuccessCurve)>, CliError> {
+    ) -> Result<Option<TrainedRun>, CliError> {
         let experiment = &run.experiment;
         let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
-        let begun = matches!(&place, Place::Begun(dir) if dir.checkpoint(Which::Last).is_ok());
+        let begun = matches!(&run_folder, RunFolder::Begun(dir) if dir.checkpoint(CheckpointChoice::Last).is_ok());
         let skills = match experiment.algorithm.needs_skills() && !begun {
             true => match self.skills(game, run)? {
                 Some(skills) => Some(skills),
@@ -189,12 +207,13 @@ impl<'a> Runner<'a> {
             },
             false => None,
         };
-        let dir = match place {
-            Place::Begun(dir) => dir,
-            Place::New(lock) => self.begin(run, lock)?,
+        let dir = match run_folder {
+            RunFolder::Begun(dir) => dir,
+            RunFolder::New(lock) => self.begin(run, lock)?,
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
-            return Ok(Some((dir, cloning(skills, experiment, draw), None, Vec::new())));
+            let player = cloning(skills, experiment, draw);
+            return Ok(Some(TrainedRun { dir, player, training: None, curve: Vec::new() }));
         }
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
@@ -205,9 +224,9 @@ impl<'a> Runner<'a> {
             return Ok(None);
         }
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
-        let training = training_result(dir.path(), experiment, trainer.steps())?;
+        let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
         let curve = success_curve(dir.path())?;
-        Ok(Some((dir, player, Some(training), curve)))
+        Ok(Some(TrainedRun { dir, player, training, curve }))
     }
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
@@ -237,11 +256,17 @@ impl<'a> Runner<'a> {
     fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
         let Experiment { game: name, test, demo_steps, .. } = experiment;
         let path = experiment::resolve(experiment.recordings()?);
-        let key = (name.clone(), path, test.clone(), experiment.observation_config(), *demo_steps);
+        let key = RecordingsKey {
+            game: name.clone(),
+            path,
+            held_out: test.clone(),
+            observation_config: experiment.observation_config(),
+            steps: *demo_steps,
+        };
         match &self.demos {
             Some((known, dataset)) if *known == key => Ok(dataset.clone()),
             _ => {
-                let dataset = learn_skills::read_demos(game, experiment, &key.1, self.threads)?;
+                let dataset = learn_skills::read_demos(game, experiment, &key.path, self.threads)?;
                 self.demos = Some((key, dataset.clone()));
                 Ok(dataset)
             }

@@ -9,8 +9,8 @@ use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
     train::{
-        Algorithm, Experiment, TrainError, Trainer, UpdateReport,
-        checkpoint::Which,
+        Algorithm, Experiment, LearnerKind, TrainError, Trainer, UpdateReport,
+        checkpoint::CheckpointChoice,
         checksum::file_checksum,
         run_dir::{OpenedRun, RunDir, RunError, RunInfo},
     },
@@ -134,7 +134,10 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
 /// The error of a training that cannot begin; where skills are missing, with the commands that make and use them.
 fn explain(error: TrainError, args: &Args, experiment: &Experiment) -> CliError {
     let TrainError::NoSkills(algorithm) = error else { return error.into() };
-    let plain = if experiment.algorithm.is_sac() { Algorithm::Sac } else { Algorithm::Ppo };
+    let plain = match experiment.algorithm.learner() {
+        LearnerKind::Ppo => Algorithm::Ppo,
+        LearnerKind::Sac => Algorithm::Sac,
+    };
     CliError::Usage(format!(
         "{algorithm} needs a skill model: learn one with `playbot learn-skills{} --out skills.safetensors`, then give the \
          same command again with `--skills skills.safetensors`; or train without skills, with `--algorithm {plain}`",
@@ -215,7 +218,7 @@ pub fn drive(
     let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
     let bar = progress::bar(title, trainer.experiment().whole_steps(), "steps");
     let mut saved = trainer.updates();
-    if run.checkpoint(Which::Last).is_err() {
+    if run.checkpoint(CheckpointChoice::Last).is_err() {
         // Whatever goes wrong later, there is something good to go back to.
         save(run, trainer)?;
     }
@@ -240,7 +243,7 @@ pub fn drive(
 
 fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
     run.save(trainer).map_err(|error| {
-        let is_first = run.checkpoint(Which::Last).is_err();
+        let is_first = run.checkpoint(CheckpointChoice::Last).is_err();
         let (error, run) = (error.into(), run.path().into());
         if is_first { CliError::NeverSaved { error, run } } else { CliError::NotSaved { error, run } }
     })
@@ -248,7 +251,7 @@ fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
 
 /// The error of a training, with the checkpoint that is left if its numbers ran away.
 fn stopped_by(run: &RunDir, error: TrainError) -> CliError {
-    match (&error, run.checkpoint(Which::Last)) {
+    match (&error, run.checkpoint(CheckpointChoice::Last)) {
         (TrainError::Learn(learn), Ok(checkpoint)) if learn.is_divergence() => {
             CliError::Diverged { error: error.into(), step: checkpoint.summary.step, checkpoint: checkpoint.path }
         }

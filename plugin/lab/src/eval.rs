@@ -182,7 +182,7 @@ fn play(
     }
     let arrangement = Arrangement::new(game, plan.arenas, plan.worlds);
     let worlds: Result<Vec<_>, _> =
-        arrangement.first_agents().map(|first| stage(game, player, plan, arrangement, first)).collect();
+        arrangement.first_agents().map(|first| build_eval_world(game, player, plan, arrangement, first)).collect();
     let mut worlds = worlds?;
     let followed = follow.then_some(game);
     let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, followed, &progress));
@@ -195,7 +195,7 @@ fn play(
 }
 
 /// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
-fn stage(
+fn build_eval_world(
     game: &dyn Game,
     player: &Player,
     plan: &EvalPlan,

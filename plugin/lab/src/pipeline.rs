@@ -94,7 +94,7 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
         keep_observations: false,
     };
     let writer = DemoWriter::create(path, plan.header(game))?;
-    let (mut world, agent) = plan.stage(game, writer);
+    let (mut world, agent) = plan.build_world(game, writer);
     while Control::of(&world, agent).is_active() {
         world.tick()?;
     }

@@ -7,7 +7,7 @@ use bevy::{
 
 use super::{
     atlas::{render_target, target_image},
-    eye::SensorCamera,
+    sensor_view::SensorCamera,
 };
 
 /// The textures that cameras of the game draw on for sensors.
@@ -43,7 +43,7 @@ impl BorrowedTargets {
 }
 
 /// A camera as the game left it.
-struct Lent {
+struct BorrowedCamera {
     camera: Entity,
     was: Camera,
     target: RenderTarget,
@@ -52,26 +52,26 @@ struct Lent {
 /// The cameras of the game while sensors look: those that no sensor looks through are switched off, the others draw
 /// for sensors.
 #[derive(Default)]
-pub(super) struct Loan {
-    lent: Vec<Lent>,
+pub(super) struct BorrowedCameras {
+    cameras: Vec<BorrowedCamera>,
     off: Vec<Entity>,
 }
 
-impl Loan {
+impl BorrowedCameras {
     /// Switches the game's cameras off, and those on that sensors look through. To be done before visibility is found.
     pub(super) fn select(world: &mut World, targets: &BorrowedTargets) -> Self {
-        let mut loan = Self::default();
+        let mut borrowed = Self::default();
         let mut cameras =
             world.query_filtered::<(Entity, &mut Camera, &RenderTarget, &mut Projection), Without<SensorCamera>>();
         for (entity, mut camera, target, mut projection) in cameras.iter_mut(world) {
             let Some(wanted) = targets.get(entity) else {
                 if camera.is_active {
                     camera.bypass_change_detection().is_active = false;
-                    loan.off.push(entity);
+                    borrowed.off.push(entity);
                 }
                 continue;
             };
-            loan.lent.push(Lent { camera: entity, was: camera.clone(), target: target.clone() });
+            borrowed.cameras.push(BorrowedCamera { camera: entity, was: camera.clone(), target: target.clone() });
             let camera = camera.bypass_change_detection();
             camera.is_active = true;
             if camera.computed.target_info.is_none() {
@@ -79,14 +79,14 @@ impl Loan {
                 camera.computed.clip_from_view = projection.get_clip_from_view();
             }
         }
-        loan
+        borrowed
     }
 
     /// Points the cameras at their textures. To be done after visibility was found for what they see in the game.
     pub(super) fn point(&self, world: &mut World, targets: &BorrowedTargets) {
-        for lent in &self.lent {
-            let Some(wanted) = targets.get(lent.camera) else { continue };
-            let mut camera = world.entity_mut(lent.camera);
+        for borrowed in &self.cameras {
+            let Some(wanted) = targets.get(borrowed.camera) else { continue };
+            let mut camera = world.entity_mut(borrowed.camera);
             if let Some(mut target) = camera.get_mut::<RenderTarget>() {
                 *target.bypass_change_detection() = render_target(wanted.image.clone());
             }
@@ -101,13 +101,13 @@ impl Loan {
 
     /// Gives the cameras back as they were.
     pub(super) fn give_back(self, world: &mut World) {
-        for lent in self.lent {
-            let mut entity = world.entity_mut(lent.camera);
+        for borrowed in self.cameras {
+            let mut entity = world.entity_mut(borrowed.camera);
             if let Some(mut target) = entity.get_mut::<RenderTarget>() {
-                *target.bypass_change_detection() = lent.target;
+                *target.bypass_change_detection() = borrowed.target;
             }
             if let Some(mut camera) = entity.get_mut::<Camera>() {
-                *camera.bypass_change_detection() = lent.was;
+                *camera.bypass_change_detection() = borrowed.was;
             }
         }
         for camera in self.off {

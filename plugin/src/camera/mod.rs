@@ -40,10 +40,8 @@ mod adapter;
 mod atlas;
 mod borrow;
 mod error;
-mod eye;
-mod eye_draw;
+mod fill_frames;
 mod images;
-mod look;
 mod plugin;
 mod prepare;
 mod readback;
@@ -52,14 +50,16 @@ mod renderer;
 mod request;
 mod scene_schedule;
 mod sensor;
+mod sensor_view;
+mod sensor_view_draw;
 mod tiles;
 
 pub(crate) use adapter::{creation as drawing, none as not_drawing};
 pub use error::CameraError;
-pub use eye::SensorCamera;
 pub use plugin::CameraSensorPlugin;
 pub(crate) use render_list::RenderListPlugin;
 pub use sensor::{CameraSensor, CameraSource};
+pub use sensor_view::SensorCamera;
 pub use tiles::TileBorder;
 
 // For playbot_lab, playbot_cli and tests; games need none of it.

@@ -8,12 +8,14 @@ use bevy::{
 use super::{
     ReadbackDelay, TileLayerPlugin, adapter,
     borrow::BorrowedTargets,
-    eye::{Eyes, Stamp},
-    eye_draw, images, look,
+    fill_frames::fill_frames,
+    images,
     prepare::Atlas,
     readback::Readback,
     renderer::{self, Renderer},
     scene_schedule::add_renderer,
+    sensor_view::{SensorViews, Stamp},
+    sensor_view_draw,
 };
 use crate::{
     no_screen::NoScreen,
@@ -70,16 +72,16 @@ impl Plugin for CameraSensorPlugin {
             app.add_plugins(TileLayerPlugin);
         }
         VisionPlugin::add_to(app);
-        eye_draw::add_eyes(app);
+        sensor_view_draw::add_sensor_views(app);
         app.init_resource::<ReadbackDelay>()
             .init_resource::<Atlas>()
             .init_resource::<BorrowedTargets>()
-            .init_resource::<Eyes>()
+            .init_resource::<SensorViews>()
             .init_resource::<Stamp>()
             .init_resource::<Readback>()
             .init_resource::<images::MissingImages>()
             // It reads whatever can be drawn; what a game changes in `Sync` or before is seen.
-            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Render).ambiguous_with_all());
+            .add_systems(ObserveSchedule, fill_frames.in_set(VisionSystems::Render).ambiguous_with_all());
     }
 
     fn cleanup(&self, app: &mut App) {

@@ -6,8 +6,8 @@ use super::{
     CameraError, TileBorder,
     atlas::{Layout, render_target, target_image},
     borrow::BorrowedTargets,
-    eye::{Eyes, spawn_camera},
-    request::Asked,
+    request::{FollowRequest, Requests},
+    sensor_view::{SensorViews, spawn_camera},
 };
 
 /// The common texture and how it is divided.
@@ -21,10 +21,10 @@ pub(super) struct Atlas {
 }
 
 /// Makes room for all pictures. Nothing is done as long as their sizes stay as they are.
-pub(super) fn prepare(world: &mut World, asked: &Asked) -> Result<(), CameraError> {
-    divide_atlas(world, asked)?;
+pub(super) fn prepare(world: &mut World, requests: &Requests) -> Result<(), CameraError> {
+    divide_atlas(world, requests)?;
     let mut cameras: Vec<(Entity, UVec2)> = Vec::new();
-    for (request, camera) in &asked.through {
+    for (request, camera) in &requests.through {
         if !cameras.contains(&(*camera, request.size)) {
             cameras.push((*camera, request.size));
         }
@@ -32,12 +32,12 @@ pub(super) fn prepare(world: &mut World, asked: &Asked) -> Result<(), CameraErro
     world.resource_scope(|world, mut targets: Mut<BorrowedTargets>| {
         targets.update(&cameras, &mut world.resource_mut::<Assets<Image>>());
     });
-    raise_border(world, asked);
+    raise_border(world, requests);
     Ok(())
 }
 
-fn divide_atlas(world: &mut World, asked: &Asked) -> Result<(), CameraError> {
-    let sizes: Vec<UVec2> = asked.following.iter().map(|(request, ..)| request.size).collect();
+fn divide_atlas(world: &mut World, requests: &Requests) -> Result<(), CameraError> {
+    let sizes: Vec<UVec2> = requests.following.iter().map(|follow| follow.request.size).collect();
     if sizes.is_empty() || sizes == world.resource::<Atlas>().sizes {
         return Ok(());
     }
@@ -56,9 +56,9 @@ fn divide_atlas(world: &mut World, asked: &Asked) -> Result<(), CameraError> {
 
 /// Lets the shared camera draw on the texture.
 fn point_camera(world: &mut World, image: Handle<Image>) {
-    let camera = world.resource::<Eyes>().camera.filter(|&camera| world.get::<Camera>(camera).is_some());
+    let camera = world.resource::<SensorViews>().camera.filter(|&camera| world.get::<Camera>(camera).is_some());
     let camera = camera.unwrap_or_else(|| spawn_camera(world));
-    world.resource_mut::<Eyes>().camera = Some(camera);
+    world.resource_mut::<SensorViews>().camera = Some(camera);
     let mut camera = world.entity_mut(camera);
     camera.insert(render_target(image));
     if let Some(mut projection) = camera.get_mut::<Projection>() {
@@ -68,12 +68,12 @@ fn point_camera(world: &mut World, image: Handle<Image>) {
 }
 
 /// Tile layers must reach as far as can be seen.
-fn raise_border(world: &mut World, asked: &Asked) {
-    let seen = |(request, _, width): &(super::request::Request, Entity, f32)| {
-        let height = width * request.size.y as f32 / request.size.x as f32;
-        width.max(height) / 2.0 + 1.0
+fn raise_border(world: &mut World, requests: &Requests) {
+    let seen = |follow: &FollowRequest| {
+        let size = follow.request.size.as_vec2();
+        follow.width.max(follow.width * size.y / size.x) / 2.0 + 1.0
     };
-    let needed = asked.following.iter().map(seen).fold(0.0, f32::max);
+    let needed = requests.following.iter().map(seen).fold(0.0, f32::max);
     if world.resource::<TileBorder>().0 < needed {
         world.resource_mut::<TileBorder>().0 = needed;
     }

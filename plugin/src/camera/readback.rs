@@ -16,7 +16,7 @@ use bevy::{
     },
 };
 
-use super::{CameraError, eye::Stamp};
+use super::{CameraError, sensor_view::Stamp};
 
 /// Rows of a picture in a buffer begin at multiples of this, in bytes: a rule of wgpu.
 const ROW: u32 = 256;
@@ -61,8 +61,8 @@ pub(super) struct Readback {
     spare: Vec<Buffer>,
 }
 
-/// What came back.
-pub(super) struct Arrived {
+/// Pictures that came back, in a buffer that is mapped.
+pub(super) struct MappedFrames {
     copied: Copied,
 }
 
@@ -78,7 +78,7 @@ impl Readback {
         sources: Vec<Source>,
         pieces: Vec<Piece>,
         delay: usize,
-    ) -> Result<Arrived, CameraError> {
+    ) -> Result<MappedFrames, CameraError> {
         let copied = self.copy(render_world, sources, pieces)?;
         self.on_the_way.push_back(copied);
         while self.on_the_way.len() > delay + 1 {
@@ -89,7 +89,7 @@ impl Readback {
             return Err(CameraError::Missing("the readback is late".into()));
         };
         wait(render_world.resource::<RenderDevice>(), &copied.buffer)?;
-        Ok(Arrived { copied })
+        Ok(MappedFrames { copied })
     }
 
     fn copy(&mut self, render_world: &World, sources: Vec<Source>, pieces: Vec<Piece>) -> Result<Copied, CameraError> {
@@ -134,9 +134,9 @@ impl Readback {
     }
 
     /// Takes the buffer back for the next copy.
-    pub(super) fn reuse(&mut self, arrived: Arrived) {
-        arrived.copied.buffer.unmap();
-        self.spare.push(arrived.copied.buffer);
+    pub(super) fn reuse(&mut self, frames: MappedFrames) {
+        frames.copied.buffer.unmap();
+        self.spare.push(frames.copied.buffer);
     }
 }
 
@@ -154,7 +154,7 @@ fn wait(device: &RenderDevice, buffer: &Buffer) -> Result<(), CameraError> {
     }
 }
 
-impl Arrived {
+impl MappedFrames {
     /// Hands each picture to `take`, with its stamp and its rows: 4 bytes a pixel, top row first.
     pub(super) fn hand_out(&self, mut take: impl FnMut(Entity, Stamp, &mut dyn Iterator<Item = &[u8]>)) {
         let bytes = self.copied.buffer.slice(..).get_mapped_range();

@@ -23,22 +23,30 @@ pub(super) struct Request {
     pub(super) size: UVec2,
 }
 
+/// The picture of an agent whose sensor follows a target.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FollowRequest {
+    pub(super) request: Request,
+    pub(super) target: Entity,
+    /// Width of the picture, world units.
+    pub(super) width: f32,
+}
+
 /// All that is asked for and possible, in the order of the agents' numbers.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Asked {
-    /// With the target and the width of the picture in world units.
-    pub(super) following: Vec<(Request, Entity, f32)>,
+pub(super) struct Requests {
+    pub(super) following: Vec<FollowRequest>,
     /// With the camera of the game.
     pub(super) through: Vec<(Request, Entity)>,
 }
 
-impl Asked {
+impl Requests {
     pub(super) fn is_empty(&self) -> bool {
         self.following.is_empty() && self.through.is_empty()
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &Request> {
-        let following = self.following.iter().map(|(request, ..)| request);
+        let following = self.following.iter().map(|follow| &follow.request);
         following.chain(self.through.iter().map(|(request, _)| request))
     }
 }
@@ -52,13 +60,13 @@ pub(super) fn report<'a>(world: &mut World, requests: impl Iterator<Item = &'a R
 }
 
 /// Gathers what is asked for by agents that are observed; what is impossible is reported.
-pub(super) fn requests(world: &mut World) -> Asked {
+pub(super) fn gather_requests(world: &mut World) -> Requests {
     let limit =
         world.get_resource::<RenderDevice>().map_or(u32::MAX, |device| device.limits().max_texture_dimension_2d);
     let mut sensors = world.query::<((&Agent, &Control, &Episode), (&CameraSensor, &ImageSensor))>();
     let mut cameras = world.query_filtered::<(Entity, &'static Camera), Without<SensorCamera>>();
     cameras.update_archetypes(world);
-    let mut asked = Asked::default();
+    let mut requests = Requests::default();
     let mut refused = Vec::new();
     for &entity in world.resource::<AgentOrder>().entities() {
         let Ok(((agent, control, episode), (sensor, image))) = sensors.get(world, entity) else { continue };
@@ -69,17 +77,16 @@ pub(super) fn requests(world: &mut World) -> Asked {
         let (level, tick) = (episode.level, episode.tick);
         let request = Request { agent: entity, index: agent.index, level, tick, size };
         let result = check_size(&image.0, limit).and_then(|()| match sensor.source {
-            CameraSource::Following { target, width } => {
-                check_target(world, target, width).map(|()| asked.following.push((request, target, width)))
-            }
+            CameraSource::Following { target, width } => check_target(world, target, width)
+                .map(|()| requests.following.push(FollowRequest { request, target, width })),
             CameraSource::OfGame => match own_camera(world, &cameras) {
                 Some(camera) => {
-                    check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
+                    check_camera(world, &requests, &request, camera).map(|()| requests.through.push((request, camera)))
                 }
                 None => Err(CameraError::NoOwnCamera),
             },
             CameraSource::Camera(camera) => {
-                check_camera(world, &asked, &request, camera).map(|()| asked.through.push((request, camera)))
+                check_camera(world, &requests, &request, camera).map(|()| requests.through.push((request, camera)))
             }
         });
         refused.extend(result.err().map(|error| (request, error)));
@@ -87,7 +94,7 @@ pub(super) fn requests(world: &mut World) -> Asked {
     for (request, error) in &refused {
         report(world, [request].into_iter(), error);
     }
-    asked
+    requests
 }
 
 /// The game's own camera: of the active ones, the one that draws first.
@@ -109,10 +116,10 @@ fn check_target(world: &World, target: Entity, width: f32) -> Result<(), CameraE
     world.get::<GlobalTransform>(target).map(|_| ()).ok_or(CameraError::NoTarget(target))
 }
 
-fn check_camera(world: &World, asked: &Asked, request: &Request, camera: Entity) -> Result<(), CameraError> {
+fn check_camera(world: &World, requests: &Requests, request: &Request, camera: Entity) -> Result<(), CameraError> {
     if world.get::<Camera>(camera).is_none() || world.get::<Projection>(camera).is_none() {
         return Err(CameraError::NoCamera(camera));
     }
-    let shared = asked.through.iter().any(|(other, used)| *used == camera && other.size != request.size);
+    let shared = requests.through.iter().any(|(other, used)| *used == camera && other.size != request.size);
     if shared { Err(CameraError::CameraShared(camera)) } else { Ok(()) }
 }

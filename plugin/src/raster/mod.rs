@@ -32,10 +32,10 @@
 mod canvas;
 mod colour;
 mod error;
-mod look;
 mod plugin;
 mod pose;
 mod quad;
+mod renderer;
 mod scene;
 mod sensor;
 mod sprite;

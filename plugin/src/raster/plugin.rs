@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::look;
+use super::renderer::fill_frames;
 use crate::{
     systems::ObserveSchedule,
     vision::{VisionPlugin, VisionSystems},
@@ -17,6 +17,6 @@ impl Plugin for RasterPlugin {
         VisionPlugin::add_to(app);
         app.init_resource::<Assets<Image>>()
             .init_resource::<Assets<TextureAtlasLayout>>()
-            .add_systems(ObserveSchedule, look::look.in_set(VisionSystems::Render));
+            .add_systems(ObserveSchedule, fill_frames.in_set(VisionSystems::Render));
     }
 }

@@ -18,10 +18,10 @@ pub(super) struct Quad {
     pub up: Vec2,
 }
 
-/// A part of an image, in texels from its top left: from `start`, which the bottom left corner of the sprite shows, to
+/// A region of an image, in texels from its top left: from `start`, which the bottom left corner of the sprite shows, to
 /// `start + size`, which the top right corner shows. So y falls, and a flip turns a size around.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Part {
+pub(super) struct ImageRegion {
     pub start: Vec2,
     pub size: Vec2,
 }
@@ -33,27 +33,28 @@ pub(super) fn lay_out(
     pose: &Pose,
     image_size: Vec2,
     layouts: &Assets<TextureAtlasLayout>,
-) -> Result<(Quad, Part), Undrawable> {
+) -> Result<(Quad, ImageRegion), Undrawable> {
     let rect = shown_rect(sprite, image_size, layouts)?;
-    let mut part = Part { start: Vec2::new(rect.min.x, rect.max.y), size: Vec2::new(rect.width(), -rect.height()) };
+    let mut region =
+        ImageRegion { start: Vec2::new(rect.min.x, rect.max.y), size: Vec2::new(rect.width(), -rect.height()) };
     for (axis, flipped) in [sprite.flip_x, sprite.flip_y].into_iter().enumerate() {
         if flipped {
-            part.start[axis] += part.size[axis];
-            part.size[axis] = -part.size[axis];
+            region.start[axis] += region.size[axis];
+            region.size[axis] = -region.size[axis];
         }
     }
     let mut size = sprite.custom_size.unwrap_or(rect.size());
     let mut shift = Vec2::ZERO;
     match sprite.image_mode {
         SpriteImageMode::Auto => {}
-        SpriteImageMode::Scale(mode) => scale(mode, rect.size(), &mut size, &mut shift, &mut part),
+        SpriteImageMode::Scale(mode) => scale(mode, rect.size(), &mut size, &mut shift, &mut region),
         SpriteImageMode::Sliced(_) => return Err(Undrawable::Mode("Sliced")),
         SpriteImageMode::Tiled { .. } => return Err(Undrawable::Mode("Tiled")),
     }
     let corner = (size + shift) * (-anchor.as_vec() - Vec2::splat(0.5));
     let (x, y) = (pose.x.truncate(), pose.y.truncate());
     let quad = Quad { corner: x * corner.x + y * corner.y + pose.at.truncate(), across: x * size.x, up: y * size.y };
-    Ok((quad, part))
+    Ok((quad, region))
 }
 
 /// A rectangle counts from the top left of the atlas's section, if there is one.
@@ -74,7 +75,7 @@ enum Keep {
 }
 
 /// Keeps the image's aspect ratio: `Fill` modes cut the image, `Fit` modes shrink the rectangle.
-fn scale(mode: SpriteScalingMode, texture: Vec2, size: &mut Vec2, shift: &mut Vec2, part: &mut Part) {
+fn scale(mode: SpriteScalingMode, texture: Vec2, size: &mut Vec2, shift: &mut Vec2, region: &mut ImageRegion) {
     let (fills, keep) = match mode {
         SpriteScalingMode::FillStart => (true, Keep::Start),
         SpriteScalingMode::FillCenter => (true, Keep::Centre),
@@ -88,14 +89,14 @@ fn scale(mode: SpriteScalingMode, texture: Vec2, size: &mut Vec2, shift: &mut Ve
     let share = if wider { given / wanted } else { wanted / given };
     if fills {
         let axis = usize::from(wider);
-        let spare = part.size[axis] * (1.0 - share);
-        // Parts start at the bottom, but vertically it is the top that counts as the start.
-        part.start[axis] += match (keep, axis) {
+        let spare = region.size[axis] * (1.0 - share);
+        // Regions start at the bottom, but vertically it is the top that counts as the start.
+        region.start[axis] += match (keep, axis) {
             (Keep::Centre, _) => spare * 0.5,
             (Keep::Start, 1) | (Keep::End, 0) => spare,
             _ => 0.0,
         };
-        part.size[axis] *= share;
+        region.size[axis] *= share;
     } else {
         let axis = usize::from(!wider);
         let spare = size[axis] * (1.0 - share);

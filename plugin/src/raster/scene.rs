@@ -5,7 +5,7 @@ use bevy::{ecs::system::SystemParam, prelude::*, sprite::Anchor};
 use super::{
     error::{RasterError, Undrawable},
     pose::Pose,
-    quad::{Part, Quad, lay_out},
+    quad::{ImageRegion, Quad, lay_out},
     texture::{TextureId, Textures},
 };
 use crate::vision::{Stage, TileLayer, lacks_image};
@@ -17,12 +17,13 @@ pub(super) struct Item {
     pub texture: TextureId,
     /// The sprite, or the first cell of the tiles.
     pub quad: Quad,
-    pub what: What,
+    pub kind: ItemKind,
 }
 
+/// What an item draws.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum What {
-    Sprite { part: Part, colour: Color },
+pub(super) enum ItemKind {
+    Sprite { region: ImageRegion, colour: Color },
     Tiles(Entity),
 }
 
@@ -144,8 +145,8 @@ impl Gathering<'_, '_, '_> {
         let texture = self.textures.find(&sprite.image, &self.stages.images)?;
         let image = self.textures.get(texture);
         let size = UVec2::new(image.width, image.height).as_vec2();
-        let (quad, part) = lay_out(sprite, anchor, pose, size, &self.stages.layouts)?;
-        Ok(Item { z: pose.at.z, texture, quad, what: What::Sprite { part, colour: sprite.color } })
+        let (quad, region) = lay_out(sprite, anchor, pose, size, &self.stages.layouts)?;
+        Ok(Item { z: pose.at.z, texture, quad, kind: ItemKind::Sprite { region, colour: sprite.color } })
     }
 
     fn tiles(&mut self, entity: Entity, layer: &TileLayer, pose: &Pose) -> Result<Item, Undrawable> {
@@ -159,6 +160,6 @@ impl Gathering<'_, '_, '_> {
             return Err(Undrawable::Strip { width: strip.width, height: strip.height });
         }
         let quad = Quad { corner: pose.at.truncate(), across: pose.x.truncate(), up: pose.y.truncate() };
-        Ok(Item { z: pose.at.z, texture, quad, what: What::Tiles(entity) })
+        Ok(Item { z: pose.at.z, texture, quad, kind: ItemKind::Tiles(entity) })
     }
 }

@@ -5,15 +5,15 @@ use std::ops::Range;
 use super::{
     canvas::{Canvas, Inverse, centre},
     colour::{Curve, Rgba, SRGB, Tint},
-    quad::{Part, Quad},
-    texture::{Cover, Texture},
+    quad::{ImageRegion, Quad},
+    texture::{Texture, Transparency},
 };
 
 /// A sprite that lies on a picture.
 pub(super) struct SpriteOn<'a> {
     /// In pixels.
     pub quad: Quad,
-    pub part: Part,
+    pub region: ImageRegion,
     pub texture: &'a Texture,
     pub tint: Tint,
 }
@@ -21,7 +21,7 @@ pub(super) struct SpriteOn<'a> {
 impl SpriteOn<'_> {
     /// Paints the sprite over these pixels, which [`Canvas::cut`] chose. `columns` is memory to work in.
     pub fn paint(&self, canvas: &mut Canvas, area: (Range<usize>, Range<usize>), columns: &mut Vec<u32>) {
-        let painter = Painter::new(self.texture.cover, self.tint);
+        let painter = Painter::new(self.texture.transparency, self.tint);
         if self.quad.across.y == 0.0 && self.quad.up.x == 0.0 {
             self.paint_upright(canvas, area, columns, painter);
         } else {
@@ -38,9 +38,9 @@ impl SpriteOn<'_> {
         mut painter: Painter,
     ) {
         let Texture { width, height, ref texels, .. } = *self.texture;
-        let (quad, part) = (&self.quad, &self.part);
-        let across = Axis::new(quad.corner.x, quad.across.x, part.start.x, part.size.x, width);
-        let down = Axis::new(quad.corner.y, quad.up.y, part.start.y, part.size.y, height);
+        let (quad, region) = (&self.quad, &self.region);
+        let across = Axis::new(quad.corner.x, quad.across.x, region.start.x, region.size.x, width);
+        let down = Axis::new(quad.corner.y, quad.up.y, region.start.y, region.size.y, height);
         columns.clear();
         columns.extend(xs.clone().map(|x| across.texel_under(x)));
         for y in ys {
@@ -52,9 +52,9 @@ impl SpriteOn<'_> {
     fn paint_turned(&self, canvas: &mut Canvas, (xs, ys): (Range<usize>, Range<usize>), mut painter: Painter) {
         let Some(inverse) = Inverse::of(&self.quad) else { return };
         let Texture { width, height, ref texels, .. } = *self.texture;
-        let part = &self.part;
-        let across = Axis::new(0.0, 1.0, part.start.x, part.size.x, width);
-        let up = Axis::new(0.0, 1.0, part.start.y, part.size.y, height);
+        let region = &self.region;
+        let across = Axis::new(0.0, 1.0, region.start.x, region.size.x, width);
+        let up = Axis::new(0.0, 1.0, region.start.y, region.size.y, height);
         let inside = 0.0..1.0;
         for y in ys {
             for (x, pixel) in xs.clone().zip(canvas.row(y, &xs)) {
@@ -116,10 +116,10 @@ enum Way {
 }
 
 impl Painter {
-    fn new(cover: Cover, tint: Tint) -> Self {
-        let way = match cover {
-            Cover::Opaque if tint == Tint::NONE => Way::Copy,
-            Cover::Cutout if tint == Tint::NONE => Way::Cut,
+    fn new(transparency: Transparency, tint: Tint) -> Self {
+        let way = match transparency {
+            Transparency::Opaque if tint == Tint::NONE => Way::Copy,
+            Transparency::Cutout if tint == Tint::NONE => Way::Cut,
             _ => Way::Mix,
         };
         // A texel that is not there leaves a pixel as it is.

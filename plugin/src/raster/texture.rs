@@ -9,7 +9,7 @@ use super::{
 
 /// How much of what lies behind an image shows through it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Cover {
+pub(super) enum Transparency {
     /// Nothing: all texels are opaque.
     Opaque,
     /// Each texel is there or not.
@@ -24,13 +24,13 @@ pub(super) struct Texture {
     pub width: u32,
     pub height: u32,
     pub texels: Vec<Rgba>,
-    pub cover: Cover,
+    pub transparency: Transparency,
 }
 
 impl Texture {
     /// A single white texel: the image of rectangles of one colour.
     fn white() -> Self {
-        Self { width: 1, height: 1, texels: vec![[255; 4]], cover: Cover::Opaque }
+        Self { width: 1, height: 1, texels: vec![[255; 4]], transparency: Transparency::Opaque }
     }
 
     fn of(image: &Image) -> Result<Self, Undrawable> {
@@ -54,18 +54,18 @@ impl Texture {
             return Err(Undrawable::Bytes { bytes: bytes.len(), width, height });
         }
         let texels: Vec<Rgba> = bytes.as_chunks().0.iter().map(|texel| convert(*texel)).collect();
-        let cover = cover(&texels);
-        Ok(Self { width, height, texels, cover })
+        let transparency = transparency(&texels);
+        Ok(Self { width, height, texels, transparency })
     }
 }
 
-fn cover(texels: &[Rgba]) -> Cover {
+fn transparency(texels: &[Rgba]) -> Transparency {
     if texels.iter().all(|texel| texel[3] == 255) {
-        Cover::Opaque
+        Transparency::Opaque
     } else if texels.iter().all(|texel| matches!(texel[3], 0 | 255)) {
-        Cover::Cutout
+        Transparency::Cutout
     } else {
-        Cover::Blended
+        Transparency::Blended
     }
 }
 

@@ -71,16 +71,16 @@ pub(super) fn send_messages(
     messages.send_motion(wanted.motion, wanted.wheel);
 }
 
-/// What it takes to let go.
+/// What is needed to release the inputs that an agent holds.
 #[derive(SystemParam)]
-pub(super) struct Hands<'w, 's> {
+pub(super) struct InputReleaser<'w, 's> {
     devices: ResMut<'w, VirtualDevices>,
     direct: ResMut<'w, DirectInput>,
     state: InputState<'w, 's>,
     messages: InputMessages<'w, 's>,
 }
 
-impl Hands<'_, '_> {
+impl InputReleaser<'_, '_> {
     /// Lets go of what the agent holds, as if it had never been pressed: whether the episode before ended with a key down
     /// must not be seen in the next one.
     pub(super) fn release(&mut self, agent: Entity, route: InputRoute) {

@@ -18,7 +18,7 @@ use bevy::{
 };
 
 use super::{
-    act::{self, Hands},
+    act::{self, InputReleaser},
     claims::check_claims,
     devices::VirtualDevices,
     direct::{self, DirectInput},
@@ -48,8 +48,12 @@ impl Plugin for VirtualInputPlugin {
         app.init_resource::<VirtualDevices>()
             .init_resource::<DirectInput>()
             // Lets go of everything at the end of an episode, and at the start of one, so that it begins with nothing held.
-            .add_observer(move |event: On<StartEpisode>, mut hands: Hands| hands.release(event.entity, route))
-            .add_observer(move |event: On<EpisodeEnded>, mut hands: Hands| hands.release(event.entity, route))
+            .add_observer(move |event: On<StartEpisode>, mut releaser: InputReleaser| {
+                releaser.release(event.entity, route)
+            })
+            .add_observer(move |event: On<EpisodeEnded>, mut releaser: InputReleaser| {
+                releaser.release(event.entity, route)
+            })
             .add_systems(PreUpdate, connect_gamepads.before(InputSystems).before(act::send_messages));
         match route {
             InputRoute::Messages => {

@@ -92,7 +92,7 @@ fn a_number_of_steps_is_recorded_over_the_levels_again_and_again() {
     let (mode, levels) = ("plain".to_owned(), vec![0, 1]);
     let plan = DemonstrationPlan { mode, levels, noise: 0.0, seed: 1, steps: Some(6), keep_observations: true };
     let writer = DemoWriter::create(&path, plan.header(&Shown)).expect("a fresh file");
-    let (mut world, _) = plan.stage(&Shown, writer);
+    let (mut world, _) = plan.build_world(&Shown, writer);
     while world.resource::<Recorder>().steps() < 6 {
         world.tick().expect("sound");
     }

@@ -15,7 +15,7 @@ use playbot_lab::prelude::*;
 use playbot_lab::{
     demo::{
         dataset::Demonstrations,
-        verify::{ReplayStage, verify_file},
+        verify::{EpisodeReplayer, verify_file},
     },
     worlds::build_world,
 };
@@ -51,8 +51,8 @@ fn a_nondeterministic_game_is_found_out_at_the_first_tick_that_differs() {
     record(&path, header(), 1);
     let mut episode = DemoReader::open(&path).expect("readable").read_all().expect("whole").remove(0);
     episode.state_hashes[1] ^= 1;
-    let mut stage = ReplayStage::new(&Corridor, "plain");
-    let divergence = stage.play(Arc::new(episode), |_, _| {}).expect("sound").expect("diverges");
+    let mut replayer = EpisodeReplayer::new(&Corridor, "plain");
+    let divergence = replayer.play(Arc::new(episode), |_, _| {}).expect("sound").expect("diverges");
     assert_eq!((divergence.level, divergence.tick), (0, 1));
     assert!(divergence.what.contains("state hash"), "{divergence}");
 }

@@ -2,7 +2,10 @@
 
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{
-    doctor::{CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, examine},
+    doctor::{
+        CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, NonFiniteValue,
+        examine,
+    },
     game::Game,
 };
 use playbot_tests::{Corridor, faulty::Fault};
@@ -143,7 +146,8 @@ fn what_reflection_cannot_see_shows_in_what_agents_get() {
 fn values_that_are_no_numbers_are_named_with_their_tick() {
     let (finding, report) = finding(Fault::NotFinite);
     assert_eq!(finding.kind, FindingKind::NotFinite);
-    assert_eq!(report.observation.not_finite, Some((7, "tallest".to_owned(), "inf".to_owned())));
+    let first = NonFiniteValue { tick: 7, name: "tallest".to_owned(), value: "inf".to_owned() };
+    assert_eq!(report.observation.not_finite, Some(first));
 }
 
 #[test]

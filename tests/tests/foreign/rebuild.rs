@@ -11,7 +11,7 @@ use bevy_playbot::{
     renewal::Renewal,
 };
 use playbot_lab::{
-    demo::verify::{ReplayStage, verify_file},
+    demo::verify::{EpisodeReplayer, verify_file},
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
     prelude::*,
@@ -89,8 +89,8 @@ fn replayed_backwards(game: &ForeignGame, path: &Path) -> Vec<Option<Divergence>
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None).expect("readable");
     let mut episodes: Vec<DemoEpisode> = reader.map(|episode| episode.expect("whole")).collect();
     episodes.reverse();
-    let mut stage = ReplayStage::new(game, "default");
-    let play = |episode| stage.play(Arc::new(episode), |_, _| {}).expect("sound");
+    let mut replayer = EpisodeReplayer::new(game, "default");
+    let play = |episode| replayer.play(Arc::new(episode), |_, _| {}).expect("sound");
     episodes.into_iter().map(play).collect()
 }
 

@@ -8,7 +8,7 @@ use playbot_lab::prelude::*;
 use playbot_lab::{
     eval::{EvalPlan, Player, evaluate, summarize},
     pipeline::learn_skills,
-    train::{Algorithm, Experiment, Trainer, config_file::parse_experiment},
+    train::{Algorithm, Experiment, LearnerKind, Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
 use playbot_learner::{DeviceKind, SkillModel};
@@ -33,10 +33,13 @@ const EXPERIMENT: &str = r#"(
 fn experiment(algorithm: Algorithm) -> Experiment {
     let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
     // Learning from a buffer takes fewer steps and more time for each.
-    let (steps, arenas) = if algorithm.is_sac() { (60_000, 8) } else { (experiment.steps, experiment.arenas) };
+    let (steps, arenas) = match algorithm.learner() {
+        LearnerKind::Ppo => (experiment.steps, experiment.arenas),
+        LearnerKind::Sac => (60_000, 8),
+    };
     let mut experiment = Experiment { algorithm, steps, arenas, ..experiment };
     // SAC squashes its actions, so its policy cannot be a copy of the decoder.
-    experiment.score.init_from_decoder = !algorithm.is_sac();
+    experiment.score.init_from_decoder = algorithm.learner() != LearnerKind::Sac;
     experiment
 }
 
@@ -75,7 +78,11 @@ fn train(algorithm: Algorithm, skills: &SkillModel) -> Player {
     }
     // A Gaussian has tails beyond the range, a squashed one has not.
     let clipped = clipped.unwrap_or_else(|| panic!("{algorithm}: clipped actions are counted"));
-    assert!(if algorithm.is_sac() { clipped == 0.0 } else { clipped > 0.01 }, "{algorithm}: {clipped}");
+    let is_expected = match algorithm.learner() {
+        LearnerKind::Ppo => clipped > 0.01,
+        LearnerKind::Sac => clipped == 0.0,
+    };
+    assert!(is_expected, "{algorithm}: {clipped}");
     Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw: ActionDraw::Sample }
 }
 
@@ -85,7 +92,10 @@ fn with_continuous_actions_everybody_beats_chance() {
     let (chance, chance_success) = measure(&Player::Blind(BlindBot::Uniform));
     for algorithm in [Algorithm::Ppo, Algorithm::ScorePpo, Algorithm::Sac, Algorithm::ScoreSac] {
         let (mean, success) = measure(&train(algorithm, &skills));
-        let factor = if algorithm.is_sac() { 1.5 } else { 2.0 };
+        let factor = match algorithm.learner() {
+            LearnerKind::Ppo => 2.0,
+            LearnerKind::Sac => 1.5,
+        };
         let learned = mean > factor * chance && success > factor * chance_success;
         assert!(learned, "{algorithm}: {mean} and {success} against {chance} and {chance_success}");
     }

@@ -21,7 +21,7 @@ impl Plugin for CoinRunPicturePlugin {
             (
                 sprites::players,
                 sprites::levels,
-                sprites::inhabitants,
+                sprites::entities,
                 animate::players,
                 animate::enemies,
                 animate::saws,

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     arena_grid::ArenaGrid,
     coinrun::{
-        components::{Arena, ArenaBody, Crate, Enemy, InArena, Inhabitants, PlayerBody, PlaysIn, Saw, Tiles},
+        components::{Arena, ArenaBody, ArenaEntities, Crate, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
         tile::{SIZE, TileGrid},
     },
 };
@@ -79,8 +79,8 @@ fn cells(tiles: &TileGrid) -> impl Iterator<Item = u16> {
 }
 
 /// Makes sprites of new saws, crates and enemies.
-pub(super) fn inhabitants(
-    mut arenas: Query<(&Inhabitants, &mut Scenery), Changed<Inhabitants>>,
+pub(super) fn entities(
+    mut arenas: Query<(&ArenaEntities, &mut Scenery), Changed<ArenaEntities>>,
     new: Query<
         (&InArena, &ArenaBody, Option<&Crate>, Option<&Enemy>),
         (Or<(With<Saw>, With<Crate>, With<Enemy>)>, Without<Sprite>),
@@ -88,8 +88,8 @@ pub(super) fn inhabitants(
     art: Res<Art>,
     mut commands: Commands,
 ) {
-    for (inhabitants, mut scenery) in &mut arenas {
-        for entity in inhabitants.iter() {
+    for (entities, mut scenery) in &mut arenas {
+        for entity in entities.iter() {
             let Ok((in_arena, body, wooden, enemy)) = new.get(entity) else { continue };
             let (rect, layer) = match (wooden, enemy) {
                 (_, Some(enemy)) => (Art::enemy(enemy.sprite, 0), ACTORS),

@@ -15,10 +15,10 @@ const CELLS: usize = (SIZE * SIZE) as usize;
 /// way.
 pub fn coin_is_unreachable(sim: &Sim) -> bool {
     let start = [sim.x() as i32, sim.y() as i32];
-    !Flood::new(sim.level()).reaches_coin(start)
+    !FloodFill::new(sim.level()).reaches_coin(start)
 }
 
-struct Flood<'a> {
+struct FloodFill<'a> {
     level: &'a Level,
     crates: Vec<[i32; 2]>,
     /// For each cell, the highest row that a player who has been there may still get to. -1 for a
@@ -27,7 +27,7 @@ struct Flood<'a> {
     queue: Vec<[i32; 2]>,
 }
 
-impl<'a> Flood<'a> {
+impl<'a> FloodFill<'a> {
     fn new(level: &'a Level) -> Self {
         let crate_cell = |spawn: &Spawn| match *spawn {
             Spawn::Crate { cell, .. } => Some(cell),

@@ -11,7 +11,7 @@ use crate::coinrun::rules::WALK_SPEED;
 use crate::coinrun::sim::Sim;
 
 /// How finely a search looks at actions and states.
-pub(super) struct Grain {
+pub(super) struct SearchResolution {
     /// Actions on the ground: 8, 5 and 2 jump.
     ground_actions: &'static [u8],
     /// Actions in the air, where a jump has no effect.
@@ -25,7 +25,7 @@ pub(super) struct Grain {
 }
 
 /// Quick, and nearly always enough.
-pub(super) const COARSE: Grain = Grain {
+pub(super) const COARSE: SearchResolution = SearchResolution {
     ground_actions: &[8, 7, 5, 4, 2, 1],
     air_actions: &[7, 4, 1],
     ground_hold: 2,
@@ -34,7 +34,7 @@ pub(super) const COARSE: Grain = Grain {
 };
 
 /// For tight spots. Also presses down, which drops through crates.
-pub(super) const FINE: Grain = Grain {
+pub(super) const FINE: SearchResolution = SearchResolution {
     ground_actions: &[8, 7, 5, 4, 2, 1, 6, 3, 0],
     air_actions: &[7, 4, 1, 6, 3, 0],
     ground_hold: 1,
@@ -94,8 +94,8 @@ impl Ord for Open {
 }
 
 /// Searches from the state of `sim`. Also returns the number of expanded states.
-pub(super) fn search(sim: &Sim, config: &PlannerConfig, grain: &Grain) -> (Found, usize) {
-    let mut search = Search::new(sim, config, grain);
+pub(super) fn search(sim: &Sim, config: &PlannerConfig, resolution: &SearchResolution) -> (Found, usize) {
+    let mut search = Search::new(sim, config, resolution);
     for expansion in 0..config.max_expansions {
         let Some(Open { node, .. }) = search.open.pop() else {
             return (search.progress(), expansion);
@@ -109,7 +109,7 @@ pub(super) fn search(sim: &Sim, config: &PlannerConfig, grain: &Grain) -> (Found
 
 struct Search<'a> {
     config: &'a PlannerConfig,
-    grain: &'a Grain,
+    resolution: &'a SearchResolution,
     nodes: Vec<Node>,
     open: BinaryHeap<Open>,
     seen: HashSet<u64>,
@@ -118,10 +118,10 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(sim: &Sim, config: &'a PlannerConfig, grain: &'a Grain) -> Self {
+    fn new(sim: &Sim, config: &'a PlannerConfig, resolution: &'a SearchResolution) -> Self {
         let mut search = Self {
             config,
-            grain,
+            resolution,
             nodes: Vec::new(),
             open: BinaryHeap::new(),
             seen: HashSet::new(),
@@ -136,9 +136,9 @@ impl<'a> Search<'a> {
     fn expand(&mut self, node: usize) -> Option<Vec<u8>> {
         let grounded = self.nodes[node].sim.vy() == 0.0;
         let (actions, hold) = if grounded {
-            (self.grain.ground_actions, self.grain.ground_hold)
+            (self.resolution.ground_actions, self.resolution.ground_hold)
         } else {
-            (self.grain.air_actions, self.grain.air_hold)
+            (self.resolution.air_actions, self.resolution.air_hold)
         };
         for &action in actions {
             let mut sim = self.nodes[node].sim.clone();
@@ -195,13 +195,13 @@ impl<'a> Search<'a> {
 
     /// A number that states with nearly the same future share.
     fn signature(&self, sim: &Sim) -> u64 {
-        let cells = self.grain.cells_per_tile;
+        let cells = self.resolution.cells_per_tile;
         let x = (sim.x() * cells) as u64;
         let y = (sim.y() * cells) as u64;
         let vx = (sim.vx() * 4.0 * cells + 64.0) as u64;
         let vy = (sim.vy() * 10.0 + 32.0) as u64;
         let is_near = sim.enemies().iter().any(|enemy| (enemy.x - sim.x()).abs() < ENEMY_RANGE);
-        let time = if is_near { 1 + u64::from(sim.steps() / self.grain.ground_hold) } else { 0 };
+        let time = if is_near { 1 + u64::from(sim.steps() / self.resolution.ground_hold) } else { 0 };
         x | y << 12 | vx << 24 | vy << 32 | time << 40
     }
 

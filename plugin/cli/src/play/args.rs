@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{player::PlayerArgs, recording::Existing};
+use crate::{player::PlayerArgs, recording::OverwriteArgs};
 
 /// Play in a window, record, and hand over to a policy and back.
 #[derive(clap::Args)]
@@ -39,11 +39,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub(super) record: Option<PathBuf>,
     #[command(flatten)]
-    pub(super) existing: Existing,
+    pub(super) overwrite: OverwriteArgs,
     /// Who plays, for the recording.
     #[arg(long, default_value = "human")]
     pub(super) name: String,
     /// Who takes over with Tab.
     #[command(flatten)]
-    pub(super) partner: PlayerArgs,
+    pub(super) autopilot: PlayerArgs,
 }

@@ -18,7 +18,7 @@ use crate::{
     interrupt,
     player::Chosen,
     program,
-    window::{GameWindow, Partner, Playlist, WindowSetup},
+    window::{Autopilot, GameWindow, Playlist, WindowSetup},
 };
 
 /// Levels are numbered with 32 bits where nobody says how many there are.
@@ -27,15 +27,15 @@ const LAST_LEVEL: u64 = u32::MAX as u64;
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let playlist = playlist(game, &args)?;
-    let (partner, observation_config) = partner(game, &args)?;
+    let (autopilot, observation_config) = autopilot(game, &args)?;
     let header = header(game, playlist.mode(), &args);
     let seed = args.seed.unwrap_or(0);
     let mut window =
-        GameWindow::open(WindowSetup { game, playlist, partner, observation_config, seed, stop: interrupt::asked })?;
+        GameWindow::open(WindowSetup { game, playlist, autopilot, observation_config, seed, stop: interrupt::asked })?;
     // Not before there is a window: a recording without one would only be in the way.
     if let Some(path) = &args.record {
         window.check_recording()?;
-        window.record(args.existing.open(path, header)?);
+        window.record(args.overwrite.open(path, header)?);
     }
     interrupt::listen();
     announce(game, &args);
@@ -65,9 +65,9 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
 }
 
 /// Whoever takes over with Tab, and what it sees.
-fn partner(game: &dyn Game, args: &Args) -> Result<(Option<Partner>, ObservationConfig), CliError> {
-    Ok(match args.partner.load(game)? {
-        Some(Chosen { name, player, observation_config }) => (Some(Partner { name, player }), observation_config),
+fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, ObservationConfig), CliError> {
+    Ok(match args.autopilot.load(game)? {
+        Some(Chosen { name, player, observation_config }) => (Some(Autopilot { name, player }), observation_config),
         None => (None, ObservationConfig::default()),
     })
 }
@@ -84,7 +84,7 @@ fn announce(game: &dyn Game, args: &Args) {
     } else {
         tell!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
     }
-    if args.partner.is_named() {
+    if args.autopilot.is_named() {
         tell!("Tab hands over and takes over again");
     } else {
         tell!("there is nobody to hand over to: name a --policy, a --run or a --bot");

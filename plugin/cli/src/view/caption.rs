@@ -2,9 +2,9 @@
 
 use super::{
     colours::{DOWN, FAINT, UP, WORDS},
+    episode_world::EpisodeStep,
     font,
     screen::Screen,
-    stage::Shot,
 };
 
 /// Space around everything, pixels.
@@ -43,21 +43,21 @@ impl Caption {
     }
 
     /// Draws it from row `top` on.
-    pub fn draw(&self, screen: &mut Screen, top: usize, shot: &Shot) {
+    pub fn draw(&self, screen: &mut Screen, top: usize, step: &EpisodeStep) {
         let (letter, first) = (self.letter, top + MARGIN);
-        let tick = format!("tick {}", shot.tick);
+        let tick = format!("tick {}", step.tick);
         font::write(screen, &tick, letter, (MARGIN, first), FAINT);
         // The action always begins at the same place.
         let column = MARGIN + font::width("tick 9999  ") * letter;
-        font::write(screen, &shot.action, letter, (column, first), WORDS);
+        font::write(screen, &step.action, letter, (column, first), WORDS);
         let second = first + self.line();
-        if let Some(value) = shot.value {
+        if let Some(value) = step.value {
             font::write(screen, &format!("value {value:.2}"), letter, (MARGIN, second), WORDS);
         }
-        if shot.reward != 0.0 {
-            font::write(screen, &format!("reward {}", shot.reward), letter, (column, second), UP);
+        if step.reward != 0.0 {
+            font::write(screen, &format!("reward {}", step.reward), letter, (column, second), UP);
         }
-        self.bars(screen, second + self.line(), &shot.skill);
+        self.bars(screen, second + self.line(), &step.skill);
     }
 
     fn bars(&self, screen: &mut Screen, top: usize, skill: &[f32]) {

@@ -1,4 +1,4 @@
-//! Shots as PNGs: one, or many that move.
+//! Steps of an episode as PNGs: one, or many that move.
 
 use bevy_playbot::vision::ImageOptions;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
@@ -6,23 +6,23 @@ use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
 use super::{
     caption::{Caption, NARROWEST},
     colours::BACKGROUND,
+    episode_world::EpisodeStep,
     numbers::Numbers,
     screen::Screen,
-    stage::Shot,
 };
 use crate::error::CliError;
 
 /// The bytes of a file, and its width and height in pixels.
 pub type Png = (Vec<u8>, [usize; 2]);
 
-/// How shots are drawn.
+/// How the steps of an episode are drawn.
 pub struct Film {
-    subject: Subject,
+    content: FilmContent,
     tick_hz: f64,
 }
 
 /// What is above the captions.
-enum Subject {
+enum FilmContent {
     /// Pictures of a form, enlarged so many times.
     Pictures(ImageOptions, usize),
     Numbers(Numbers),
@@ -35,7 +35,7 @@ impl Film {
     ///
     /// Such a picture is too large.
     pub fn new(options: ImageOptions, scale: u32, tick_hz: f64) -> Result<Self, CliError> {
-        let film = Self { subject: Subject::Pictures(options, scale as usize), tick_hz };
+        let film = Self { content: FilmContent::Pictures(options, scale as usize), tick_hz };
         let [width, height] = film.size();
         Screen::check_size(width, height)?;
         Ok(film)
@@ -43,7 +43,7 @@ impl Film {
 
     /// Numbers instead of pictures.
     pub fn of_numbers(numbers: Numbers, tick_hz: f64) -> Self {
-        Self { subject: Subject::Numbers(numbers), tick_hz }
+        Self { content: FilmContent::Numbers(numbers), tick_hz }
     }
 
     /// One observation ([`Observation::image`](bevy_playbot::observation::Observation::image)) and nothing else; stacked pictures side by side, the oldest on the left.
@@ -58,41 +58,41 @@ impl Film {
         Ok((to_png(&screen)?, [width, height]))
     }
 
-    /// One shot with its caption.
+    /// One step with its caption.
     ///
     /// # Errors
     ///
     /// The picture is too large for a PNG.
-    pub fn captioned(&self, shot: &Shot) -> Result<Png, CliError> {
-        let (mut screen, caption) = self.screen(std::slice::from_ref(shot))?;
-        self.draw_shot(&mut screen, &caption, shot);
+    pub fn captioned(&self, step: &EpisodeStep) -> Result<Png, CliError> {
+        let (mut screen, caption) = self.screen(std::slice::from_ref(step))?;
+        self.draw_step(&mut screen, &caption, step);
         Ok((to_png(&screen)?, [screen.width, screen.height]))
     }
 
-    /// Room for any of the shots, and for what stands below it.
-    fn screen(&self, shots: &[Shot]) -> Result<(Screen, Caption), CliError> {
+    /// Room for any of the steps, and for what stands below it.
+    fn screen(&self, steps: &[EpisodeStep]) -> Result<(Screen, Caption), CliError> {
         let [width, height] = self.size();
         let width = width.max(NARROWEST);
-        let skills = shots.iter().map(|shot| shot.skill.len()).max().unwrap_or(0);
+        let skills = steps.iter().map(|step| step.skill.len()).max().unwrap_or(0);
         let caption = Caption::new(width, skills);
         Ok((Screen::new(width, height + caption.height(), BACKGROUND)?, caption))
     }
 
-    fn draw_shot(&self, screen: &mut Screen, caption: &Caption, shot: &Shot) {
+    fn draw_step(&self, screen: &mut Screen, caption: &Caption, step: &EpisodeStep) {
         screen.block(0, 0, screen.width, screen.height, BACKGROUND);
-        self.draw(screen, &shot.image, &shot.vector);
-        caption.draw(screen, self.size()[1], shot);
+        self.draw(screen, &step.image, &step.vector);
+        caption.draw(screen, self.size()[1], step);
     }
 
-    /// All shots one after the other, again and again, each with its caption. `drawn` hears each that is done.
+    /// All steps one after the other, again and again, each with its caption. `drawn` hears each that is done.
     ///
     /// # Errors
     ///
     /// The pictures are too large for a PNG.
-    pub fn animated(&self, shots: &[Shot], drawn: impl FnMut()) -> Result<Png, CliError> {
-        let (mut screen, caption) = self.screen(shots)?;
+    pub fn animated(&self, steps: &[EpisodeStep], drawn: impl FnMut()) -> Result<Png, CliError> {
+        let (mut screen, caption) = self.screen(steps)?;
         let mut bytes = Vec::new();
-        self.encode(&mut bytes, &mut screen, shots, &caption, drawn).map_err(too_large)?;
+        self.encode(&mut bytes, &mut screen, steps, &caption, drawn).map_err(too_large)?;
         Ok((bytes, [screen.width, screen.height]))
     }
 
@@ -100,17 +100,17 @@ impl Film {
         &self,
         bytes: &mut Vec<u8>,
         screen: &mut Screen,
-        shots: &[Shot],
+        steps: &[EpisodeStep],
         caption: &Caption,
         mut drawn: impl FnMut(),
     ) -> Result<(), EncodingError> {
         let mut encoder = encoder(bytes, screen);
-        encoder.set_animated(shots.len() as u32, 0)?;
+        encoder.set_animated(steps.len() as u32, 0)?;
         let (numerator, denominator) = self.delay();
         encoder.set_frame_delay(numerator, denominator)?;
         let mut writer = encoder.write_header()?;
-        for shot in shots {
-            self.draw_shot(screen, caption, shot);
+        for step in steps {
+            self.draw_step(screen, caption, step);
             writer.write_image_data(screen.bytes())?;
             drawn();
         }
@@ -128,25 +128,25 @@ impl Film {
 
     /// Width and height of the enlarged pictures, side by side, or of the numbers.
     fn size(&self) -> [usize; 2] {
-        match &self.subject {
-            Subject::Pictures(ImageOptions { width, height, stack, .. }, scale) => {
+        match &self.content {
+            FilmContent::Pictures(ImageOptions { width, height, stack, .. }, scale) => {
                 let gaps = (*stack as usize - 1) * scale;
                 [*stack as usize * *width as usize * scale + gaps, *height as usize * scale]
             }
-            Subject::Numbers(numbers) => numbers.size(),
+            FilmContent::Numbers(numbers) => numbers.size(),
         }
     }
 
     fn draw(&self, screen: &mut Screen, image: &[u8], vector: &[f32]) {
-        match &self.subject {
-            Subject::Pictures(options, scale) => {
+        match &self.content {
+            FilmContent::Pictures(options, scale) => {
                 let (width, height) = (options.width as usize, options.height as usize);
                 let picture = width * height * options.colours() as usize;
                 for (number, planes) in image.chunks_exact(picture).enumerate() {
                     screen.planes(planes, width, height, *scale, (number * (width + 1) * scale, 0));
                 }
             }
-            Subject::Numbers(numbers) => numbers.draw(screen, vector),
+            FilmContent::Numbers(numbers) => numbers.draw(screen, vector),
         }
     }
 }

@@ -18,8 +18,8 @@ const SCALE_PER_LETTER: u32 = 4;
 pub struct Reach(Vec<f32>);
 
 impl Reach {
-    /// Sees the observation of another tick.
-    pub fn see(&mut self, vector: &[f32]) {
+    /// Includes the observation of another tick.
+    pub fn include(&mut self, vector: &[f32]) {
         self.0.resize(self.0.len().max(vector.len()), 0.0);
         for (largest, value) in self.0.iter_mut().zip(vector) {
             *largest = largest.max(value.abs());
@@ -111,7 +111,7 @@ mod tests {
     fn bars_keep_one_scale_and_point_the_other_way_below_zero() {
         let vectors = [[2.0, 0.0], [-1.0, 0.0]];
         let mut reach = Reach::default();
-        vectors.iter().for_each(|vector| reach.see(vector));
+        vectors.iter().for_each(|vector| reach.include(vector));
         let numbers = Numbers::new(vec!["x".to_owned(), "y".to_owned()], 4, &reach);
         let [width, height] = numbers.size();
         for (vector, colour, pixels) in [(vectors[0], UP, BAR), (vectors[1], DOWN, BAR / 2)] {

@@ -14,11 +14,11 @@ use playbot_lab::{
 };
 
 use super::{
+    episode_world::{EpisodeStep, EpisodeWorld},
     film::Film,
     numbers::{Numbers, Reach},
     options,
-    stage::{Shot, Stage},
-    told::Written,
+    written_picture::WrittenPicture,
 };
 use crate::{
     defaults::usual_mode,
@@ -89,43 +89,43 @@ const MOST_BYTES: usize = 1 << 30;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let Opened { mut stage, observation_config, mode, player } = open_stage(game, &args, games)?;
+    let Opened { mut episode_world, observation_config, mode, player } = open_episode(game, &args, games)?;
     let pictures = observation_config
         .is_image()
         .then(|| Film::new(observation_config.image, args.scale, game.tick_hz()))
         .transpose()?;
-    let (shots, reach) = take(&mut stage, &args)?;
+    let (steps, reach) = play(&mut episode_world, &args)?;
     let numbers = || Numbers::new(game.observation().names, args.scale, &reach);
     let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
     let (bytes, size) = if args.episode {
-        let bar = progress::bar("draw", shots.len() as u64, "frames");
-        let drawn = film.animated(&shots, || bar.inc(1));
+        let bar = progress::bar("draw", steps.len() as u64, "frames");
+        let drawn = film.animated(&steps, || bar.inc(1));
         bar.finish_and_clear();
         drawn?
     } else if observation_config.is_image() {
-        film.still(&shots[0].image)?
+        film.still(&steps[0].image)?
     } else {
-        film.captioned(&shots[0])?
+        film.captioned(&steps[0])?
     };
     output::write(&args.out, &bytes)?;
-    let written = Written {
+    let written = WrittenPicture {
         path: &args.out,
         game,
         mode: &mode,
         is_mode_named: args.mode.is_some() || args.demo.is_some(),
-        level: stage.level(),
+        level: episode_world.level(),
         player: &player,
         demo: args.demo.as_deref(),
         tick: (!args.episode).then_some(args.tick),
-        frames: shots.len(),
+        frames: steps.len(),
         bytes: bytes.len(),
         size,
-        ticks: stage.ticks(),
-        end: stage.end(),
-        divergence: stage.divergence(),
+        ticks: episode_world.ticks(),
+        end: episode_world.end(),
+        divergence: episode_world.divergence(),
     };
     written.tell(args.json)?;
-    match stage.divergence() {
+    match episode_world.divergence() {
         None => Ok(Outcome::Pass),
         Some(divergence) => {
             tell!("from there on it is not the game that was recorded: {divergence}");
@@ -136,7 +136,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 
 /// A World with the player, or with the recording.
 struct Opened {
-    stage: Stage,
+    episode_world: EpisodeWorld,
     observation_config: ObservationConfig,
     /// Mode that is played.
     mode: String,
@@ -144,15 +144,15 @@ struct Opened {
     player: String,
 }
 
-fn open_stage(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, CliError> {
+fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, CliError> {
     if let Some(path) = &args.demo {
         let reader = open_recording(game, path, games)?;
         let mode = reader.header().mode.clone();
         game.check_mode(&mode).map_err(|error| CliError::Usage(format!("{}: {error}", path.display())))?;
         let observation_config = observation_config(game, args, None)?;
         let episode = episode(reader, path, args.episode_number)?;
-        let stage = Stage::replaying(game, &mode, &observation_config, episode)?;
-        return Ok(Opened { stage, observation_config, mode, player: "recording".to_owned() });
+        let episode_world = EpisodeWorld::replaying(game, &mode, &observation_config, episode)?;
+        return Ok(Opened { episode_world, observation_config, mode, player: "recording".to_owned() });
     }
     let mode = args.mode.as_deref().unwrap_or_else(|| usual_mode(game));
     game.check_mode(mode)?;
@@ -161,8 +161,8 @@ fn open_stage(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, Cli
         None => Chosen::usual(game)?,
     };
     let observation_config = observation_config(game, args, Some(&chosen))?;
-    let stage = Stage::playing(game, mode, &observation_config, args.seed, &chosen.player)?;
-    Ok(Opened { stage, observation_config, mode: mode.to_owned(), player: chosen.name })
+    let episode_world = EpisodeWorld::playing(game, mode, &observation_config, args.seed, &chosen.player)?;
+    Ok(Opened { episode_world, observation_config, mode: mode.to_owned(), player: chosen.name })
 }
 
 /// A recording of this game and these rules.
@@ -231,26 +231,26 @@ fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<DemoEpisode
 }
 
 /// Plays until the tick that is asked for, or to the end.
-fn take(stage: &mut Stage, args: &Args) -> Result<(Vec<Shot>, Reach), CliError> {
+fn play(episode_world: &mut EpisodeWorld, args: &Args) -> Result<(Vec<EpisodeStep>, Reach), CliError> {
     interrupt::listen();
     let bar = progress::bar("play", 0, "ticks");
-    let (mut shots, mut reach, mut kept) = (Vec::new(), Reach::default(), 0);
-    while let Some(shot) = stage.next()? {
-        bar.set_length(u64::from(shot.tick) + 1);
-        bar.set_position(u64::from(shot.tick) + 1);
-        reach.see(&shot.vector);
+    let (mut steps, mut reach, mut kept) = (Vec::new(), Reach::default(), 0);
+    while let Some(step) = episode_world.next()? {
+        bar.set_length(u64::from(step.tick) + 1);
+        bar.set_position(u64::from(step.tick) + 1);
+        reach.include(&step.vector);
         if args.episode {
-            kept += shot.image.len() + size_of_val(shot.vector.as_slice());
+            kept += step.image.len() + size_of_val(step.vector.as_slice());
             if kept > MOST_BYTES {
                 return Err(CliError::Usage(format!(
                     "the pictures of {} ticks take more than {} MiB of memory: try smaller pictures, or a shorter stack",
-                    shot.tick,
+                    step.tick,
                     MOST_BYTES >> 20
                 )));
             }
-            shots.push(shot);
-        } else if shot.tick == args.tick {
-            shots.push(shot);
+            steps.push(step);
+        } else if step.tick == args.tick {
+            steps.push(step);
             break;
         }
         if interrupt::asked() {
@@ -258,9 +258,9 @@ fn take(stage: &mut Stage, args: &Args) -> Result<(Vec<Shot>, Reach), CliError> 
         }
     }
     bar.finish_and_clear();
-    if shots.is_empty() {
-        let ticks = stage.ticks();
+    if steps.is_empty() {
+        let ticks = episode_world.ticks();
         return Err(CliError::Usage(format!("there is no tick {}: the episode has {ticks} ticks, from 0", args.tick)));
     }
-    Ok((shots, reach))
+    Ok((steps, reach))
 }

@@ -21,7 +21,7 @@ use playbot_lab::prelude::*;
 use playbot_lab::worlds::{add_game, spawn_agents};
 
 use super::{
-    Partner, Playlist, WindowError, camera,
+    Autopilot, Playlist, WindowError, camera,
     ending::{self, Verdict},
     error::catch,
     frames, keys, own_keys, pace, score,
@@ -41,10 +41,10 @@ pub struct WindowSetup<'a> {
     /// Its levels.
     pub playlist: Playlist,
     /// Who takes over when the person presses Tab.
-    pub partner: Option<Partner>,
-    /// What the partner sees.
+    pub autopilot: Option<Autopilot>,
+    /// What the autopilot sees.
     pub observation_config: ObservationConfig,
-    /// Seed of the partner's draws.
+    /// Seed of the autopilot's draws.
     pub seed: u64,
     /// Whether somebody outside the window wants it closed; asked every frame.
     pub stop: fn() -> bool,
@@ -74,7 +74,7 @@ impl GameWindow {
 
     /// A game that is drawn for us.
     fn with_our_camera(setup: WindowSetup) -> Result<Self, WindowError> {
-        let WindowSetup { game, playlist, partner, observation_config, seed, stop } = setup;
+        let WindowSetup { game, playlist, autopilot, observation_config, seed, stop } = setup;
         let keys = game.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
         let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         let resolution = WindowResolution::new(SIDE, SIDE);
@@ -88,7 +88,7 @@ impl GameWindow {
             // Those who see pictures have brought it already.
             game.build_picture(&mut app);
         }
-        let agent = seat(&mut app, game, &observation_config, partner, playlist);
+        let agent = seat(&mut app, game, &observation_config, autopilot, playlist);
         app.world_mut().entity_mut(agent).insert(keys);
         camera::build(&mut app, picture.width);
         let has_space_view = game.has_space_view();
@@ -110,7 +110,7 @@ impl GameWindow {
 
     /// A game that draws itself, and whose ticks are frames: in a window like the one that it has headless.
     fn as_it_is(setup: WindowSetup) -> Result<Self, WindowError> {
-        let WindowSetup { game, playlist, partner, observation_config, seed, stop } = setup;
+        let WindowSetup { game, playlist, autopilot, observation_config, seed, stop } = setup;
         let window = Window {
             title: game.name().to_owned(),
             resolution: WindowResolution::new(1280, 720),
@@ -134,7 +134,7 @@ impl GameWindow {
             react_to_window_events: false,
         };
         set_pace(&mut app, by_the_clock, by_the_clock);
-        let agent = seat(&mut app, game, &observation_config, partner, playlist);
+        let agent = seat(&mut app, game, &observation_config, autopilot, playlist);
         let unrecorded = match game.key_bindings() {
             Some(keys) => {
                 app.world_mut().entity_mut(agent).insert((keys, PressesForPeople));
@@ -182,11 +182,11 @@ fn seat(
     app: &mut App,
     game: &dyn Game,
     observation_config: &ObservationConfig,
-    partner: Option<Partner>,
+    autopilot: Option<Autopilot>,
     playlist: Playlist,
 ) -> Entity {
     let agent = spawn_agents(game, app.world_mut(), observation_config, 0, 1)[0];
-    let seats = Seats::new(game, app.world_mut(), agent, partner);
+    let seats = Seats::new(game, app.world_mut(), agent, autopilot);
     app.world_mut().entity_mut(agent).insert((Control::Human, playlist.queue()));
     app.insert_resource(seats).insert_resource(playlist);
     agent

@@ -1,4 +1,4 @@
-//! The person's eye: the bots' square view, enlarged, with the player in the middle.
+//! The person's camera: the bots' square view, enlarged, with the player in the middle.
 
 use bevy::{
     camera::{ScalingMode, Viewport},
@@ -61,42 +61,43 @@ impl Zoom {
     }
 }
 
+/// Marks the camera through which the person sees the game.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
-struct Eye;
+struct WindowCamera;
 
 fn spawn_camera(zoom: Res<Zoom>, mut commands: Commands) {
     let projection = OrthographicProjection { scaling_mode: zoom.scaling(), ..OrthographicProjection::default_2d() };
-    commands.spawn((Eye, Camera2d, Projection::Orthographic(projection), Msaa::Off));
+    commands.spawn((WindowCamera, Camera2d, Projection::Orthographic(projection), Msaa::Off));
 }
 
-fn follow(seats: Res<Seats>, mut eye: ParamSet<(TransformHelper, Single<&mut Transform, With<Eye>>)>) {
+fn follow(seats: Res<Seats>, mut camera: ParamSet<(TransformHelper, Single<&mut Transform, With<WindowCamera>>)>) {
     // Until the first level is drawn the agent may be nowhere.
-    let Ok(at) = eye.p0().compute_global_transform(seats.agent) else { return };
+    let Ok(at) = camera.p0().compute_global_transform(seats.agent) else { return };
     let at = at.translation();
-    let mut eye = eye.p1();
-    eye.translation.x = at.x;
-    eye.translation.y = at.y;
+    let mut camera = camera.p1();
+    camera.translation.x = at.x;
+    camera.translation.y = at.y;
 }
 
-fn zoom(zoom: Res<Zoom>, mut eye: Single<&mut Projection, With<Eye>>) {
+fn zoom(zoom: Res<Zoom>, mut camera: Single<&mut Projection, With<WindowCamera>>) {
     if zoom.is_changed()
-        && let Projection::Orthographic(projection) = &mut **eye
+        && let Projection::Orthographic(projection) = &mut **camera
     {
         projection.scaling_mode = zoom.scaling();
     }
 }
 
 /// A window of any shape shows the square in its middle.
-fn keep_square(window: Single<Ref<Window>, With<PrimaryWindow>>, mut eye: Single<&mut Camera, With<Eye>>) {
+fn keep_square(window: Single<Ref<Window>, With<PrimaryWindow>>, mut camera: Single<&mut Camera, With<WindowCamera>>) {
     let size = window.physical_size();
     let side = size.min_element();
     if side == 0
-        || eye.viewport.as_ref().is_some_and(|viewport| viewport.physical_size == UVec2::splat(side))
+        || camera.viewport.as_ref().is_some_and(|viewport| viewport.physical_size == UVec2::splat(side))
             && !window.is_changed()
     {
         return;
     }
-    eye.viewport =
+    camera.viewport =
         Some(Viewport { physical_position: (size - side) / 2, physical_size: UVec2::splat(side), ..default() });
 }

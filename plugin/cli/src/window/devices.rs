@@ -1,6 +1,6 @@
 //! The person's devices, kept from the game or handed on to it.
 //!
-//! Between two frames the window system writes its messages into empty lists, while those of the game lie aside. So
+//! Between two frames the window system writes its messages into empty lists, while those of the game are stashed. So
 //! what the person does can be told from what virtual input does, message by message.
 
 use bevy::{
@@ -27,21 +27,23 @@ pub(super) enum Devices {
 /// The messages that do not count at the moment: between frames the game's, in frames nobody's.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
-struct Aside<M: Message>(#[reflect(ignore)] Messages<M>);
+struct StashedMessages<M: Message>(#[reflect(ignore)] Messages<M>);
 
 pub(super) fn build(app: &mut App) {
     app.init_resource::<OwnKeys>();
-    put_aside::<KeyboardInput>(app);
-    put_aside::<MouseButtonInput>(app);
-    put_aside::<MouseMotion>(app);
-    put_aside::<MouseWheel>(app);
-    put_aside::<CursorMoved>(app);
-    put_aside::<WindowFocused>(app);
-    put_aside::<WindowEvent>(app);
+    add_stash::<KeyboardInput>(app);
+    add_stash::<MouseButtonInput>(app);
+    add_stash::<MouseMotion>(app);
+    add_stash::<MouseWheel>(app);
+    add_stash::<CursorMoved>(app);
+    add_stash::<WindowFocused>(app);
+    add_stash::<WindowEvent>(app);
 }
 
-fn put_aside<M: Message + TypePath>(app: &mut App) {
-    app.add_message::<M>().insert_resource(Aside::<M>(Messages::default())).register_type::<Aside<M>>();
+fn add_stash<M: Message + TypePath>(app: &mut App) {
+    app.add_message::<M>()
+        .insert_resource(StashedMessages::<M>(Messages::default()))
+        .register_type::<StashedMessages<M>>();
 }
 
 /// At the start of a frame: reads the person's keys, and hands on what the game may see.
@@ -102,15 +104,15 @@ pub(super) fn set(world: &mut World, devices: Devices) {
 }
 
 fn swap<M: Message>(world: &mut World) {
-    world.resource_scope(|world, mut aside: Mut<Aside<M>>| {
-        std::mem::swap(&mut aside.0, &mut *world.resource_mut::<Messages<M>>());
+    world.resource_scope(|world, mut stash: Mut<StashedMessages<M>>| {
+        std::mem::swap(&mut stash.0, &mut *world.resource_mut::<Messages<M>>());
     });
 }
 
 /// Brings the game's messages back, and returns those of the window system.
 fn lift<M: Message>(world: &mut World) -> Vec<M> {
     swap::<M>(world);
-    world.resource_mut::<Aside<M>>().0.drain().collect()
+    world.resource_mut::<StashedMessages<M>>().0.drain().collect()
 }
 
 fn hand_on<M: Message>(world: &mut World, messages: Vec<M>, is_open: bool) {

@@ -42,23 +42,23 @@ fn let_go(mut gamepads: Query<&mut Gamepad, Without<VirtualGamepad>>) {
     }
 }
 
-type Own<'w, 's> = Query<'w, 's, (), With<VirtualGamepad>>;
+type VirtualGamepads<'w, 's> = Query<'w, 's, (), With<VirtualGamepad>>;
 
-fn keep_events(events: ResMut<Messages<RawGamepadEvent>>, own: Own) {
+fn keep_events(events: ResMut<Messages<RawGamepadEvent>>, virtual_gamepads: VirtualGamepads) {
     keep(events, |event| match event {
         // A game may show which gamepads are connected; only what they do is kept from it.
         RawGamepadEvent::Connection(_) => true,
-        RawGamepadEvent::Button(change) => own.contains(change.gamepad),
-        RawGamepadEvent::Axis(change) => own.contains(change.gamepad),
+        RawGamepadEvent::Button(change) => virtual_gamepads.contains(change.gamepad),
+        RawGamepadEvent::Axis(change) => virtual_gamepads.contains(change.gamepad),
     });
 }
 
-fn keep_buttons(events: ResMut<Messages<RawGamepadButtonChangedEvent>>, own: Own) {
-    keep(events, |change| own.contains(change.gamepad));
+fn keep_buttons(events: ResMut<Messages<RawGamepadButtonChangedEvent>>, virtual_gamepads: VirtualGamepads) {
+    keep(events, |change| virtual_gamepads.contains(change.gamepad));
 }
 
-fn keep_axes(events: ResMut<Messages<RawGamepadAxisChangedEvent>>, own: Own) {
-    keep(events, |change| own.contains(change.gamepad));
+fn keep_axes(events: ResMut<Messages<RawGamepadAxisChangedEvent>>, virtual_gamepads: VirtualGamepads) {
+    keep(events, |change| virtual_gamepads.contains(change.gamepad));
 }
 
 /// Drops what is not let through. What came before this frame has been read.

@@ -37,7 +37,7 @@ pub(super) fn excuse_view(app: &mut App) {
     app.add_systems(PreUpdate, says.after(OwnKeysRead));
 }
 
-/// Tab: the partner takes over, or gives back.
+/// Tab: the autopilot takes over, or gives back.
 fn hand_over(
     keys: Res<OwnKeys>,
     seats: Res<Seats>,

@@ -27,4 +27,4 @@ mod title;
 pub use app::{GameWindow, WindowSetup};
 pub use error::WindowError;
 pub use playlist::Playlist;
-pub use seats::Partner;
+pub use seats::Autopilot;

@@ -5,7 +5,7 @@ use playbot_lab::eval::Player;
 use playbot_lab::prelude::*;
 
 /// Whoever takes over from the person, and gives back.
-pub struct Partner {
+pub struct Autopilot {
     /// Its name, for people.
     pub name: String,
     /// A policy or a bot.
@@ -18,30 +18,30 @@ pub struct Partner {
 pub(super) struct Seats {
     /// The agent.
     pub agent: Entity,
-    partner: Option<(String, Control)>,
+    autopilot: Option<(String, Control)>,
 }
 
 impl Seats {
-    /// Prepares the agent for the partner; nobody decides yet.
-    pub fn new(game: &dyn Game, world: &mut World, agent: Entity, partner: Option<Partner>) -> Self {
-        let partner = partner.map(|Partner { name, player }| {
+    /// Prepares the agent for the autopilot; nobody decides yet.
+    pub fn new(game: &dyn Game, world: &mut World, agent: Entity, autopilot: Option<Autopilot>) -> Self {
+        let autopilot = autopilot.map(|Autopilot { name, player }| {
             player.install(world);
             (name, player.seat(game, world, agent))
         });
-        Self { agent, partner }
+        Self { agent, autopilot }
     }
 
     /// Who decides after a change; `None` if there is nobody to change with.
     pub fn other(&self, control: Control) -> Option<Control> {
-        let (_, partner) = self.partner.as_ref()?;
-        Some(if control == Control::Human { *partner } else { Control::Human })
+        let (_, autopilot) = self.autopilot.as_ref()?;
+        Some(if control == Control::Human { *autopilot } else { Control::Human })
     }
 
     /// Who decides, in words.
     pub fn who(&self, control: Control) -> String {
-        match (&self.partner, control) {
+        match (&self.autopilot, control) {
             (_, Control::Human) => "you play".to_owned(),
-            (Some((name, partner)), control) if *partner == control => format!("{name} plays"),
+            (Some((name, autopilot)), control) if *autopilot == control => format!("{name} plays"),
             _ => "nobody plays".to_owned(),
         }
     }

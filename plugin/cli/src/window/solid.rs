@@ -30,13 +30,13 @@ pub(super) fn build(app: &mut App, game: &dyn Game) {
 #[reflect(Resource)]
 struct Solid(bool);
 
-/// The eye in space, and the place it looks at.
+/// The camera in space, and the place it looks at.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
-struct SolidEye(Option<Vec3>);
+struct SolidCamera(Option<Vec3>);
 
 fn spawn_camera(mut commands: Commands) {
-    commands.spawn((SolidEye(None), Camera3d::default(), Tonemapping::AcesFitted, Camera { order: 1, ..default() }));
+    commands.spawn((SolidCamera(None), Camera3d::default(), Tonemapping::AcesFitted, Camera { order: 1, ..default() }));
 }
 
 /// V: from above, or in space.
@@ -47,7 +47,7 @@ fn change_view(keys: Res<OwnKeys>, mut solid: ResMut<Solid>) {
 }
 
 /// Only one of the window's cameras draws.
-fn choose(solid: Res<Solid>, mut cameras: Query<(&mut Camera, &RenderTarget, Has<SolidEye>)>) {
+fn choose(solid: Res<Solid>, mut cameras: Query<(&mut Camera, &RenderTarget, Has<SolidCamera>)>) {
     for (mut camera, target, in_space) in &mut cameras {
         let wanted = in_space == solid.0;
         if matches!(target, RenderTarget::Window(_)) && camera.is_active != wanted {
@@ -61,14 +61,14 @@ fn follow(
     seats: Res<Seats>,
     zoom: Res<Zoom>,
     focuses: Query<&CameraFocus>,
-    mut set: ParamSet<(TransformHelper, Single<(&mut SolidEye, &mut Transform)>)>,
+    mut set: ParamSet<(TransformHelper, Single<(&mut SolidCamera, &mut Transform)>)>,
 ) {
     let Ok(focus) = focuses.get(seats.agent) else { return };
     let Ok(at) = set.p0().compute_global_transform(focus.0) else { return };
-    let (mut eye, mut transform) = set.p1().into_inner();
+    let (mut camera, mut transform) = set.p1().into_inner();
     let at = at.translation();
-    let before = eye.0.filter(|before| before.distance(at) < 3.0).unwrap_or(at);
+    let before = camera.0.filter(|before| before.distance(at) < 3.0).unwrap_or(at);
     let looks_at = before.lerp(at, (HASTE * clock.delta_secs()).min(1.0));
-    eye.0 = Some(looks_at);
+    camera.0 = Some(looks_at);
     *transform = Transform::from_translation(looks_at + BEHIND * zoom.factor()).looking_at(looks_at, Vec3::Z);
 }

@@ -13,7 +13,7 @@
 //!     keep_observations: false,
 //! };
 //! let writer = DemoWriter::create("easy.demo", plan.header(game))?;
-//! let (mut world, agent) = plan.stage(game, writer);
+//! let (mut world, agent) = plan.build_world(game, writer);
 //! while Control::of(&world, agent).is_active() {
 //!     world.tick()?;
 //! }
@@ -62,7 +62,7 @@ impl DemonstrationPlan {
 
     /// A World with an agent that the demonstrator plays, recorded by `writer` in each tick. After the last level the agent is
     /// idle. With a number of steps it plays on, and whoever ticks the World looks at [`Recorder::steps`].
-    pub fn stage(&self, game: &dyn Game, writer: DemoWriter) -> (World, Entity) {
+    pub fn build_world(&self, game: &dyn Game, writer: DemoWriter) -> (World, Entity) {
         let (mut world, agents) = build_world(game, &self.mode, self.seed, 0, 1);
         let agent = agents[0];
         game.attach_demonstrator(&mut world, agent, self.noise);

@@ -108,11 +108,11 @@ pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) 
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
     let mode = reader.header().mode.clone();
     game.check_mode(&mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
-    let mut stage = ReplayStage::new(game, &mode);
+    let mut replayer = EpisodeReplayer::new(game, &mode);
     let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
     for episode in reader {
         let episode = Arc::new(episode?);
-        if let Some(divergence) = stage.play(episode.clone(), |_, _| {})? {
+        if let Some(divergence) = replayer.play(episode.clone(), |_, _| {})? {
             report.divergences.push((report.episodes, divergence.to_string()));
         }
         report.episodes += 1;
@@ -123,12 +123,12 @@ pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) 
 }
 
 /// A World with one agent on which recordings are played.
-pub struct ReplayStage {
+pub struct EpisodeReplayer {
     world: World,
     agent: Entity,
 }
 
-impl ReplayStage {
+impl EpisodeReplayer {
     /// Builds the game in a mode it has.
     pub fn new(game: &dyn Game, mode: &str) -> Self {
         let (world, agents) = build_world(game, mode, 0, 0, 1);

@@ -5,17 +5,17 @@ use bevy::{
     prelude::*,
 };
 
-use super::{census::types_of, game_copy::GameCopy, types::TypeBook, values::each_entity};
+use super::{census::types_of, game_copy::GameCopy, types::KnownTypes, values::each_entity};
 
 /// The number of the agent that an entity is tied to, or `None` if several are.
 pub(super) type Owners = EntityHashMap<Option<u32>>;
 
 /// Follows the entities that components name, from every agent outwards, in both directions. What two agents reach at the
 /// same distance belongs to neither, and nothing behind it does.
-pub(super) fn owners(book: &TypeBook, copy: &GameCopy, entities: impl Iterator<Item = Entity>) -> Owners {
+pub(super) fn owners(known_types: &KnownTypes, copy: &GameCopy, entities: impl Iterator<Item = Entity>) -> Owners {
     let mut ties: EntityHashMap<EntityHashSet> = EntityHashMap::default();
     for entity in entities {
-        for named in named_by(book, &copy.world, entity) {
+        for named in named_by(known_types, &copy.world, entity) {
             ties.entry(entity).or_default().insert(named);
             ties.entry(named).or_default().insert(entity);
         }
@@ -42,11 +42,11 @@ pub(super) fn owners(book: &TypeBook, copy: &GameCopy, entities: impl Iterator<I
     owners
 }
 
-fn named_by(book: &TypeBook, world: &World, entity: Entity) -> Vec<Entity> {
+fn named_by(known_types: &KnownTypes, world: &World, entity: Entity) -> Vec<Entity> {
     let entity = world.entity(entity);
     let mut named = Vec::new();
     for id in types_of(world, entity.archetype().components()) {
-        let known = book.get(id).filter(|known| known.is_compared());
+        let known = known_types.get(id).filter(|known| known.is_compared());
         if let Some(value) = known.and_then(|known| known.reflect.as_ref()?.reflect(entity)) {
             each_entity(value.as_partial_reflect(), &mut |other| named.push(other));
         }

@@ -8,7 +8,7 @@ use bevy::{
 };
 use bevy_playbot::agent::Agent;
 
-use super::types::TypeBook;
+use super::types::KnownTypes;
 
 /// What entities of two Worlds must have in common to be the same one: its name, and the game's own components. Those of the
 /// engine come and go with the loading of files.
@@ -56,12 +56,12 @@ impl Census {
     }
 
     /// All entities, by kind.
-    pub fn groups(&self, world: &World, book: &TypeBook) -> Groups {
+    pub fn groups(&self, world: &World, known_types: &KnownTypes) -> Groups {
         let mut numbered: Vec<_> = self.numbers.iter().map(|(&entity, &number)| (number, entity)).collect();
         numbered.sort();
         let mut groups = Groups::new();
         for (_, entity) in numbered {
-            groups.entry(key(world, entity, book)).or_default().push(entity);
+            groups.entry(key(world, entity, known_types)).or_default().push(entity);
         }
         groups
     }
@@ -80,13 +80,13 @@ fn game_entities(world: &World) -> Vec<Entity> {
     shown.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id())).collect()
 }
 
-fn key(world: &World, entity: Entity, book: &TypeBook) -> GroupKey {
+fn key(world: &World, entity: Entity, known_types: &KnownTypes) -> GroupKey {
     let entity = world.entity(entity);
     let types = types_of(world, entity.archetype().components());
     GroupKey {
         agent: entity.get::<Agent>().map(|agent| agent.index),
         name: entity.get::<Name>().map(|name| name.as_str().to_owned()),
-        types: types.into_iter().filter(|id| book.get(*id).is_some_and(|known| !known.engine)).collect(),
+        types: types.into_iter().filter(|id| known_types.get(*id).is_some_and(|known| !known.engine)).collect(),
     }
 }
 
@@ -106,7 +106,7 @@ mod tests {
     struct Brick;
 
     fn order(world: &World, census: &Census) -> Vec<Entity> {
-        let groups = census.groups(world, &TypeBook::new(&World::new()));
+        let groups = census.groups(world, &KnownTypes::new(&World::new()));
         groups.into_values().flatten().collect()
     }
 

@@ -17,12 +17,12 @@ use super::{
     pairs::Pairs,
     report::{Comparison, Difference, DifferenceKind},
     scope,
-    types::{KnownType, TypeBook},
+    types::{KnownType, KnownTypes},
 };
 
 /// How copies are compared.
 pub(super) struct Comparer<'a> {
-    pub book: &'a TypeBook,
+    pub known_types: &'a KnownTypes,
     pub comparison: Comparison,
     /// Parts of paths of types that nobody wants to hear of.
     pub ignored: &'a [String],
@@ -109,7 +109,7 @@ impl Comparer<'_> {
         let (lefts, rights) = (self.resources(left), self.resources(right));
         let all: BTreeSet<TypeId> = lefts.keys().chain(rights.keys()).copied().collect();
         for id in all {
-            let Some(known) = self.book.get(id).filter(|known| self.is_wanted(known)) else { continue };
+            let Some(known) = self.known_types.get(id).filter(|known| self.is_wanted(known)) else { continue };
             let name = known.path.clone().unwrap_or_default();
             let difference = match (lefts.get(&id), rights.get(&id)) {
                 (Some(&a), Some(&b)) => self.field(known, (&left.world, a), (&right.world, b), same_entity),
@@ -201,9 +201,9 @@ impl Comparer<'_> {
     ) -> Vec<(String, FieldDifference)> {
         let types = types_of(&left.world, left.world.entity(a).archetype().components());
         let shared = types.into_iter().filter(|id| right.world.entity(b).contains_type_id(*id));
-        let book = self.book;
+        let known_types = self.known_types;
         let mut differences = Vec::new();
-        for known in shared.filter_map(|id| book.get(id)) {
+        for known in shared.filter_map(|id| known_types.get(id)) {
             if self.is_wanted(known)
                 && let Some(field) = self.field(known, (&left.world, a), (&right.world, b), same_entity)
             {

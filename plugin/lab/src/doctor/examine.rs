@@ -3,11 +3,11 @@
 use super::{
     finding::findings,
     game_copy::{Plan, bare_world},
-    observed::{ObservationReport, Watch},
+    observed::{ObservationMonitor, ObservationReport},
     report::{Comparison, ComparisonReport, DoctorReport},
-    safety::judge,
+    safety::assess_safety,
     trial::Trial,
-    types::{TypeBook, TypesReport},
+    types::{KnownTypes, TypesReport},
 };
 use crate::{game::Game, mode::ModeError};
 
@@ -44,7 +44,7 @@ pub fn examine(
 ) -> Result<DoctorReport, ModeError> {
     game.check_mode(&options.mode)?;
     let plan = Plan { mode: &options.mode, seed: options.seed };
-    let mut book = TypeBook::new(&bare_world());
+    let mut known_types = KnownTypes::new(&bare_world());
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
     let mut suspicions = Vec::new();
@@ -56,14 +56,14 @@ pub fn examine(
         progress(comparison);
         let mut trial = Trial::new(comparison, game, &plan, options.ticks);
         let is_first = comparison == Comparison::Repeat;
-        let mut watch = is_first.then(|| Watch::new(trial.copies[0].observed_names()));
-        let ran = trial.run(options.ticks, &mut book, &options.ignored, watch.as_mut());
-        if let Some(watch) = watch {
-            observation = watch.report();
-            types = book.report(&trial.copies[0], &ran.incomparable);
-            suspicions = book.suspicions(&trial.copies[0]);
+        let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
+        let result = trial.run(options.ticks, &mut known_types, &options.ignored, monitor.as_mut());
+        if let Some(monitor) = monitor {
+            observation = monitor.report();
+            types = known_types.report(&trial.copies[0], &result.incomparable);
+            suspicions = known_types.suspicions(&trial.copies[0]);
         }
-        comparisons.push(ran.report);
+        comparisons.push(result.report);
     }
     Ok(DoctorReport {
         game: game.name().to_owned(),
@@ -71,7 +71,7 @@ pub fn examine(
         mode: options.mode.clone(),
         seed: options.seed,
         ticks: options.ticks,
-        safety: judge(&comparisons, &observation),
+        safety: assess_safety(&comparisons, &observation),
         findings: findings(&comparisons, &observation, &suspicions),
         comparisons,
         observation,

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{
     cause::{Cause, CauseKind, causes},
-    observed::ObservationReport,
+    observed::{NonFiniteValue, ObservationReport},
     report::{Comparison, ComparisonReport, Difference},
 };
 
@@ -73,7 +73,7 @@ fn plain(kind: FindingKind, what: String, comparison: Option<Comparison>) -> Fin
 
 fn of_observation(seen: &ObservationReport) -> Vec<Finding> {
     let mut findings = Vec::new();
-    if let Some((tick, name, value)) = &seen.not_finite {
+    if let Some(NonFiniteValue { tick, name, value }) = &seen.not_finite {
         let what = format!("observation `{name}` is {value} at tick {tick}: no policy can read that");
         findings.push(plain(FindingKind::NotFinite, what, None));
     }

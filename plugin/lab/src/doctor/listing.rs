@@ -2,7 +2,10 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use super::{observed::ObservationReport, types::TypesReport};
+use super::{
+    observed::{NonFiniteValue, ObservationReport},
+    types::TypesReport,
+};
 
 /// Most lines of one list; a longer one ends with how many more there are.
 const LISTED: usize = 8;
@@ -14,7 +17,7 @@ impl Display for ObservationReport {
             0 => writeln!(f, "Observation: {values} values, all of which changed in {ticks} ticks")?,
             count => writeln!(f, "Observation: {values} values, {count} of which never changed in {ticks} ticks")?,
         }
-        if let Some((tick, name, value)) = &self.not_finite {
+        if let Some(NonFiniteValue { tick, name, value }) = &self.not_finite {
             writeln!(f, "  {:<26}{value} at tick {tick}: not a number that a policy can read", quoted(name))?;
         }
         if let Some((tick, count)) = self.length {
@@ -74,7 +77,8 @@ mod tests {
 
     #[test]
     fn each_observation_with_a_problem_has_a_line_of_its_own() {
-        let report = ObservationReport { not_finite: Some((7, "x".to_owned(), "inf".to_owned())), ..constant(1) };
+        let value = NonFiniteValue { tick: 7, name: "x".to_owned(), value: "inf".to_owned() };
+        let report = ObservationReport { not_finite: Some(value), ..constant(1) };
         let text = report.to_string();
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(lines.len(), 3, "{text}");

@@ -31,7 +31,7 @@ mod values;
 pub use cause::{Cause, CauseKind};
 pub use examine::{DoctorOptions, examine};
 pub use finding::{Finding, FindingKind};
-pub use observed::{ConstantValue, ObservationReport};
+pub use observed::{ConstantValue, NonFiniteValue, ObservationReport};
 pub use report::{Comparison, ComparisonReport, Difference, DifferenceKind, DoctorReport};
 pub use safety::{Safety, Verdict};
 pub use types::TypesReport;

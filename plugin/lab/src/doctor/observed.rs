@@ -13,6 +13,17 @@ pub struct ConstantValue {
     pub value: f32,
 }
 
+/// An observed value that was no finite number.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct NonFiniteValue {
+    /// The tick, from 0.
+    pub tick: u32,
+    /// Name of the value.
+    pub name: String,
+    /// What it was: `NaN`, `inf` or `-inf`.
+    pub value: String,
+}
+
 /// What one agent observed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObservationReport {
@@ -22,8 +33,8 @@ pub struct ObservationReport {
     pub ticks: u32,
     /// Those that were the same in all of them.
     pub constant: Vec<ConstantValue>,
-    /// The first value that was no finite number: the tick, from 0, its name and what it was.
-    pub not_finite: Option<(u32, String, String)>,
+    /// The first value that was no finite number.
+    pub not_finite: Option<NonFiniteValue>,
     /// The first tick, from 0, with another number of values, and that number.
     pub length: Option<(u32, usize)>,
     /// Whether the game writes a state hash.
@@ -31,7 +42,7 @@ pub struct ObservationReport {
 }
 
 /// Looks at one agent's observations.
-pub(super) struct Watch {
+pub(super) struct ObservationMonitor {
     names: Vec<String>,
     first: Option<Outcome>,
     changed: Vec<bool>,
@@ -39,7 +50,7 @@ pub(super) struct Watch {
     report: ObservationReport,
 }
 
-impl Watch {
+impl ObservationMonitor {
     /// Values of these names are expected.
     pub fn new(names: Vec<String>) -> Self {
         let report = ObservationReport { values: names.len(), ..Default::default() };
@@ -57,7 +68,7 @@ impl Watch {
         let bad = seen.observation.iter().position(|value| !value.is_finite());
         if let (Some(at), None) = (bad, &self.report.not_finite) {
             let name = self.names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
-            self.report.not_finite = Some((tick, name, seen.observation[at].to_string()));
+            self.report.not_finite = Some(NonFiniteValue { tick, name, value: seen.observation[at].to_string() });
         }
         let first = self.first.get_or_insert_with(|| seen.clone());
         for ((now, then), changed) in seen.observation.iter().zip(&first.observation).zip(&mut self.changed) {
@@ -93,32 +104,33 @@ impl ObservationReport {
 mod tests {
     use super::*;
 
-    fn watch(rows: &[&[f32]]) -> ObservationReport {
-        let mut watch = Watch::new(vec!["x".to_owned(), "y".to_owned()]);
+    fn report_on(rows: &[&[f32]]) -> ObservationReport {
+        let mut monitor = ObservationMonitor::new(vec!["x".to_owned(), "y".to_owned()]);
         for (tick, row) in rows.iter().enumerate() {
             let seen = Outcome { observation: row.to_vec(), image: Vec::new(), reward: 0.0, hash: 0, end: None };
-            watch.note(tick as u32, &seen);
+            monitor.note(tick as u32, &seen);
         }
-        watch.report()
+        monitor.report()
     }
 
     #[test]
     fn constant_values_are_named() {
-        let report = watch(&[&[1.0, 5.0], &[2.0, 5.0]]);
+        let report = report_on(&[&[1.0, 5.0], &[2.0, 5.0]]);
         let always_five = ConstantValue { name: "y".to_owned(), value: 5.0 };
         assert_eq!((report.constant.as_slice(), report.is_blind()), (&[always_five][..], false));
-        assert!(watch(&[&[1.0, 5.0], &[1.0, 5.0]]).is_blind());
-        assert!(!watch(&[&[1.0, 5.0]]).is_blind(), "one tick proves nothing");
+        assert!(report_on(&[&[1.0, 5.0], &[1.0, 5.0]]).is_blind());
+        assert!(!report_on(&[&[1.0, 5.0]]).is_blind(), "one tick proves nothing");
     }
 
     #[test]
     fn the_first_value_that_is_no_number_is_named_with_its_tick() {
-        let report = watch(&[&[1.0, 5.0], &[2.0, f32::NAN], &[f32::INFINITY, 5.0]]);
-        assert_eq!(report.not_finite, Some((1, "y".to_owned(), "NaN".to_owned())));
+        let report = report_on(&[&[1.0, 5.0], &[2.0, f32::NAN], &[f32::INFINITY, 5.0]]);
+        let first = NonFiniteValue { tick: 1, name: "y".to_owned(), value: "NaN".to_owned() };
+        assert_eq!(report.not_finite, Some(first));
     }
 
     #[test]
     fn another_number_of_values_is_noticed() {
-        assert_eq!(watch(&[&[1.0, 5.0], &[2.0], &[]]).length, Some((1, 1)));
+        assert_eq!(report_on(&[&[1.0, 5.0], &[2.0], &[]]).length, Some((1, 1)));
     }
 }

@@ -22,8 +22,8 @@ pub(super) struct Pairs {
 impl Comparer<'_> {
     /// Finds the partners of all entities; kinds of which there are more on one side are reported and left out.
     pub(super) fn pair_up(&self, left: &GameCopy, right: &GameCopy, tick: u32, found: &mut Found) -> Vec<Pairs> {
-        let lefts = left.census.groups(&left.world, self.book);
-        let mut rights = right.census.groups(&right.world, self.book);
+        let lefts = left.census.groups(&left.world, self.known_types);
+        let mut rights = right.census.groups(&right.world, self.known_types);
         if self.comparison == Comparison::Arenas {
             return self.pair_with_share(left, right, lefts, &rights, found);
         }
@@ -49,7 +49,7 @@ impl Comparer<'_> {
         rights: &Groups,
         found: &mut Found,
     ) -> Vec<Pairs> {
-        let owners = owners(self.book, right, rights.values().flatten().copied());
+        let owners = owners(self.known_types, right, rights.values().flatten().copied());
         let number = left.number(0);
         let mut pairs = Vec::new();
         for (key, left) in lefts {
@@ -64,7 +64,7 @@ impl Comparer<'_> {
 
     fn of_counts(&self, key: &GroupKey, left: usize, right: usize, tick: u32) -> Option<Difference> {
         let ignored = |id: &TypeId| {
-            let path = self.book.get(*id).and_then(|known| known.path.as_deref()).unwrap_or_default();
+            let path = self.known_types.get(*id).and_then(|known| known.path.as_deref()).unwrap_or_default();
             self.ignored.iter().any(|part| path.contains(part.as_str()))
         };
         (!key.types.iter().any(ignored)).then(|| Difference {
@@ -80,7 +80,7 @@ impl Comparer<'_> {
 
     /// `"Paddle" [Velocity, Collider]`.
     fn describe_kind(&self, key: &GroupKey) -> String {
-        let types = key.types.iter().filter_map(|id| self.book.get(*id)?.short_name());
+        let types = key.types.iter().filter_map(|id| self.known_types.get(*id)?.short_name());
         let types: Vec<_> = types.collect();
         let is_nameless = types.is_empty();
         let types = format!("[{}]", types.join(", "));

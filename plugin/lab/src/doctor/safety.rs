@@ -46,8 +46,8 @@ impl Safety {
     }
 }
 
-/// Judges by what the comparisons found.
-pub(super) fn judge(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
+/// What is safe, by what the comparisons found.
+pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
     let verdict = |needed: &[Comparison]| verdict(comparisons, needed);
     let mut resume = verdict(&[Comparison::Repeat, Comparison::Restart]);
     let mut recording = verdict(&[Comparison::Repeat, Comparison::Archetypes, Comparison::Restart]);

@@ -4,10 +4,10 @@ use super::{
     archetypes::{VARIANTS, add_archetypes},
     compare::Comparer,
     game_copy::{GameCopy, Outcome, Plan},
-    observed::Watch,
+    observed::ObservationMonitor,
     report::{Comparison, ComparisonReport, Difference, DifferenceKind},
     slow_clock::add_wall_clock,
-    types::TypeBook,
+    types::KnownTypes,
 };
 use crate::{game::Game, parallel::on_threads};
 
@@ -53,7 +53,13 @@ impl Trial {
     }
 
     /// Plays, and compares after every tick.
-    pub fn run(&mut self, ticks: u32, book: &mut TypeBook, ignored: &[String], mut watch: Option<&mut Watch>) -> Ran {
+    pub fn run(
+        &mut self,
+        ticks: u32,
+        known_types: &mut KnownTypes,
+        ignored: &[String],
+        mut monitor: Option<&mut ObservationMonitor>,
+    ) -> TrialResult {
         let mut report = ComparisonReport {
             comparison: self.comparison,
             skipped: None,
@@ -69,8 +75,8 @@ impl Trial {
         let mut is_over = true;
         for tick in 0..ticks {
             self.tick();
-            if let Some(watch) = &mut watch {
-                watch.note(tick, &self.copies[0].outcome(0));
+            if let Some(monitor) = &mut monitor {
+                monitor.note(tick, &self.copies[0].outcome(0));
             }
             report.fault = self.copies.iter().find_map(|copy| copy.fault.clone());
             if report.fault.is_some() {
@@ -79,9 +85,9 @@ impl Trial {
             report.ticks += 1;
             report.episodes += u32::from(is_over);
             is_over = self.copies[0].end(0).is_some();
-            self.copies.iter().for_each(|copy| book.learn(&copy.world));
+            self.copies.iter().for_each(|copy| known_types.learn(&copy.world));
             if report.first.is_none() {
-                let mut comparer = Comparer { book, comparison: self.comparison, ignored, incomparable };
+                let mut comparer = Comparer { known_types, comparison: self.comparison, ignored, incomparable };
                 self.compare(tick, &mut comparer, &mut report);
                 incomparable = comparer.incomparable;
             }
@@ -94,7 +100,7 @@ impl Trial {
             report.first = None;
             report.others.clear();
         }
-        Ran { report, incomparable }
+        TrialResult { report, incomparable }
     }
 
     fn tick(&mut self) {
@@ -119,7 +125,7 @@ impl Trial {
 }
 
 /// What came of a trial.
-pub(super) struct Ran {
+pub(super) struct TrialResult {
     pub report: ComparisonReport,
     /// Types of fields that could not be compared.
     pub incomparable: std::collections::BTreeSet<String>,

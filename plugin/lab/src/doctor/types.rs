@@ -54,13 +54,13 @@ impl KnownType {
 }
 
 /// All types that have been met.
-pub(super) struct TypeBook {
+pub(super) struct KnownTypes {
     known: BTreeMap<TypeId, KnownType>,
     /// Those of a World without a game.
     bare: BTreeSet<TypeId>,
 }
 
-impl TypeBook {
+impl KnownTypes {
     /// Starts with a World without a game, in which only the engine's and the plugin's types are.
     pub fn new(bare: &World) -> Self {
         let engine = bare.components().iter_registered().filter_map(ComponentInfo::type_id);

@@ -54,7 +54,7 @@ impl Plugin for ForeignPlugin {
                     .ambiguous_with(PlaybotSystems::Act),
             ),
         )
-        .add_systems(judge, outcome::judge.before(PlaybotSystems::Judge).run_if(is_tick));
+        .add_systems(judge, outcome::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         sense::build(app);
     }
 

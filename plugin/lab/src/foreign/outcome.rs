@@ -13,7 +13,7 @@ use bevy_playbot::{
 };
 
 /// Asks for reward and end, when the game's frame is over.
-pub(super) fn judge(world: &mut World) {
+pub(super) fn read_outcome(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
     let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
     let outcome = with_foreign(world, agent, |world, foreign| {

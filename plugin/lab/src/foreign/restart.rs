@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 use super::{
-    restart_kind::{Own, Restart},
+    restart_kind::{OwnRestartKind, Restart},
     runtime::{Foreign, ForeignCell, LevelSeed, with_foreign},
 };
 use bevy_playbot::{
@@ -42,8 +42,8 @@ fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
         Restart::Own(own) => {
             set_clock_back(world);
             match own.0 {
-                Own::State(enter) => enter(world),
-                Own::System(_) => Ok(()),
+                OwnRestartKind::State(enter) => enter(world),
+                OwnRestartKind::System(_) => Ok(()),
             }
         }
         Restart::Startup => {

@@ -24,10 +24,10 @@ pub enum Restart {
 
 /// A game's own way to begin anew.
 #[derive(Clone)]
-pub struct OwnRestart(pub(super) Own);
+pub struct OwnRestart(pub(super) OwnRestartKind);
 
 #[derive(Clone)]
-pub(super) enum Own {
+pub(super) enum OwnRestartKind {
     System(SystemFactory<()>),
     State(Arc<dyn Fn(&mut World) -> Result<(), String> + Send + Sync>),
 }
@@ -35,13 +35,13 @@ pub(super) enum Own {
 impl Restart {
     /// A system that begins the game anew. The clock is set back to 0 before it.
     pub fn system<M: 'static>(system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
-        Self::Own(OwnRestart(Own::System(SystemFactory::new(system, |()| ()))))
+        Self::Own(OwnRestart(OwnRestartKind::System(SystemFactory::new(system, |()| ()))))
     }
 
     /// The state in which the game begins: it is left, if the game is in it, and entered again, with everything that the
     /// game does on the way. The clock is set back to 0 before it.
     pub fn state<S: FreelyMutableState + Clone>(state: S) -> Self {
-        Self::Own(OwnRestart(Own::State(Arc::new(move |world: &mut World| enter(world, state.clone())))))
+        Self::Own(OwnRestart(OwnRestartKind::State(Arc::new(move |world: &mut World| enter(world, state.clone())))))
     }
 }
 

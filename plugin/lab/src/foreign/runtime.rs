@@ -9,7 +9,7 @@ use super::{
     game::ForeignGame,
     kept::Baseline,
     paths::ObservedPath,
-    restart_kind::{Own, Restart},
+    restart_kind::{OwnRestartKind, Restart},
 };
 use bevy_playbot::{
     action::ActionValue,
@@ -82,8 +82,8 @@ impl Foreign {
         let description = &game.description;
         let restart = match &description.restart {
             Restart::Own(own) => match &own.0 {
-                Own::System(system) => Some(system.make()),
-                Own::State(_) => None,
+                OwnRestartKind::System(system) => Some(system.make()),
+                OwnRestartKind::State(_) => None,
             },
             Restart::Startup | Restart::Rebuild => None,
         };

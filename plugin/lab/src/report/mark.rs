@@ -15,34 +15,42 @@ pub(super) struct Mark {
     pub label_left: bool,
 }
 
+/// A mark, and where its label begins and ends.
+struct PlacedMark {
+    mark: Mark,
+    start: f64,
+    end: f64,
+}
+
 impl Mark {
     /// Places the marks that can be drawn, in a drawing of the given width, with a font size in pixels.
     ///
     /// Labels do not overlap, and as far as possible no line of a mark runs through the label of another:
     /// the line of the leftmost mark is the longest.
     pub fn place(marks: &[(String, f64)], width: f64, size: f64, px: impl Fn(f64) -> f64) -> Vec<Self> {
-        let mut placed: Vec<(Self, f64, f64)> = marks
+        let mut placed: Vec<PlacedMark> = marks
             .iter()
             .filter(|(_, x)| is_drawable(*x))
             .map(|(label, x)| {
                 let (x, room) = (px(*x), text_width(label, size) + 8.0);
                 let label_left = x + room > width;
                 let (start, end) = if label_left { (x - room, x) } else { (x, x + room) };
-                (Self { label: label.clone(), x, row: 0, label_left }, start, end)
+                PlacedMark { mark: Self { label: label.clone(), x, row: 0, label_left }, start, end }
             })
             .collect();
         // Labels at the right of their line from right to left, then those at the left from left to right.
-        placed.sort_by(|(a, ..), (b, ..)| {
+        placed.sort_by(|a, b| {
+            let (a, b) = (&a.mark, &b.mark);
             let by_x = if a.label_left { a.x.total_cmp(&b.x) } else { b.x.total_cmp(&a.x) };
             a.label_left.cmp(&b.label_left).then(by_x)
         });
         for i in 1..placed.len() {
             let (before, rest) = placed.split_at_mut(i);
-            let (mark, start, end) = &mut rest[0];
-            let overlapping = before.iter().filter(|(_, s, e)| *s < *end && *start < *e);
-            mark.row = overlapping.map(|(other, ..)| other.row + 1).max().unwrap_or(0);
+            let PlacedMark { mark, start, end } = &mut rest[0];
+            let overlapping = before.iter().filter(|other| other.start < *end && *start < other.end);
+            mark.row = overlapping.map(|other| other.mark.row + 1).max().unwrap_or(0);
         }
-        placed.into_iter().map(|(mark, ..)| mark).collect()
+        placed.into_iter().map(|placed| placed.mark).collect()
     }
 }
 

@@ -45,14 +45,37 @@ impl Algorithm {
         matches!(self, Self::ScorePpo | Self::ScoreSac | Self::BehaviourCloning)
     }
 
-    /// Whether it is of SAC's family, whose settings are the experiment's `sac`; `ppo` belongs to the other.
-    pub fn is_sac(self) -> bool {
-        matches!(self, Self::ScoreSac | Self::Sac)
+    /// The learner whose settings count. Behaviour cloning trains none; where settings are asked for, it has those of PPO.
+    pub fn learner(self) -> LearnerKind {
+        match self {
+            Self::ScorePpo | Self::Ppo | Self::BehaviourCloning => LearnerKind::Ppo,
+            Self::ScoreSac | Self::Sac => LearnerKind::Sac,
+        }
     }
 
     /// Whether it learns from play; the others are ready as soon as they have their skills.
     pub fn is_trained(self) -> bool {
         self != Self::BehaviourCloning
+    }
+}
+
+/// What improves a policy. Code that depends on it matches every variant, so that the compiler names what a new learner
+/// needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LearnerKind {
+    /// Proximal policy optimisation.
+    Ppo,
+    /// Soft actor-critic.
+    Sac,
+}
+
+impl LearnerKind {
+    /// The key of its settings in an experiment.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Ppo => "ppo",
+            Self::Sac => "sac",
+        }
     }
 }
 

@@ -17,8 +17,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+pub use super::checkpoint_choice::CheckpointChoice;
 use super::run_dir::{RunError, damaged, io_error, write_atomically};
-pub use super::which_checkpoint::Which;
 
 const PREFIX: &str = "step-";
 const SUMMARY: &str = "summary.json";
@@ -104,12 +104,12 @@ pub fn list(run: &Path) -> Result<Vec<Checkpoint>, RunError> {
 /// # Errors
 ///
 /// [`RunError::NoCheckpoint`] if there is none, or none at that step.
-pub fn choose(run: &Path, which: Which) -> Result<Checkpoint, RunError> {
+pub fn choose(run: &Path, choice: CheckpointChoice) -> Result<Checkpoint, RunError> {
     let mut all = list(run)?;
-    let index = match which {
-        Which::Last => all.len().checked_sub(1),
-        Which::Best => best(&all),
-        Which::Step(step) => all.iter().position(|checkpoint| checkpoint.summary.step == step),
+    let index = match choice {
+        CheckpointChoice::Last => all.len().checked_sub(1),
+        CheckpointChoice::Best => best(&all),
+        CheckpointChoice::Step(step) => all.iter().position(|checkpoint| checkpoint.summary.step == step),
     };
     let steps = all.iter().map(|checkpoint| checkpoint.summary.step).collect();
     match index {
@@ -225,11 +225,11 @@ mod tests {
             save(run.path(), step, value, 2).expect("writable");
         }
         assert_eq!(steps(run.path()), [20, 40, 50]);
-        let chosen = |which| choose(run.path(), which).map(|checkpoint| checkpoint.summary.step);
-        assert_eq!(chosen(Which::Last).expect("there"), 50);
-        assert_eq!(chosen(Which::Best).expect("there"), 20);
-        assert_eq!(chosen(Which::Step(40)).expect("there"), 40);
-        let missing = chosen(Which::Step(30)).expect_err("pruned").to_string();
+        let chosen = |choice| choose(run.path(), choice).map(|checkpoint| checkpoint.summary.step);
+        assert_eq!(chosen(CheckpointChoice::Last).expect("there"), 50);
+        assert_eq!(chosen(CheckpointChoice::Best).expect("there"), 20);
+        assert_eq!(chosen(CheckpointChoice::Step(40)).expect("there"), 40);
+        let missing = chosen(CheckpointChoice::Step(30)).expect_err("pruned").to_string();
         assert!(missing.contains("20, 40, 50"), "{missing}");
     }
 
@@ -253,7 +253,7 @@ mod tests {
         let half = folder(run.path()).join(UNFINISHED);
         fs::create_dir_all(&half).expect("writable");
         fs::write(half.join("learner.safetensors"), b"half").expect("writable");
-        assert!(matches!(choose(run.path(), Which::Last), Err(RunError::NoCheckpoint { .. })));
+        assert!(matches!(choose(run.path(), CheckpointChoice::Last), Err(RunError::NoCheckpoint { .. })));
         save(run.path(), 10, 1.0, 1).expect("writable");
         assert_eq!(steps(run.path()), [10]);
     }

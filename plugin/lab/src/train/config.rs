@@ -6,7 +6,10 @@ use playbot_learner::{PpoConfig, SacConfig, ScoreConfig, SkillConfig};
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::checkpoint::CheckpointConfig;
-pub use super::{algorithm::Algorithm, experiment_error::ExperimentError};
+pub use super::{
+    algorithm::{Algorithm, LearnerKind},
+    experiment_error::ExperimentError,
+};
 use crate::split::LevelSplit;
 pub use bevy_playbot::vision::ObservationKind;
 use bevy_playbot::vision::{ImageOptions, ObservationConfig};
@@ -172,7 +175,10 @@ impl Experiment {
 
     /// Ticks of one rollout.
     pub fn rollout_steps(&self) -> usize {
-        if self.algorithm.is_sac() { self.sac.num_steps } else { self.ppo.num_steps }
+        match self.algorithm.learner() {
+            LearnerKind::Ppo => self.ppo.num_steps,
+            LearnerKind::Sac => self.sac.num_steps,
+        }
     }
 
     /// Environment steps of one rollout.

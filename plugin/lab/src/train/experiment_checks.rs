@@ -5,7 +5,7 @@ use std::path::Path;
 use playbot_learner::ActionSpace;
 
 use super::{
-    config::Experiment,
+    config::{Experiment, LearnerKind},
     experiment_error::{ExperimentError, refuse, settings},
 };
 use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
@@ -103,7 +103,10 @@ impl Experiment {
             return Ok(());
         }
         self.score.check_space(space).map_err(settings)?;
-        let squashed = self.algorithm.is_sac() && matches!(space, ActionSpace::Continuous(_));
+        let squashed = match self.algorithm.learner() {
+            LearnerKind::Ppo => false,
+            LearnerKind::Sac => matches!(space, ActionSpace::Continuous(_)),
+        };
         if squashed && self.score.init_from_decoder {
             let why = "SAC squashes continuous actions, so its policy cannot start as a copy of the decoder; set it to \
                        false (the penalty still ties the two together)";
@@ -126,9 +129,9 @@ impl Experiment {
         if self.skills.norm_obs && self.observation_config().is_image() {
             return refuse("skills.norm_obs", true, "is for vectors; the pixels of images are divided by 255 instead");
         }
-        let (key, running) = match self.algorithm.is_sac() {
-            true => ("sac.norm_obs", self.sac.norm_obs),
-            false => ("ppo.norm_obs", self.ppo.norm_obs),
+        let (key, running) = match self.algorithm.learner() {
+            LearnerKind::Ppo => ("ppo.norm_obs", self.ppo.norm_obs),
+            LearnerKind::Sac => ("sac.norm_obs", self.sac.norm_obs),
         };
         if !(running && self.algorithm.needs_skills() && self.algorithm.is_trained()) {
             return Ok(());
@@ -154,8 +157,16 @@ impl Experiment {
             let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
             return refuse("worlds", worlds, why);
         }
+        match self.algorithm.learner() {
+            LearnerKind::Ppo => self.check_minibatches(arenas),
+            LearnerKind::Sac => Ok(()),
+        }
+    }
+
+    /// PPO splits a rollout into minibatches.
+    fn check_minibatches(&self, arenas: u64) -> Result<(), ExperimentError> {
         let (batch, minibatches) = (arenas * self.ppo.num_steps as u64, self.ppo.minibatches as u64);
-        if !self.algorithm.is_sac() && !batch.is_multiple_of(minibatches) {
+        if !batch.is_multiple_of(minibatches) {
             let (steps, near) = (self.ppo.num_steps, nearest_divisor(batch, minibatches));
             let why = format!("must divide `arenas` × `ppo.num_steps` = {arenas} × {steps} = {batch}; {near} does");
             return refuse("ppo.minibatches", minibatches, why);

@@ -8,7 +8,11 @@ use std::{
 pub use playbot_learner::LearnerMetrics;
 use playbot_learner::{DeviceKind, FileError, Learner, PolicySpec, PpoLearner, SacLearner, SkillModel};
 
-use super::{algorithm::Algorithm, config::Experiment, train_error::TrainError};
+use super::{
+    algorithm::{Algorithm, LearnerKind},
+    config::Experiment,
+    train_error::TrainError,
+};
 use crate::game::Game;
 use crate::sensors::GameSensors;
 use bevy_playbot::vision::ObservationConfig;
@@ -52,14 +56,16 @@ impl TrainedLearner {
             PolicySpec { obs: experiment.observation_config().obs_kind(game), latent: 0, action_space: game.actions() };
         let skills = if algorithm.needs_skills() { Some(fitting(game, experiment, skills)?) } else { None };
         let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
-        if algorithm.is_sac() {
-            warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
+        let learner = algorithm.learner();
+        match learner {
+            LearnerKind::Ppo => {}
+            LearnerKind::Sac => warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent)),
         }
-        Ok(match (algorithm.is_sac(), skills) {
-            (false, None) => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
-            (false, Some(model)) => Self::of(PpoLearner::with_skill(ppo, score, model, seed, device)?),
-            (true, None) => Self::of(SacLearner::new(sac, spec, seed, device)?),
-            (true, Some(model)) => Self::of(SacLearner::with_skill(sac, score, model, seed, device)?),
+        Ok(match (learner, skills) {
+            (LearnerKind::Ppo, None) => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
+            (LearnerKind::Ppo, Some(model)) => Self::of(PpoLearner::with_skill(ppo, score, model, seed, device)?),
+            (LearnerKind::Sac, None) => Self::of(SacLearner::new(sac, spec, seed, device)?),
+            (LearnerKind::Sac, Some(model)) => Self::of(SacLearner::with_skill(sac, score, model, seed, device)?),
         })
     }
 
@@ -78,9 +84,9 @@ impl TrainedLearner {
     ///
     /// [`FileError`] says what is wrong with the file.
     pub fn load(algorithm: Algorithm, path: &Path, device: DeviceKind) -> Result<Self, FileError> {
-        Ok(match algorithm.is_sac() {
-            false => Self::of(PpoLearner::load(path, device)?),
-            true => Self::of(SacLearner::load(path, device)?),
+        Ok(match algorithm.learner() {
+            LearnerKind::Ppo => Self::of(PpoLearner::load(path, device)?),
+            LearnerKind::Sac => Self::of(SacLearner::load(path, device)?),
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::config::{Experiment, ExperimentError};
+use super::config::{Experiment, ExperimentError, LearnerKind};
 use crate::game::Game;
 use crate::sensors::GameSensors;
 
@@ -29,19 +29,27 @@ impl Experiment {
         let copies: u64 = if self.worlds > 1 { 2 } else { 1 };
         let rollouts = product(&[arenas, steps, observation, copies]);
         if rollouts > free {
-            let family = if self.algorithm.is_sac() { "sac" } else { "ppo" };
+            let learner = self.algorithm.learner().key();
             let image = if is_image { ", `image.width`, `image.height` or `image.stack`" } else { "" };
             let joined = if copies > 1 { " × 2 (those of the Worlds are joined)" } else { "" };
             return Err(ExperimentError::Memory {
                 what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes{joined}"),
                 needed: rollouts,
                 free,
-                keys: format!("`arenas`, `{family}.num_steps`{image}"),
+                keys: format!("`arenas`, `{learner}.num_steps`{image}"),
             });
         }
+        match self.algorithm.learner() {
+            LearnerKind::Ppo => Ok(()),
+            LearnerKind::Sac => self.check_replay_buffer(observation, rollouts, free),
+        }
+    }
+
+    /// Checks that the replay buffer fits beside the rollouts, in bytes of `observation`s.
+    fn check_replay_buffer(&self, observation: u64, rollouts: u64, free: u64) -> Result<(), ExperimentError> {
         let transitions = (self.sac.buffer as u64).min(self.steps);
         let replay = product(&[transitions, 2, observation]);
-        if self.algorithm.is_sac() && replay.saturating_add(rollouts) > free {
+        if replay.saturating_add(rollouts) > free {
             return Err(ExperimentError::Memory {
                 what: format!("the slots of a replay buffer of {transitions} transitions × 2 × {observation} bytes"),
                 needed: replay,

@@ -3,6 +3,7 @@
 mod algorithm;
 pub mod arena_state;
 pub mod checkpoint;
+mod checkpoint_choice;
 pub mod checksum;
 pub mod collect;
 pub mod config;
@@ -31,9 +32,8 @@ pub mod tensorboard;
 mod train_error;
 pub mod trainer;
 mod update_report;
-mod which_checkpoint;
 
-pub use config::{Algorithm, Experiment};
+pub use config::{Algorithm, Experiment, LearnerKind};
 pub use learner::{LearnerMetrics, TrainedLearner};
 pub use train_error::TrainError;
 pub use trainer::Trainer;

@@ -21,7 +21,7 @@ use serde_json::json;
 
 use super::{
     arena_state::{ArenaState, restore_arenas, save_arenas},
-    checkpoint::{self, Checkpoint, Which},
+    checkpoint::{self, Checkpoint, CheckpointChoice},
     config::{Algorithm, Experiment},
     config_file::read_experiment,
     learner::TrainedLearner,
@@ -195,8 +195,8 @@ impl RunDir {
     /// # Errors
     ///
     /// [`RunError::NoCheckpoint`].
-    pub fn checkpoint(&self, which: Which) -> Result<Checkpoint, RunError> {
-        checkpoint::choose(&self.path, which)
+    pub fn checkpoint(&self, choice: CheckpointChoice) -> Result<Checkpoint, RunError> {
+        checkpoint::choose(&self.path, choice)
     }
 
     /// Its metrics.

@@ -1,7 +1,7 @@
 //! What every learner has beside its networks and their optimizers.
 
 use crate::norm::{ObsNormalizer, ObsStats, RewardNormalizer};
-use crate::policy::{Actor, Critic, Policy, States};
+use crate::policy::{Actor, Critic, Policy, StateBatch};
 use crate::rng::Streams;
 use crate::score::{ScoreConfig, Teacher};
 use crate::{DeviceKind, LearnError, PolicySpec};
@@ -75,7 +75,7 @@ impl LearnerBase {
         &self,
         policy: &Policy,
         untrained: bool,
-        states: States<'_>,
+        states: StateBatch<'_>,
     ) -> Result<Option<f32>, LearnError> {
         let Some(teacher) = &self.teacher else { return Ok(None) };
         teacher.initial_kl(policy, untrained, states, self.device).map(Some)

@@ -1,7 +1,7 @@
 //! Convolution and pooling over images `[n, channels, height, width]`.
 
 use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Fresh, Init, ParamSource};
+use super::source::{Init, ParamSource, RandomInit};
 use burn::tensor::module::{conv2d, max_pool2d};
 use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor};
@@ -31,7 +31,7 @@ impl Conv2d {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let Ok(layer) = Self::build(&mut Fresh { rng, device }, "", inputs, outputs, kernel, gain);
+        let Ok(layer) = Self::build(&mut RandomInit { rng, device }, "", inputs, outputs, kernel, gain);
         layer
     }
 

@@ -1,8 +1,8 @@
 //! A stack of gated recurrent layers, in one or both directions.
 
-use super::cpu::kernels::{self, has_kernels};
+use super::cpu::kernels::{self, GruInput, has_kernels};
 use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Fresh, Init, ParamSource};
+use super::source::{Init, ParamSource, RandomInit};
 use burn::tensor::{Device, Tensor, activation::sigmoid};
 use rand::Rng;
 
@@ -40,7 +40,7 @@ impl Gru {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let source = &mut Fresh { rng, device };
+        let source = &mut RandomInit { rng, device };
         let Ok(gru) = Self::build(source, "", inputs, hidden, layers, bidirectional);
         gru
     }
@@ -112,7 +112,13 @@ impl GruLayer {
         let initial = initial.unwrap_or_else(|| Tensor::zeros([directions, batch, hidden], &device));
         let input = x.unsqueeze_dim(0).matmul(self.weight_ih.clone());
         let scan = if has_kernels(&device) { kernels::gru } else { gru_steps };
-        scan(input, self.weight_hh.clone(), self.bias_ih.clone(), self.bias_hh.clone(), initial)
+        scan(GruInput {
+            input,
+            weight: self.weight_hh.clone(),
+            bias_ih: self.bias_ih.clone(),
+            bias_hh: self.bias_hh.clone(),
+            initial,
+        })
     }
 
     /// The last state of each direction, `[directions, B, hidden]`, taken from the outputs.
@@ -129,14 +135,9 @@ impl GruLayer {
 }
 
 /// The recurrent part of a layer in tensor operations, for devices without a kernel and as the kernel's yardstick:
-/// shapes as in [`kernels::gru`].
-fn gru_steps(
-    input: Tensor<3>,
-    weight: Tensor<3>,
-    bias_ih: Tensor<2>,
-    bias_hh: Tensor<2>,
-    initial: Tensor<3>,
-) -> Tensor<2> {
+/// the same as [`kernels::gru`].
+fn gru_steps(input: GruInput) -> Tensor<2> {
+    let GruInput { input, weight, bias_ih, bias_hh, initial } = input;
     let [directions, batch, hidden] = initial.dims();
     let steps = input.dims()[1] / batch.max(1);
     let input = input + bias_ih.unsqueeze_dim(1);
@@ -195,7 +196,7 @@ mod tests {
     /// The outputs under `scan` and the gradients of everything that enters it, for a loss in which each output has
     /// its own weight.
     fn run(
-        scan: fn(Tensor<3>, Tensor<3>, Tensor<2>, Tensor<2>, Tensor<3>) -> Tensor<2>,
+        scan: fn(GruInput) -> Tensor<2>,
         directions: usize,
         hidden: usize,
         kind: DeviceKind,
@@ -212,7 +213,8 @@ mod tests {
         let probe = matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
         layer = tracked(&layer);
         let GruLayer { weight_hh, bias_ih, bias_hh, .. } = layer.layers[0].clone();
-        let output = scan(input.clone(), weight_hh, bias_ih, bias_hh, initial.clone());
+        let of_scan = GruInput { input: input.clone(), weight: weight_hh, bias_ih, bias_hh, initial: initial.clone() };
+        let output = scan(of_scan);
         let grads = (output.clone() * probe).sum().backward();
         let named = NamedGrads::read(&mut layer, "", &grads).expect("readable");
         let mut found = vec![

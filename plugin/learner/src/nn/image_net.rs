@@ -1,7 +1,7 @@
 //! The network that turns images into features, of either architecture.
 
 use super::params::{ParamVisitor, Parameters};
-use super::source::{Fresh, ParamSource};
+use super::source::{ParamSource, RandomInit};
 use super::{Activation, Impala, Linear, Nature};
 use crate::{ImageShape, LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
@@ -100,7 +100,7 @@ impl ImageNet {
         device: &Device,
     ) -> Result<Self, LearnError> {
         kind.check_image(image)?;
-        let Ok(net) = Self::build(&mut Fresh { rng, device }, "", kind, image);
+        let Ok(net) = Self::build(&mut RandomInit { rng, device }, "", kind, image);
         Ok(net)
     }
 

@@ -4,7 +4,7 @@ use super::conv::{Conv2d, max_pool, window_places};
 use super::cpu::trunk::{self, Stage};
 use super::image_net::last_layer;
 use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Fresh, ParamSource};
+use super::source::{ParamSource, RandomInit};
 use super::{Activation, Linear};
 use crate::ImageShape;
 use burn::tensor::{Device, Tensor};
@@ -49,7 +49,7 @@ impl Impala {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let Ok(net) = Self::build(&mut Fresh { rng, device }, "", channels, feature, image);
+        let Ok(net) = Self::build(&mut RandomInit { rng, device }, "", channels, feature, image);
         net
     }
 

@@ -1,7 +1,7 @@
 //! A linear layer.
 
 use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Fresh, Init, ParamSource};
+use super::source::{Init, ParamSource, RandomInit};
 use burn::tensor::{Device, Tensor, module::linear};
 use rand::Rng;
 
@@ -17,7 +17,7 @@ pub struct Linear {
 impl Linear {
     /// Orthogonal weights times `gain`, zero bias.
     pub fn new<R: Rng + ?Sized>(inputs: usize, outputs: usize, gain: f64, rng: &mut R, device: &Device) -> Self {
-        let Ok(layer) = Self::build(&mut Fresh { rng, device }, "", inputs, outputs, gain);
+        let Ok(layer) = Self::build(&mut RandomInit { rng, device }, "", inputs, outputs, gain);
         layer
     }
 

@@ -1,7 +1,7 @@
 //! A multi-layer perceptron.
 
 use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Fresh, ParamSource};
+use super::source::{ParamSource, RandomInit};
 use super::{Activation, Linear};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
@@ -29,7 +29,7 @@ impl Mlp {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let source = &mut Fresh { rng, device };
+        let source = &mut RandomInit { rng, device };
         let Ok(net) = Self::build(source, "", inputs, hidden, outputs, activation, head_gain);
         net
     }

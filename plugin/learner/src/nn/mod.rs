@@ -23,6 +23,7 @@ mod sample;
 mod source;
 mod squash;
 mod tensors;
+mod unsquash;
 
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
@@ -42,6 +43,7 @@ pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
 pub use sample::{
     argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
 };
-pub(crate) use source::{Fresh, Init, ParamSource};
+pub(crate) use source::{Init, ParamSource, RandomInit};
 pub use squash::{LogProbForm, SquashedDraw, SquashedGaussian, bounded_log_std};
 pub(crate) use tensors::{check_loss, finite, host, matrix, scalar, vector};
+pub use unsquash::unsquashed;

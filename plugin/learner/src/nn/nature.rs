@@ -4,15 +4,27 @@ use super::conv::{Conv2d, window_places};
 use super::cpu::trunk::{self, Stage};
 use super::image_net::last_layer;
 use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Fresh, ParamSource};
+use super::source::{ParamSource, RandomInit};
 use super::{Activation, Linear};
 use crate::ImageShape;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 use std::f64::consts::SQRT_2;
 
-/// Output channels, kernel and stride of each convolution.
-const LAYERS: [(usize, usize, usize); 3] = [(32, 8, 4), (64, 4, 2), (64, 3, 1)];
+/// The size of a convolution.
+struct ConvSize {
+    /// Output channels.
+    channels: usize,
+    /// Rows and columns of the kernel.
+    kernel: usize,
+    stride: usize,
+}
+
+const LAYERS: [ConvSize; 3] = [
+    ConvSize { channels: 32, kernel: 8, stride: 4 },
+    ConvSize { channels: 64, kernel: 4, stride: 2 },
+    ConvSize { channels: 64, kernel: 3, stride: 1 },
+];
 
 /// Three convolutions and a linear layer, ReLU after each (Mnih et al. 2015, "Human-level control through deep
 /// reinforcement learning"). Several times cheaper than [`super::Impala`].
@@ -30,7 +42,7 @@ impl Nature {
         if !Self::fits(image) {
             return None;
         }
-        let Ok(net) = Self::build(&mut Fresh { rng, device }, "", feature, image);
+        let Ok(net) = Self::build(&mut RandomInit { rng, device }, "", feature, image);
         Some(net)
     }
 
@@ -48,10 +60,10 @@ impl Nature {
     ) -> Result<Self, S::Error> {
         let mut inputs = image.channels;
         let mut convs = Vec::with_capacity(LAYERS.len());
-        for (i, (outputs, kernel, stride)) in LAYERS.into_iter().enumerate() {
-            let conv = Conv2d::build(source, &path(prefix, &format!("conv{i}")), inputs, outputs, kernel, SQRT_2)?;
+        for (i, ConvSize { channels, kernel, stride }) in LAYERS.into_iter().enumerate() {
+            let conv = Conv2d::build(source, &path(prefix, &format!("conv{i}")), inputs, channels, kernel, SQRT_2)?;
             convs.push(conv.with_stride(stride));
-            inputs = outputs;
+            inputs = channels;
         }
         let sides = places(image.height).unwrap_or(0).saturating_mul(places(image.width).unwrap_or(0));
         let fc = Linear::build(source, &path(prefix, "fc"), inputs.saturating_mul(sides), feature, SQRT_2)?;
@@ -71,7 +83,7 @@ impl Nature {
 
 /// Places of the last convolution along a side of `size` pixels.
 fn places(size: usize) -> Option<usize> {
-    LAYERS.into_iter().try_fold(size, |size, (_, kernel, stride)| window_places(size, kernel, stride, 0))
+    LAYERS.into_iter().try_fold(size, |size, layer| window_places(size, layer.kernel, layer.stride, 0))
 }
 
 impl Parameters for Nature {

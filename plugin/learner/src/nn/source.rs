@@ -35,12 +35,12 @@ pub(crate) trait ParamSource {
 
 /// Starting weights from a generator; no parameter is ever missing.
 #[derive(Debug)]
-pub(crate) struct Fresh<'a, R: ?Sized> {
+pub(crate) struct RandomInit<'a, R: ?Sized> {
     pub(crate) rng: &'a mut R,
     pub(crate) device: &'a Device,
 }
 
-impl<R: Rng + ?Sized> ParamSource for Fresh<'_, R> {
+impl<R: Rng + ?Sized> ParamSource for RandomInit<'_, R> {
     type Error = Infallible;
 
     fn param<const D: usize>(&mut self, _: &str, shape: [usize; D], init: Init) -> Result<Tensor<D>, Infallible> {

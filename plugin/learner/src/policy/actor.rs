@@ -2,7 +2,8 @@
 
 use super::{NetInput, NetShape, StdShape};
 use crate::nn::{
-    Dist, Fresh, ImageNet, Init, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, bounded_log_std, path,
+    Dist, ImageNet, Init, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit, bounded_log_std,
+    path,
 };
 use crate::{ActionSpace, LearnError};
 use burn::tensor::{Device, Tensor};
@@ -64,7 +65,7 @@ impl Actor {
         rng: &mut R,
         device: &Device,
     ) -> Self {
-        let Ok(actor) = Self::build(&mut Fresh { rng, device }, "", shape, space, std.into());
+        let Ok(actor) = Self::build(&mut RandomInit { rng, device }, "", shape, space, std.into());
         actor
     }
 
@@ -77,7 +78,7 @@ impl Actor {
         device: &Device,
     ) -> Self {
         let std = StdShape::Squashed(log_std_range.0, log_std_range.1);
-        let Ok(actor) = Self::build(&mut Fresh { rng, device }, "", shape, space, std);
+        let Ok(actor) = Self::build(&mut RandomInit { rng, device }, "", shape, space, std);
         actor
     }
 

@@ -1,7 +1,7 @@
 //! The network that estimates the return.
 
 use super::NetShape;
-use crate::nn::{Fresh, Mlp, ParamSource, ParamVisitor, Parameters};
+use crate::nn::{Mlp, ParamSource, ParamVisitor, Parameters, RandomInit};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
@@ -16,7 +16,7 @@ pub struct Critic {
 impl Critic {
     /// Orthogonal weights, gain √2 in the hidden layers and 1 in the head.
     pub fn new<R: Rng + ?Sized>(shape: &NetShape, rng: &mut R, device: &Device) -> Self {
-        let Ok(critic) = Self::build(&mut Fresh { rng, device }, "", shape);
+        let Ok(critic) = Self::build(&mut RandomInit { rng, device }, "", shape);
         critic
     }
 

@@ -28,7 +28,7 @@ impl From<Tensor<2>> for NetInput {
 
 /// Skills and raw observations of `n` states in host memory.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct States<'a> {
+pub(crate) struct StateBatch<'a> {
     /// `n * latent`; not read by networks without skills.
     pub(crate) z: &'a [f32],
     /// `n` observations.

@@ -10,7 +10,7 @@ mod snapshot;
 pub use actor::{Actor, LogStd, StdKind};
 pub use critic::Critic;
 pub use inputs::NetInput;
-pub(crate) use inputs::{InputBuilder, States, joined_rows};
+pub(crate) use inputs::{InputBuilder, StateBatch, joined_rows};
 pub use output::PolicyOutput;
 pub use shape::NetShape;
 pub(crate) use shape::{ActorShape, InputWidths, StdShape};

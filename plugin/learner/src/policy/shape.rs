@@ -2,7 +2,7 @@
 
 use super::{Actor, Critic, LogStd, StdKind};
 use crate::file::TensorFile;
-use crate::nn::{Activation, CnnKind, Fresh, ImageNet, Mlp, path};
+use crate::nn::{Activation, CnnKind, ImageNet, Mlp, RandomInit, path};
 use crate::rng::Streams;
 use crate::{FileError, LearnError, ObsKind, PolicySpec};
 use burn::tensor::Device;
@@ -127,7 +127,7 @@ impl ActorShape {
             }
             _ => None,
         };
-        let mut source = Fresh { rng: &mut streams.stream(name, 0), device };
+        let mut source = RandomInit { rng: &mut streams.stream(name, 0), device };
         let Ok(actor) = Actor::build(&mut source, "", &self.net, spec.action_space, self.std);
         Ok(Actor { cnn, ..actor })
     }

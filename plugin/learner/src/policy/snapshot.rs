@@ -1,6 +1,6 @@
 //! A frozen policy that plays.
 
-use super::{Actor, Critic, InputBuilder, PolicyOutput, States};
+use super::{Actor, Critic, InputBuilder, PolicyOutput, StateBatch};
 use crate::nn::{CnnKind, ImageNet, frozen, host};
 use crate::norm::ObsStats;
 use crate::{ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec};
@@ -82,7 +82,7 @@ impl Policy {
     pub fn forward<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<PolicyOutput, LearnError> {
         let (mut head, mut log_std, mut values) = (Vec::new(), Vec::new(), Vec::new());
         let dim = self.spec.action_space.dim();
-        self.for_each_chunk(States { z, obs: obs.into(), n }, |x, rows| {
+        self.for_each_chunk(StateBatch { z, obs: obs.into(), n }, |x, rows| {
             let dist = self.actor.forward(x.clone()).to_host()?;
             head.extend_from_slice(&dist.head[..rows * dim]);
             if let Some(stds) = dist.log_std {
@@ -108,7 +108,7 @@ impl Policy {
             return Ok(vec![0.0; n]);
         }
         let mut values = Vec::with_capacity(n);
-        self.for_each_chunk(States { z, obs: obs.into(), n }, |x, rows| self.append_values(x, rows, &mut values))?;
+        self.for_each_chunk(StateBatch { z, obs: obs.into(), n }, |x, rows| self.append_values(x, rows, &mut values))?;
         Ok(values)
     }
 
@@ -127,10 +127,10 @@ impl Policy {
     /// and a lone agent shall act like one of many.
     fn for_each_chunk(
         &self,
-        states: States<'_>,
+        states: StateBatch<'_>,
         mut read: impl FnMut(Tensor<2>, usize) -> Result<(), LearnError>,
     ) -> Result<(), LearnError> {
-        let States { z, obs, n } = states;
+        let StateBatch { z, obs, n } = states;
         if n == 0 {
             return Ok(());
         }

@@ -5,7 +5,7 @@ use super::examples::Examples;
 use super::header::{PolicyShape, SkillsShape};
 use crate::file::{FileKind, TensorFile};
 use crate::norm::put_obs_stats;
-use crate::policy::{Policy, States};
+use crate::policy::{Policy, StateBatch};
 use crate::skill::{SKILL_STATS, SkillSource};
 use crate::{DeviceKind, FileError, LearnError, ObsSlice};
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,7 @@ impl PolicyFile {
             skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
             examples: n,
         };
-        let states = States { z, obs, n };
+        let states = StateBatch { z, obs, n };
         let examples = Examples::of(self, states).map_err(learner)?;
         let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("actor", &policy.actor)?;

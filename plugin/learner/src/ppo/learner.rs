@@ -4,7 +4,7 @@ use super::{PpoConfig, PpoNets};
 use crate::file::FileKind;
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
 use crate::nn::{Adam, AdamConfig, tracked};
-use crate::policy::{Policy, States};
+use crate::policy::{Policy, StateBatch};
 use crate::score::{ScoreConfig, Teacher};
 use crate::skill::SkillModel;
 use crate::{DeviceKind, FileError, LearnError, ObsKind, ObsSlice, PolicySpec, Rollout};
@@ -124,7 +124,7 @@ impl Learner for PpoLearner {
     }
 
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
-        self.base.initial_kl(&self.policy(), self.base.updates == 0, States { z, obs, n })
+        self.base.initial_kl(&self.policy(), self.base.updates == 0, StateBatch { z, obs, n })
     }
 
     /// Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments `adam.m.actor.l0.weight`.

@@ -5,7 +5,7 @@ use super::objective::{PpoBatch, gae, normalize_advantages, ppo_loss};
 use super::{PpoConfig, PpoLearner, PpoNets, StepMetrics, UpdateMetrics, explained_variance, ratio_stats};
 use crate::nn::{ActionBatch, Adam, NamedGrads, finite, host, vector};
 use crate::norm::ObsStats;
-use crate::policy::{InputBuilder, NetInput, States};
+use crate::policy::{InputBuilder, NetInput, StateBatch};
 use crate::rng::shuffle;
 use crate::score::{Penalty, ScoreConfig, TeacherBatch, TeacherOutput, penalty};
 use crate::{LearnError, Observations, Rollout};
@@ -88,7 +88,7 @@ impl PpoLearner {
     fn teacher_output(&self, rollout: &Rollout) -> Result<Option<TeacherOutput>, LearnError> {
         let Some(teacher) = &self.base.teacher else { return Ok(None) };
         let mut rng = self.base.streams.stream("score.own_samples", self.base.updates);
-        let states = States { z: &rollout.z, obs: rollout.obs.as_slice(), n: rollout.rows() };
+        let states = StateBatch { z: &rollout.z, obs: rollout.obs.as_slice(), n: rollout.rows() };
         teacher.output(states, &rollout.actions, false, &mut rng, self.base.device)
     }
 }

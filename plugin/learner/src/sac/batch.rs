@@ -3,7 +3,7 @@
 use super::SacLearner;
 use crate::LearnError;
 use crate::nn::{ActionBatch, matrix, vector};
-use crate::policy::{States, joined_rows};
+use crate::policy::{StateBatch, joined_rows};
 use crate::score::TeacherBatch;
 use burn::tensor::Tensor;
 
@@ -52,7 +52,7 @@ impl SacLearner {
                 let (z, obs) = (gather(&buffer.z, buffer.latent), gather(&buffer.obs, buffer.obs_dim));
                 let squashed = self.nets.actor.is_squashed();
                 let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);
-                let states = States { z: &z, obs: (&obs).into(), n };
+                let states = StateBatch { z: &z, obs: (&obs).into(), n };
                 teacher.output(states, &actions, squashed, &mut rng, base.device)?
             }
         };

@@ -7,7 +7,7 @@ use crate::file::{FileKind, TensorFile};
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
 use crate::nn::{Adam, AdamConfig};
 use crate::norm::RewardNormalizer;
-use crate::policy::{Policy, States};
+use crate::policy::{Policy, StateBatch};
 use crate::score::{ScoreConfig, Teacher};
 use crate::skill::SkillModel;
 use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, Rollout};
@@ -81,7 +81,7 @@ impl SacLearner {
     /// Discrete actions: the actor can be an exact copy of the decoder, and the divergence is exact. Continuous
     /// actions: the actor squashes what the decoder does not, so it cannot be a copy
     /// ([`ScoreConfig::init_from_decoder`] must be false), and the two are compared before the tanh, the decoder as
-    /// [`crate::score::unsquashed`] makes it.
+    /// [`crate::nn::unsquashed`] makes it.
     ///
     /// # Errors
     /// [`LearnError::Config`] for settings that cannot work, or a skill model of images.
@@ -198,7 +198,7 @@ impl Learner for SacLearner {
     /// Of the actor, also while random actions are played.
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         let actor = self.base.snapshot(&self.nets.actor, None);
-        self.base.initial_kl(&actor, self.gradient_steps == 0, States { z, obs, n })
+        self.base.initial_kl(&actor, self.gradient_steps == 0, StateBatch { z, obs, n })
     }
 
     /// Weights are called `actor.l0.weight`, `q1.l0.weight`, `target.q1.l0.weight` and `log_alpha` (that of the

@@ -3,7 +3,9 @@
 use super::{EntropyCoef, SacConfig};
 use crate::file::TensorFile;
 use crate::learner::LearnerBase;
-use crate::nn::{ActionBatch, Fresh, Init, Mlp, ParamSource, ParamVisitor, Parameters, frozen, path, tracked, vector};
+use crate::nn::{
+    ActionBatch, Init, Mlp, ParamSource, ParamVisitor, Parameters, RandomInit, frozen, path, tracked, vector,
+};
 use crate::policy::{Actor, ActorShape, NetShape, StdShape};
 use crate::{ActionSpace, FileError, LearnError};
 use burn::tensor::{Device, Tensor};
@@ -23,7 +25,7 @@ pub struct Critics {
 impl Critics {
     /// Orthogonal weights, gain √2 in the hidden layers and 1 in the heads.
     pub fn new<R: Rng + ?Sized>(shape: &NetShape, space: ActionSpace, rng: &mut R, device: &Device) -> Self {
-        let Ok(critics) = Self::build(&mut Fresh { rng, device }, "", shape, space);
+        let Ok(critics) = Self::build(&mut RandomInit { rng, device }, "", shape, space);
         critics
     }
 

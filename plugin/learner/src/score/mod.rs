@@ -8,14 +8,10 @@
 mod confidence;
 mod config;
 mod penalty;
-mod released;
 mod teacher;
-mod unsquash;
 
 pub use confidence::{confidences, own_samples, penalty_weights};
 pub use config::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
-pub use penalty::{Penalty, decoder_kl, penalty};
-pub use released::{legacy_coinrun, legacy_d4rl, marginal_densities};
+pub use penalty::{Penalty, decoder_kl, legacy_coinrun, legacy_d4rl, marginal_densities, penalty};
 pub use teacher::TeacherBatch;
 pub(crate) use teacher::{Teacher, TeacherOutput};
-pub use unsquash::unsquashed;

@@ -1,9 +1,15 @@
-//! The penalty for leaving the decoder.
+//! The penalty for leaving the decoder: the paper's, and for comparison only those of its released code.
+//!
+//! The latter measure KL(policy ‖ decoder) and weigh it by what the decoder thinks of the rollout's action. The one for
+//! mazes rewards the divergence, since it is subtracted from a loss that is minimised, until the clamp ends the gradient.
 
-use super::{KlDirection, PenaltyForm, ScoreConfig, legacy_coinrun, legacy_d4rl};
-use crate::LearnError;
-use crate::nn::Dist;
+use super::{KlDirection, PenaltyForm, ScoreConfig};
+use crate::nn::{Dist, HostDist, gaussian_log_prob};
+use crate::{Actions, LearnError};
 use burn::tensor::Tensor;
+
+/// Bound of a divergence in the released code's penalties; there is no gradient beyond.
+const BOUND: f32 = 100.0;
 
 /// The divergence of each row in the chosen direction, in nats, `[n]`. Exactly 0 where the two are equal. `decoder` is
 /// constant.
@@ -39,4 +45,64 @@ pub fn penalty(config: &ScoreConfig, decoder: &Dist, policy: &Dist, weight: Tens
         PenaltyForm::LegacyCoinrun => legacy_coinrun(kl.clone(), weight),
     };
     Ok(Penalty { kl, term })
+}
+
+/// -w · clamp(Σᵢ KLᵢ, ±100), `[1]`, with w = Σᵢ weightᵢ: `kl` `[n]` is KL(policy ‖ decoder), `weight` `[n]` is
+/// [`marginal_densities`], a constant.
+pub fn legacy_d4rl(kl: Tensor<1>, weight: Tensor<1>) -> Tensor<1> {
+    weight.sum().neg() * kl.sum().clamp(-BOUND, BOUND)
+}
+
+/// Σᵢ clamp(KLᵢ, ±100) · weightᵢ, `[1]`: `kl` `[n]` is KL(policy ‖ decoder), `weight` `[n]` is the decoder's probability
+/// of the rollout's action, a constant.
+pub fn legacy_coinrun(kl: Tensor<1>, weight: Tensor<1>) -> Tensor<1> {
+    (kl.clamp(-BOUND, BOUND) * weight).sum()
+}
+
+/// The sum over dimensions of the decoder's one-dimensional densities at the action of each row.
+///
+/// # Errors
+/// [`LearnError::Shape`] or [`LearnError::Action`] if the actions do not fit a decoder of continuous actions.
+pub fn marginal_densities(decoder: &HostDist, actions: &Actions) -> Result<Vec<f32>, LearnError> {
+    let dim = decoder.dim;
+    let (Some(stds), Actions::Continuous { dim: width, values }) = (&decoder.log_std, actions) else {
+        return Err(LearnError::Action("the legacy weight for mazes needs continuous actions".to_owned()));
+    };
+    LearnError::check("width of the actions", dim, *width)?;
+    LearnError::check("actions", decoder.head.len(), values.len())?;
+    let densities = decoder.head.iter().zip(stds).zip(values);
+    let densities: Vec<f32> = densities.map(|((&m, &s), &a)| gaussian_log_prob(&[m], &[s], &[a]).exp()).collect();
+    Ok(densities.chunks_exact(dim).map(|row| row.iter().sum()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{scalar, vector};
+
+    #[test]
+    fn clamps_by_hand() {
+        let device = DeviceKind::Flex.plain();
+        let tensor = |values: &[f32]| vector(values.to_vec(), &device);
+        // Mazes: one clamp for the sum, one weight for the sum.
+        let term = legacy_d4rl(tensor(&[30.0, 20.0]), tensor(&[0.5, 1.5]));
+        assert_eq!(scalar(term).expect("readable"), -100.0);
+        let term = legacy_d4rl(tensor(&[150.0, 20.0]), tensor(&[0.5, 1.0]));
+        assert_eq!(scalar(term).expect("readable"), -150.0);
+        // CoinRun: a clamp and a weight for each row.
+        let term = legacy_coinrun(tensor(&[150.0, 20.0]), tensor(&[0.5, 0.25]));
+        assert_eq!(scalar(term).expect("readable"), 55.0);
+    }
+
+    #[test]
+    fn densities_by_hand() {
+        let decoder = HostDist { dim: 2, head: vec![0.0, 1.0], log_std: Some(vec![0.0, 2.0f32.ln()]) };
+        let action = Actions::Continuous { dim: 2, values: vec![1.0, 1.0] };
+        // φ(1) + φ(0) / 2
+        let got = marginal_densities(&decoder, &action).expect("they fit");
+        assert!((got[0] - (0.241_970_7 + 0.199_471_1)).abs() < 1e-6, "{got:?}");
+        assert!(marginal_densities(&decoder, &Actions::Discrete(vec![0])).is_err());
+        assert!(marginal_densities(&decoder, &Actions::Continuous { dim: 2, values: vec![1.0; 4] }).is_err());
+    }
 }

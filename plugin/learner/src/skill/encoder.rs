@@ -2,7 +2,7 @@
 
 use super::SkillConfig;
 use crate::nn::{
-    Activation, Dist, Fresh, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, path,
+    Activation, Dist, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit, path,
 };
 use crate::{LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
@@ -47,7 +47,7 @@ impl Encoder {
         if let ObsKind::Image(image) = observation {
             config.cnn.check_image(image)?;
         }
-        let Ok(encoder) = Self::build(&mut Fresh { rng, device }, "", config, observation, action_width);
+        let Ok(encoder) = Self::build(&mut RandomInit { rng, device }, "", config, observation, action_width);
         Ok(encoder)
     }
 

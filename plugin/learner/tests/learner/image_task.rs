@@ -91,7 +91,7 @@ struct Player {
 }
 
 impl Player {
-    fn look(&mut self) {
+    fn draw_picture(&mut self) {
         self.quarter = below(&mut self.rng, 4) as u32;
         self.pixels = image(self.quarter, &mut self.rng);
     }
@@ -103,7 +103,7 @@ impl Driver {
         let player = |i| {
             let rng = streams.stream("play", i);
             let mut player = Player { rng, quarter: 0, time: 0, pixels: Vec::new() };
-            player.look();
+            player.draw_picture();
             player
         };
         Self { players: (0..envs as u64).map(player).collect(), skills: Vec::new(), hits: Vec::new() }
@@ -145,7 +145,7 @@ impl Driver {
                 let (action, log_prob) = output.sample(row, &mut player.rng);
                 let hit = action == Action::Discrete(player.quarter);
                 player.time += 1;
-                player.look();
+                player.draw_picture();
                 actions.push(&action).expect("discrete");
                 log_probs.push(log_prob);
                 rewards.push(f32::from(u8::from(hit)));
@@ -171,7 +171,7 @@ impl Driver {
                 }
                 if truncated[row] || terminated[row] {
                     player.time = 0;
-                    player.look();
+                    player.draw_picture();
                 }
             }
             obs = self.observe();

@@ -40,7 +40,7 @@ pub fn press(world: &mut World, agent: Entity, action: u32, ticks: u32) {
 }
 
 /// Brings the picture up to date with the state after the last tick.
-pub fn look(world: &mut World) {
+pub fn update_picture(world: &mut World) {
     world.run_schedule(ObserveSchedule);
 }
 

@@ -7,7 +7,7 @@ use playbot_games::coinrun::{
 };
 use playbot_lab::prelude::*;
 
-use super::arena::{NOTHING, drawn, look, play, press, sprite};
+use super::arena::{NOTHING, drawn, play, press, sprite, update_picture};
 
 /// The sprites behind the only enemy, each with depth, left and right end, lower and upper end; and the enemy.
 fn puffs(world: &mut World) -> (Vec<[f32; 5]>, Body) {
@@ -47,9 +47,9 @@ fn enemies_leave_puffs_where_they_were() {
         press(world, agent, NOTHING, 1);
         // Now those that the next tick begins with, however often they are looked at.
         hover(world, agent, -5.0);
-        look(world);
+        update_picture(world);
         let (seen, enemy) = puffs(world);
-        look(world);
+        update_picture(world);
         assert_eq!(puffs(world).0, seen);
         path.insert(0, enemy.x);
         let [left, right] = [1, 2].map(|end| seen.iter().map(move |puff| puff[end]));
@@ -71,7 +71,7 @@ fn enemies_leave_puffs_where_they_were() {
     // Far away there are none, and all at once when one comes near again.
     for (away, near) in [(30.0, false), (-8.0, true)] {
         hover(world, agent, away);
-        look(world);
+        update_picture(world);
         assert_eq!(!puffs(world).0.is_empty(), near);
     }
     // A new level begins without.

@@ -10,7 +10,7 @@ use playbot_games::coinrun::{
 };
 use playbot_lab::prelude::*;
 
-use super::arena::{JUMP, LEFT, NOTHING, RIGHT, drawn, look, play, press, sprite};
+use super::arena::{JUMP, LEFT, NOTHING, RIGHT, drawn, play, press, sprite, update_picture};
 
 #[test]
 fn what_is_drawn_is_where_the_game_says() {
@@ -21,7 +21,7 @@ fn what_is_drawn_is_where_the_game_says() {
             play(world, agent, level.into());
             world.get_mut::<Episode>(agent).expect("an agent").abandon();
             press(world, agent, RIGHT, 7);
-            look(world);
+            update_picture(world);
             check_arena(world, agent, mode, level);
         }
     }
@@ -68,7 +68,7 @@ fn a_player_stands_walks_jumps_and_turns() {
     // The first ground of easy level 0 begins at column 5: there is room to walk.
     play(world, agent, 0);
     let seen = |world: &mut World| {
-        look(world);
+        update_picture(world);
         let sprite = sprite(world, agent);
         let poses = [Pose::Stand, Pose::Walk1, Pose::Walk2];
         let pose = poses.into_iter().find(|pose| sprite.rect == Some(Art::player(0, *pose)));

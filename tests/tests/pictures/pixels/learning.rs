@@ -7,7 +7,7 @@ use playbot_lab::{
     prelude::*,
     train::{
         Algorithm, Experiment, TrainedLearner, Trainer,
-        checkpoint::Which,
+        checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
 };
@@ -47,7 +47,7 @@ fn what_is_learned_from_pictures_survives_its_files() {
     assert_eq!(results, measure(&trainer.policy(), trainer.skill_prior(), 1), "threads");
 
     let OpenedRun { run, experiment, info } = RunDir::open(&run).expect("a run");
-    let saved = run.checkpoint(Which::Last).expect("saved").learner_file();
+    let saved = run.checkpoint(CheckpointChoice::Last).expect("saved").learner_file();
     let learner = TrainedLearner::load(info.algorithm, &saved, DeviceKind::Flex).expect("as written");
     let (path, about) = (folder.path().join("pixels.policy"), Provenance::default());
     let file =

@@ -26,14 +26,24 @@ pub(in crate::nn) fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     Tensor::from_dispatch(Dispatch::kernel_tanh(x.into_dispatch()))
 }
 
-/// The recurrent part of a layer on a device with kernels; shapes as in [`Kernels::kernel_gru`].
-pub(in crate::nn) fn gru(
-    input: Tensor<3>,
-    weight: Tensor<3>,
-    bias_ih: Tensor<2>,
-    bias_hh: Tensor<2>,
-    initial: Tensor<3>,
-) -> Tensor<2> {
+/// What the recurrent part of a layer of T steps works on.
+#[derive(Clone, Debug)]
+pub(in crate::nn) struct GruInput {
+    /// x W_ih without its bias, time-major, `[directions, T * B, 3 * hidden]`.
+    pub(in crate::nn) input: Tensor<3>,
+    /// W_hh, `[directions, hidden, 3 * hidden]`.
+    pub(in crate::nn) weight: Tensor<3>,
+    /// `[directions, 3 * hidden]`.
+    pub(in crate::nn) bias_ih: Tensor<2>,
+    /// `[directions, 3 * hidden]`.
+    pub(in crate::nn) bias_hh: Tensor<2>,
+    /// The states before the first step, `[directions, B, hidden]`.
+    pub(in crate::nn) initial: Tensor<3>,
+}
+
+/// The recurrent part of a layer on a device with kernels: `[T * B, directions * hidden]`.
+pub(in crate::nn) fn gru(input: GruInput) -> Tensor<2> {
+    let GruInput { input, weight, bias_ih, bias_hh, initial } = input;
     Tensor::from_dispatch(Dispatch::kernel_gru(
         input.into_dispatch(),
         weight.into_dispatch(),
@@ -49,8 +59,7 @@ pub(super) trait Kernels: Backend {
     /// tanh of every element.
     fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// The recurrent part of a layer of T steps: `input` `[directions, T * B, 3 * hidden]` is x W_ih without its bias,
-    /// time-major, `weight` is W_hh, `initial` `[directions, B, hidden]`. Gives `[T * B, directions * hidden]`.
+    /// The recurrent part of a layer, with the tensors of [`GruInput`]. Gives `[T * B, directions * hidden]`.
     fn kernel_gru(
         input: FloatTensor<Self>,
         weight: FloatTensor<Self>,

@@ -1,9 +1,9 @@
 //! The teacher's side of the penalty: its distributions and its confidence for the rows that an update reads.
 
 use super::Teacher;
-use crate::nn::{Dist, HostDist, vector};
-use crate::policy::States;
-use crate::score::{penalty_weights, unsquashed};
+use crate::nn::{Dist, HostDist, unsquashed, vector};
+use crate::policy::StateBatch;
+use crate::score::penalty_weights;
 use crate::{Actions, DeviceKind, LearnError};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
@@ -46,7 +46,7 @@ impl Teacher {
     /// `squashed`: the policy is a squashed Gaussian.
     pub(crate) fn output<R: Rng + ?Sized>(
         &self,
-        states: States<'_>,
+        states: StateBatch<'_>,
         actions: &Actions,
         squashed: bool,
         own_samples_from: &mut R,
@@ -87,7 +87,7 @@ mod tests {
         let mut numbers = |width: usize| -> Vec<f32> { (0..n * width).map(|_| normal(&mut rng)).collect() };
         let (z, obs) = (numbers(teacher.latent()), numbers(obs_dim));
         let actions = Actions::Discrete(vec![0; n]);
-        let states = States { z: &z, obs: (&obs).into(), n };
+        let states = StateBatch { z: &z, obs: (&obs).into(), n };
         let rows = teacher.output(states, &actions, false, &mut Streams::new(1).stream("own", 0), device);
         let rows = rows.expect("finite").expect("there is a penalty");
         // The same row among others.

@@ -1,9 +1,9 @@
 //! How far a policy is from its teacher, which must be nothing where it starts as a copy.
 
 use super::Teacher;
-use crate::nn::{HostDist, scalar};
-use crate::policy::{Policy, States};
-use crate::score::{decoder_kl, unsquashed};
+use crate::nn::{HostDist, scalar, unsquashed};
+use crate::policy::{Policy, StateBatch};
+use crate::score::decoder_kl;
 use crate::{DeviceKind, LearnError};
 
 impl Teacher {
@@ -13,10 +13,10 @@ impl Teacher {
         &self,
         policy: &Policy,
         untrained: bool,
-        states: States<'_>,
+        states: StateBatch<'_>,
         device: DeviceKind,
     ) -> Result<f32, LearnError> {
-        let States { z, obs, n } = states;
+        let StateBatch { z, obs, n } = states;
         if n == 0 {
             return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
         }

@@ -7,7 +7,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata};
 use rayon::prelude::*;
 
-/// The outputs `[T * B, directions * hidden]`; for the shapes of the inputs see [`crate::nn::cpu::kernels::Kernels`].
+/// The outputs `[T * B, directions * hidden]`; for the shapes of the inputs see [`crate::nn::cpu::kernels::GruInput`].
 pub(in crate::nn) fn forward<B: Backend>(
     input: FloatTensor<B>,
     weight: FloatTensor<B>,

@@ -1,6 +1,6 @@
 //! From the gradient of the features to those of the parameters.
 
-use super::forward::{Kept, wides};
+use super::forward::{SavedActivations, wides};
 use super::layer::{Layer, Weights, add_where, put};
 use super::plan::{Plan, Step};
 use super::pool;
@@ -16,7 +16,7 @@ const IMAGES: usize = 8;
 /// The gradients of all parameters, layer by layer, for the gradient `[n, Plan::features]` of the features.
 ///
 /// The parts depend on the batch alone and are added in order: the sums are the same on any number of threads.
-pub(super) fn gradients(plan: &Plan, weights: &[Weights], kept: &Kept, grad: &[f32]) -> Vec<f32> {
+pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivations, grad: &[f32]) -> Vec<f32> {
     let n = grad.len() / plan.features();
     let part = n.div_ceil(PARTS).max(IMAGES);
     let parts = (0..n.div_ceil(part)).into_par_iter().map(|i| {
@@ -24,8 +24,8 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], kept: &Kept, grad: &[f
         let (mut wides, mut grads) = (wides(plan), vec![0.0; plan.lean.len]);
         for image in i * part..n.min((i + 1) * part) {
             let grad = &grad[image * plan.features()..][..plan.features()];
-            let values = &kept.values[image * plan.kept.len..][..plan.kept.len];
-            let marks = &kept.marks[image * plan.marks..][..plan.marks];
+            let values = &saved.values[image * plan.kept.len..][..plan.kept.len];
+            let marks = &saved.marks[image * plan.marks..][..plan.marks];
             let last = plan.lean.write(plan.last, &mut grads);
             plan.slots[plan.last].read(grad, last);
             mask(last, plan.kept.read(plan.last, values));

@@ -11,7 +11,7 @@ const IMAGES: usize = 4;
 
 /// What the backward pass needs of all images.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(super) struct SavedActivations {
     /// [`Plan::kept`] of each image.
     pub(super) values: Vec<f32>,
     /// The marks of each image.
@@ -31,13 +31,13 @@ pub(super) fn features(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<
 }
 
 /// As [`features`], and keeps what the backward pass needs.
-pub(super) fn features_kept(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<f32>, Kept) {
+pub(super) fn features_and_saved(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<f32>, SavedActivations) {
     let n = images.len() / image_len(plan);
     let mut out = vec![0.0; n * plan.features()];
-    let mut kept = Kept { values: vec![0.0; n * plan.kept.len], marks: vec![0; n * plan.marks] };
+    let mut saved = SavedActivations { values: vec![0.0; n * plan.kept.len], marks: vec![0; n * plan.marks] };
     let images = images.par_chunks(image_len(plan)).with_min_len(IMAGES);
     let work = out.par_chunks_mut(plan.features()).zip(images);
-    let work = work.zip(kept.values.par_chunks_mut(plan.kept.len).zip(kept.marks.par_chunks_mut(plan.marks)));
+    let work = work.zip(saved.values.par_chunks_mut(plan.kept.len).zip(saved.marks.par_chunks_mut(plan.marks)));
     work.for_each_init(
         || wides(plan),
         |wides, ((out, image), (values, marks))| {
@@ -45,7 +45,7 @@ pub(super) fn features_kept(plan: &Plan, weights: &[Weights], images: &[f32]) ->
             write(plan, &plan.kept, values, out);
         },
     );
-    (out, kept)
+    (out, saved)
 }
 
 fn image_len(plan: &Plan) -> usize {

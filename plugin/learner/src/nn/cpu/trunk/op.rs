@@ -1,7 +1,7 @@
 //! The trunk as an operation of the flex backend, with its backward pass.
 
 use super::backward::gradients;
-use super::forward::{Kept, features, features_kept};
+use super::forward::{SavedActivations, features, features_and_saved};
 use super::layer::Weights;
 use super::plan::Plan;
 use crate::nn::cpu::kernels::tensor;
@@ -59,9 +59,9 @@ impl<B: Trunks + HostNumbers, C: CheckpointStrategy> Trunks for Autodiff<B, C> {
         match Convolutions.prepare::<C>([node]).compute_bound().stateful() {
             OpsKind::Tracked(prep) => {
                 let weights = weights(&plan, &B::numbers(&params), true);
-                let (values, kept) = features_kept(&plan, &weights, &B::numbers(&pixels));
+                let (values, saved) = features_and_saved(&plan, &weights, &B::numbers(&pixels));
                 let values = tensor::<B>(values, [pixels.shape()[0], plan.features()], &pixels.device());
-                prep.finish(Arc::new(Run { plan, weights, kept }), values)
+                prep.finish(Arc::new(Run { plan, weights, saved }), values)
             }
             OpsKind::UnTracked(prep) => prep.finish(B::trunk(pixels, params, plan)),
         }
@@ -73,7 +73,7 @@ impl<B: Trunks + HostNumbers, C: CheckpointStrategy> Trunks for Autodiff<B, C> {
 struct Run {
     plan: Arc<Plan>,
     weights: Vec<Weights>,
-    kept: Kept,
+    saved: SavedActivations,
 }
 
 #[derive(Debug)]
@@ -86,7 +86,7 @@ impl<B: Trunks + HostNumbers> Backward<B, 1> for Convolutions {
         let grad = grads.consume::<B>(&ops.node);
         let (run, [params]) = (ops.state, ops.parents);
         if let Some(params) = params {
-            let found = gradients(&run.plan, &run.weights, &run.kept, &B::numbers(&grad));
+            let found = gradients(&run.plan, &run.weights, &run.saved, &B::numbers(&grad));
             let len = found.len();
             grads.register::<B>(params.id, tensor::<B>(found, [len], &grad.device()));
         }

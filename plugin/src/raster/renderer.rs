@@ -1,4 +1,4 @@
-//! Filling the frames of all eyes.
+//! Filling the frames of all agents.
 
 use bevy::prelude::*;
 
@@ -7,7 +7,7 @@ use super::{
     canvas::{Canvas, View},
     colour::{Rgba, SRGB, Tint},
     error::RasterError,
-    scene::{Item, Stages, What},
+    scene::{Item, ItemKind, Stages},
     sprite::SpriteOn,
     texture::Textures,
     tiles::{TileBuffers, TilesOn},
@@ -23,18 +23,18 @@ use crate::{
 
 /// Converted images, and memory that is used again for every picture.
 #[derive(Default)]
-pub(super) struct Studio {
+pub(super) struct RasterRenderer {
     textures: Textures,
-    eyes: Vec<Eye>,
+    viewpoints: Vec<Viewpoint>,
     items: Vec<Item>,
     visible: Vec<u64>,
     columns: Vec<u32>,
     tiles: TileBuffers,
 }
 
-/// An agent that looks.
+/// An agent, and the place that its sensor looks at.
 #[derive(Debug)]
-struct Eye {
+struct Viewpoint {
     stage: Option<Entity>,
     row: usize,
     agent: Entity,
@@ -42,7 +42,7 @@ struct Eye {
 }
 
 /// Agents and their frames.
-type Eyes<'w, 's> = Query<
+type RasterAgents<'w, 's> = Query<
     'w,
     's,
     (
@@ -53,66 +53,68 @@ type Eyes<'w, 's> = Query<
 >;
 
 /// Draws the picture of each agent that is observed.
-pub(super) fn look(
+pub(super) fn fill_frames(
     (order, tick, clear): (Res<AgentOrder>, Res<Tick>, Option<Res<ClearColor>>),
     stages: Stages,
-    mut eyes: Eyes,
+    mut agents: RasterAgents,
     names: Query<&Name>,
     mut faults: ResMut<Faults>,
-    mut studio: Local<Studio>,
+    mut renderer: Local<RasterRenderer>,
 ) {
-    let mut report = |eyes: &Eyes, eye: Entity, error: RasterError| {
-        let Ok(((agent, _, episode), ..)) = eyes.get(eye) else { return };
+    let mut report = |agents: &RasterAgents, entity: Entity, error: RasterError| {
+        let Ok(((agent, _, episode), ..)) = agents.get(entity) else { return };
         let name = error.entity().and_then(|entity| names.get(entity).ok());
         let name = name.map_or_else(String::new, |name| format!(" (`{name}`)"));
         faults.report(format!("{}: {error}{name}", episode.moment(agent)));
     };
-    let studio = &mut *studio;
-    studio.textures.refresh(&stages.images);
-    studio.find_eyes(&order, &eyes, &stages, &mut report);
+    let renderer = &mut *renderer;
+    renderer.textures.refresh(&stages.images);
+    renderer.find_viewpoints(&order, &agents, &stages, &mut report);
     let clear = clear.map_or([0, 0, 0, 255], |clear| SRGB.opaque(Tint::of(clear.0)));
     let mut first = 0;
-    while let Some(&Eye { stage, agent, .. }) = studio.eyes.get(first) {
-        let group = first..first + studio.eyes[first..].iter().take_while(|eye| eye.stage == stage).count();
+    while let Some(&Viewpoint { stage, agent, .. }) = renderer.viewpoints.get(first) {
+        let group =
+            first..first + renderer.viewpoints[first..].iter().take_while(|viewpoint| viewpoint.stage == stage).count();
         first = group.end;
-        if let Err(error) = stages.gather(stage, &mut studio.textures, &mut studio.items) {
-            report(&eyes, agent, error);
+        if let Err(error) = stages.gather(stage, &mut renderer.textures, &mut renderer.items) {
+            report(&agents, agent, error);
             continue;
         }
-        for eye in group {
-            let Eye { agent, centre, .. } = studio.eyes[eye];
-            let Ok((_, (sensor, image), mut frame)) = eyes.get_mut(agent) else { continue };
+        for number in group {
+            let Viewpoint { agent, centre, .. } = renderer.viewpoints[number];
+            let Ok((_, (sensor, image), mut frame)) = agents.get_mut(agent) else { continue };
             let size = UVec2::new(image.0.width, image.0.height);
-            let painted = studio.paint(&stages, &View::new(centre, sensor.width, size), size, clear, &mut frame.pixels);
+            let painted =
+                renderer.paint(&stages, &View::new(centre, sensor.width, size), size, clear, &mut frame.pixels);
             match painted {
                 Ok(()) => frame.tick = Some(tick.0),
-                Err(error) => report(&eyes, agent, error),
+                Err(error) => report(&agents, agent, error),
             }
         }
     }
 }
 
-impl Studio {
+impl RasterRenderer {
     /// Lists the agents that are observed, those of one stage together.
-    fn find_eyes(
+    fn find_viewpoints(
         &mut self,
         order: &AgentOrder,
-        eyes: &Eyes,
+        agents: &RasterAgents,
         stages: &Stages,
-        report: &mut impl FnMut(&Eyes, Entity, RasterError),
+        report: &mut impl FnMut(&RasterAgents, Entity, RasterError),
     ) {
-        self.eyes.clear();
+        self.viewpoints.clear();
         for (row, &agent) in order.entities().iter().enumerate() {
-            let Ok(((_, control, episode), (sensor, image), _)) = eyes.get(agent) else { continue };
+            let Ok(((_, control, episode), (sensor, image), _)) = agents.get(agent) else { continue };
             if !is_observed(control, episode) {
                 continue;
             }
             match locate(sensor, image, stages) {
-                Ok((stage, centre)) => self.eyes.push(Eye { stage, row, agent, centre }),
-                Err(error) => report(eyes, agent, error),
+                Ok((stage, centre)) => self.viewpoints.push(Viewpoint { stage, row, agent, centre }),
+                Err(error) => report(agents, agent, error),
             }
         }
-        self.eyes.sort_unstable_by_key(|eye| (eye.stage, eye.row));
+        self.viewpoints.sort_unstable_by_key(|viewpoint| (viewpoint.stage, viewpoint.row));
     }
 
     /// Paints what was gathered, the farthest first, and what is equally far in the order in which it was found.
@@ -130,9 +132,9 @@ impl Studio {
         let mut canvas = Canvas { pixels, width, height };
         self.visible.clear();
         self.visible.extend((0u64..).zip(&self.items).filter_map(|(number, item)| {
-            let seen = match item.what {
-                What::Tiles(_) => true,
-                What::Sprite { .. } => {
+            let seen = match item.kind {
+                ItemKind::Tiles(_) => true,
+                ItemKind::Sprite { .. } => {
                     let (columns, rows) = canvas.cut(&view.place(&item.quad));
                     !columns.is_empty() && !rows.is_empty()
                 }
@@ -144,13 +146,13 @@ impl Studio {
             let item = &self.items[*number as u32 as usize];
             let quad = view.place(&item.quad);
             let texture = self.textures.get(item.texture);
-            match item.what {
-                What::Sprite { part, colour } => {
+            match item.kind {
+                ItemKind::Sprite { region, colour } => {
                     let area = canvas.cut(&quad);
-                    let sprite = SpriteOn { quad, part, texture, tint: Tint::of(colour) };
+                    let sprite = SpriteOn { quad, region, texture, tint: Tint::of(colour) };
                     sprite.paint(&mut canvas, area, &mut self.columns);
                 }
-                What::Tiles(entity) => {
+                ItemKind::Tiles(entity) => {
                     let Ok(layer) = stages.layers.get(entity) else { continue };
                     let tiles = TilesOn { cell: quad, layer, strip: texture };
                     tiles.paint(&mut canvas, &mut self.tiles).map_err(|why| RasterError::Thing(entity, why))?;

@@ -6,14 +6,14 @@ use bevy::{prelude::*, tasks::tick_global_task_pools_on_main_thread};
 
 use super::{
     CameraError, ReadbackDelay,
-    borrow::{BorrowedTargets, Loan},
-    eye::{self, Eye, Eyes, Stamp},
-    eye_draw::{DrawnStamp, ExtractedStamp},
+    borrow::{BorrowedCameras, BorrowedTargets},
     images::{self, Images},
     prepare::{Atlas, prepare},
-    readback::{Arrived, Piece, Readback, Source},
+    readback::{MappedFrames, Piece, Readback, Source},
     renderer::Renderer,
-    request::{Asked, Request, report, requests},
+    request::{FollowRequest, Requests, gather_requests, report},
+    sensor_view::{self, SensorView, SensorViews, Stamp},
+    sensor_view_draw::{DrawnStamp, ExtractedStamp},
 };
 use crate::{fault::Faults, tick::Tick, vision::Frame};
 
@@ -21,38 +21,38 @@ use crate::{fault::Faults, tick::Tick, vision::Frame};
 const PATIENCE: u64 = 60;
 
 /// Fills the frames of all agents with a [`CameraSensor`](super::CameraSensor).
-pub(super) fn look(world: &mut World) {
-    let asked = requests(world);
-    if asked.is_empty() {
+pub(super) fn fill_frames(world: &mut World) {
+    let requests = gather_requests(world);
+    if requests.is_empty() {
         return;
     }
     let Some(mut renderer) = world.remove_resource::<Renderer>() else {
-        return report(world, asked.iter(), &CameraError::NoRenderer);
+        return report(world, requests.iter(), &CameraError::NoRenderer);
     };
-    if let Err(error) = look_with(world, &mut renderer, &asked) {
-        report(world, asked.iter(), &error);
+    if let Err(error) = fill_frames_with(world, &mut renderer, &requests) {
+        report(world, requests.iter(), &error);
     }
     world.insert_resource(renderer);
 }
 
-fn look_with(world: &mut World, renderer: &mut Renderer, asked: &Asked) -> Result<(), CameraError> {
-    prepare(world, asked)?;
+fn fill_frames_with(world: &mut World, renderer: &mut Renderer, requests: &Requests) -> Result<(), CameraError> {
+    prepare(world, requests)?;
     let tick = world.resource::<Tick>().0;
     let mut stamp = world.resource_mut::<Stamp>();
     *stamp = Stamp { look: stamp.look + 1, tick };
     let stamp = *stamp;
-    draw_until_ready(world, renderer, asked)?;
-    let arrived = read_back(world, renderer, asked)?;
-    hand_out(world, asked, &arrived, stamp);
-    world.resource_mut::<Readback>().reuse(arrived);
+    draw_until_ready(world, renderer, requests)?;
+    let frames = read_back(world, renderer, requests)?;
+    hand_out(world, requests, &frames, stamp);
+    world.resource_mut::<Readback>().reuse(frames);
     Ok(())
 }
 
 /// Draws, again and again until every shader and image that is being loaded is there: the first time.
-fn draw_until_ready(world: &mut World, renderer: &mut Renderer, asked: &Asked) -> Result<(), CameraError> {
+fn draw_until_ready(world: &mut World, renderer: &mut Renderer, requests: &Requests) -> Result<(), CameraError> {
     let begun = Instant::now();
     loop {
-        draw(world, renderer, asked);
+        draw(world, renderer, requests);
         let waits_for = match images::check(world) {
             Images::Loading => "images",
             _ if !renderer.is_ready() => "shaders",
@@ -77,15 +77,15 @@ fn draw_until_ready(world: &mut World, renderer: &mut Renderer, asked: &Asked) -
 }
 
 /// Draws the World as it is now, for sensors only.
-fn draw(world: &mut World, renderer: &mut Renderer, asked: &Asked) {
+fn draw(world: &mut World, renderer: &mut Renderer, requests: &Requests) {
     world.resource_scope(|world, targets: Mut<BorrowedTargets>| {
-        let loan = Loan::select(world, &targets);
-        switch(world, !asked.following.is_empty());
+        let borrowed = BorrowedCameras::select(world, &targets);
+        switch(world, !requests.following.is_empty());
         renderer.scene.prepare.run(world);
-        open_eyes(world, asked);
-        loan.point(world, &targets);
+        place_views(world, requests);
+        borrowed.point(world, &targets);
         renderer.draw_unseen(world);
-        loan.give_back(world);
+        borrowed.give_back(world);
         if renderer.shows_windows {
             switch(world, false);
         }
@@ -94,41 +94,41 @@ fn draw(world: &mut World, renderer: &mut Renderer, asked: &Asked) {
 
 /// Switches the shared camera on or off.
 fn switch(world: &mut World, on: bool) {
-    let Some(camera) = world.resource::<Eyes>().camera else { return };
+    let Some(camera) = world.resource::<SensorViews>().camera else { return };
     if let Some(mut camera) = world.get_mut::<Camera>(camera) {
         camera.bypass_change_detection().is_active = on;
     }
 }
 
-/// Puts the eyes where their targets are.
-fn open_eyes(world: &mut World, asked: &Asked) {
+/// Puts the views where their targets are.
+fn place_views(world: &mut World, requests: &Requests) {
     let cells = std::mem::take(&mut world.resource_mut::<Atlas>().layout.cells);
-    let eye = |(&cell, (request, target, width)): (&URect, &(Request, Entity, f32))| {
-        let centre = world.get::<GlobalTransform>(*target).map_or(Vec3::ZERO, GlobalTransform::translation);
-        let height = width * request.size.y as f32 / request.size.x as f32;
-        Eye { cell, centre: centre.truncate(), size: Vec2::new(*width, height) }
+    let view = |(&cell, follow): (&URect, &FollowRequest)| {
+        let centre = world.get::<GlobalTransform>(follow.target).map_or(Vec3::ZERO, GlobalTransform::translation);
+        let size = follow.request.size.as_vec2();
+        SensorView { cell, centre: centre.truncate(), size: Vec2::new(follow.width, follow.width * size.y / size.x) }
     };
-    let eyes: Vec<Eye> = cells.iter().zip(&asked.following).map(eye).collect();
-    world.resource_mut::<Eyes>().eyes = eyes;
+    let views: Vec<SensorView> = cells.iter().zip(&requests.following).map(view).collect();
+    world.resource_mut::<SensorViews>().views = views;
     world.resource_mut::<Atlas>().layout.cells = cells;
-    world.run_system_cached(eye::note_bounds).expect("its resources are the plugin's own");
+    world.run_system_cached(sensor_view::note_bounds).expect("its resources are the plugin's own");
 }
 
 /// Copies what was drawn, and waits for it.
-fn read_back(world: &mut World, renderer: &mut Renderer, asked: &Asked) -> Result<Arrived, CameraError> {
+fn read_back(world: &mut World, renderer: &mut Renderer, requests: &Requests) -> Result<MappedFrames, CameraError> {
     let render_world = renderer.world();
     let extracted = render_world.resource::<ExtractedStamp>().0;
     let drawn = render_world.resource::<DrawnStamp>().get();
     let atlas = world.resource::<Atlas>();
     let targets = world.resource::<BorrowedTargets>();
     let (mut sources, mut pieces) = (Vec::new(), Vec::new());
-    if let Some(image) = atlas.image.as_ref().filter(|_| !asked.following.is_empty()) {
+    if let Some(image) = atlas.image.as_ref().filter(|_| !requests.following.is_empty()) {
         sources.push(Source { image: image.id(), size: atlas.layout.size, stamp: drawn });
-        let cells = asked.following.iter().zip(&atlas.layout.cells);
-        pieces.extend(cells.map(|((request, ..), &cell)| Piece { agent: request.agent, source: 0, cell }));
+        let cells = requests.following.iter().zip(&atlas.layout.cells);
+        pieces.extend(cells.map(|(follow, &cell)| Piece { agent: follow.request.agent, source: 0, cell }));
     }
     for target in targets.iter() {
-        let agents = asked.through.iter().filter(|(_, camera)| *camera == target.camera);
+        let agents = requests.through.iter().filter(|(_, camera)| *camera == target.camera);
         let cell = URect { min: UVec2::ZERO, max: target.size };
         pieces.extend(agents.map(|(request, _)| Piece { agent: request.agent, source: sources.len(), cell }));
         sources.push(Source { image: target.image.id(), size: target.size, stamp: extracted });
@@ -138,9 +138,9 @@ fn read_back(world: &mut World, renderer: &mut Renderer, asked: &Asked) -> Resul
 }
 
 /// Writes the frames that are of this look, and reports the others.
-fn hand_out(world: &mut World, asked: &Asked, arrived: &Arrived, now: Stamp) {
+fn hand_out(world: &mut World, requests: &Requests, frames: &MappedFrames, now: Stamp) {
     let mut late = Vec::new();
-    arrived.hand_out(|agent, stamp, rows| {
+    frames.hand_out(|agent, stamp, rows| {
         if stamp != now {
             return late.push((agent, stamp.tick));
         }
@@ -155,7 +155,7 @@ fn hand_out(world: &mut World, asked: &Asked, arrived: &Arrived, now: Stamp) {
     for (agent, got) in late {
         report(
             world,
-            asked.iter().filter(|request| request.agent == agent),
+            requests.iter().filter(|request| request.agent == agent),
             &CameraError::Stale { wanted: now.tick, got },
         );
     }

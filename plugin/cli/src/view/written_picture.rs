@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A picture that was written, and what it shows.
-pub struct Written<'a> {
+pub struct WrittenPicture<'a> {
     /// The file.
     pub path: &'a Path,
     /// The game.
@@ -46,7 +46,7 @@ pub struct Written<'a> {
     pub divergence: Option<&'a Divergence>,
 }
 
-impl Written<'_> {
+impl WrittenPicture<'_> {
     /// Says it: as a line of JSON on standard output, or to people.
     ///
     /// # Errors
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn a_sentence_says_what_is_seen_of_whom_and_how_it_went() {
         let game = ForeignGame::new("runner", 1, |_: &mut App| {});
-        let still = Written {
+        let still = WrittenPicture {
             path: Path::new("view.png"),
             game: &game,
             mode: "default",
@@ -134,7 +134,7 @@ mod tests {
         let words = "view.png shows tick 0 of level 5 of runner in mode default, played by walker, on 64 × 48 pixels; \
                      after 1 tick the episode was still running";
         assert_eq!(still.sentence(), words);
-        let film = Written { demo: Some(Path::new("a.demo")), tick: None, frames: 2, ticks: 2, ..still };
+        let film = WrittenPicture { demo: Some(Path::new("a.demo")), tick: None, frames: 2, ticks: 2, ..still };
         let words = "view.png shows 2 frames of level 5 of runner in mode default, as recorded in a.demo, on 64 × 48 \
                      pixels; after 2 ticks the episode was still running";
         assert_eq!(film.sentence(), words);

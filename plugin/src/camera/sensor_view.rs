@@ -7,7 +7,7 @@ use bevy::{
     render::{camera::CameraRenderGraph, view::Msaa},
 };
 
-use super::eye_draw::DrawEyes;
+use super::sensor_view_draw::DrawSensorViews;
 
 /// How far above and below the target things are seen, as with Bevy's own 2D camera.
 const DEPTH: f32 = 1000.0;
@@ -19,7 +19,7 @@ const DEPTH: f32 = 1000.0;
 #[reflect(Component)]
 pub struct SensorCamera;
 
-/// A camera that sees everything and draws nothing by itself: what it would draw is dealt out to the eyes.
+/// A camera that sees everything and draws nothing by itself: what it would draw is dealt out to the sensors' views.
 ///
 /// It neither tones nor dithers, so that colours are the bytes of the images they are from.
 pub(super) fn spawn_camera(world: &mut World) -> Entity {
@@ -36,7 +36,7 @@ pub(super) fn spawn_camera(world: &mut World) -> Entity {
             Camera2d,
             Camera { order: isize::MIN, ..default() },
             Projection::Orthographic(everything),
-            CameraRenderGraph::new(DrawEyes),
+            CameraRenderGraph::new(DrawSensorViews),
             Msaa::Off,
         ))
         .remove::<(Tonemapping, DebandDither)>()
@@ -53,7 +53,7 @@ pub(super) struct Stamp {
 
 /// What one agent sees, and where it is drawn.
 #[derive(Clone, Copy, Debug, Reflect)]
-pub(super) struct Eye {
+pub(super) struct SensorView {
     /// Pixels of the common texture.
     pub(super) cell: URect,
     /// The middle of the picture.
@@ -62,12 +62,12 @@ pub(super) struct Eye {
     pub(super) size: Vec2,
 }
 
-impl Eye {
+impl SensorView {
     pub(super) fn area(&self) -> Rect {
         Rect::from_center_size(self.centre, self.size)
     }
 
-    /// From the eye's coordinates to the picture's.
+    /// From the view's coordinates to the picture's.
     pub(super) fn projection(&self) -> Mat4 {
         let half = self.size / 2.0;
         // Far and near are exchanged, as everywhere in Bevy.
@@ -75,22 +75,25 @@ impl Eye {
     }
 }
 
-/// All eyes of this tick, and what there is to see.
+/// All views of this tick, and what there is to see.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
-pub(super) struct Eyes {
+pub(super) struct SensorViews {
     pub(super) camera: Option<Entity>,
-    pub(super) eyes: Vec<Eye>,
+    pub(super) views: Vec<SensorView>,
     /// What is visible, with the rectangle that it lies in.
     pub(super) bounds: Vec<(Entity, Rect)>,
 }
 
 /// Notes where everything is that may be drawn.
-pub(super) fn note_bounds(mut eyes: ResMut<Eyes>, drawn: Query<(Entity, &GlobalTransform, &Aabb, &ViewVisibility)>) {
-    eyes.bounds.clear();
+pub(super) fn note_bounds(
+    mut views: ResMut<SensorViews>,
+    drawn: Query<(Entity, &GlobalTransform, &Aabb, &ViewVisibility)>,
+) {
+    views.bounds.clear();
     for (entity, transform, aabb, visible) in &drawn {
         if visible.get() {
-            eyes.bounds.push((entity, bounds(transform, aabb)));
+            views.bounds.push((entity, bounds(transform, aabb)));
         }
     }
 }

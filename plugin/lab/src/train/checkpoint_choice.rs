@@ -6,7 +6,7 @@ use bevy_playbot::unknown_name::UnknownName;
 
 /// Which checkpoint of a run is meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Which {
+pub enum CheckpointChoice {
     /// The latest.
     #[default]
     Last,
@@ -16,7 +16,7 @@ pub enum Which {
     Step(u64),
 }
 
-impl FromStr for Which {
+impl FromStr for CheckpointChoice {
     type Err = UnknownName;
 
     fn from_str(name: &str) -> Result<Self, UnknownName> {
@@ -36,9 +36,9 @@ mod tests {
 
     #[test]
     fn checkpoints_are_named_on_the_command_line() {
-        assert_eq!("last".parse(), Ok(Which::Last));
-        assert_eq!("best".parse(), Ok(Which::Best));
-        assert_eq!("4096".parse(), Ok(Which::Step(4096)));
-        assert!("newest".parse::<Which>().expect_err("no such word").to_string().contains("last, best"));
+        assert_eq!("last".parse(), Ok(CheckpointChoice::Last));
+        assert_eq!("best".parse(), Ok(CheckpointChoice::Best));
+        assert_eq!("4096".parse(), Ok(CheckpointChoice::Step(4096)));
+        assert!("newest".parse::<CheckpointChoice>().expect_err("no such word").to_string().contains("last, best"));
     }
 }

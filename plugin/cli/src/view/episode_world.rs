@@ -15,7 +15,7 @@ use playbot_lab::{eval::Player, game::Game, worlds::build_observing_world};
 use crate::error::CliError;
 
 /// What an agent saw and did in one tick.
-pub struct Shot {
+pub struct EpisodeStep {
     /// Tick of the episode, from 0.
     pub tick: u32,
     /// What it saw, as in [`Observation::image`].
@@ -33,7 +33,7 @@ pub struct Shot {
 }
 
 /// One agent in one episode.
-pub struct Stage {
+pub struct EpisodeWorld {
     world: World,
     agent: Entity,
     action_names: Vec<String>,
@@ -46,7 +46,7 @@ pub struct Stage {
 #[reflect(Resource)]
 struct End(Option<EpisodeEnded>);
 
-impl Stage {
+impl EpisodeWorld {
     /// A level that a player plays.
     ///
     /// # Errors
@@ -59,11 +59,11 @@ impl Stage {
         level: u64,
         player: &Player,
     ) -> Result<Self, CliError> {
-        let mut stage = Self::new(game, mode, observation_config, level)?;
-        let control = player.seat(game, &mut stage.world, stage.agent);
-        player.install(&mut stage.world);
-        stage.world.entity_mut(stage.agent).insert(control);
-        Ok(stage)
+        let mut new = Self::new(game, mode, observation_config, level)?;
+        let control = player.seat(game, &mut new.world, new.agent);
+        player.install(&mut new.world);
+        new.world.entity_mut(new.agent).insert(control);
+        Ok(new)
     }
 
     /// A recorded episode.
@@ -77,10 +77,10 @@ impl Stage {
         observation_config: &ObservationConfig,
         episode: DemoEpisode,
     ) -> Result<Self, CliError> {
-        let mut stage = Self::new(game, mode, observation_config, episode.level_seed)?;
-        stage.over = episode.is_empty();
-        stage.world.entity_mut(stage.agent).insert((Control::Replay, Replay::new(Arc::new(episode))));
-        Ok(stage)
+        let mut new = Self::new(game, mode, observation_config, episode.level_seed)?;
+        new.over = episode.is_empty();
+        new.world.entity_mut(new.agent).insert((Control::Replay, Replay::new(Arc::new(episode))));
+        Ok(new)
     }
 
     fn new(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, level: u64) -> Result<Self, CliError> {
@@ -102,24 +102,24 @@ impl Stage {
     /// # Errors
     ///
     /// The game broke its contract, or the pictures fail.
-    pub fn next(&mut self) -> Result<Option<Shot>, CliError> {
+    pub fn next(&mut self) -> Result<Option<EpisodeStep>, CliError> {
         if self.over {
             return Ok(None);
         }
         self.world.tick()?;
-        let shot = self.shot();
+        let step = self.step();
         self.ticks += 1;
         let replayed = self.world.get::<Replay>(self.agent).is_some_and(Replay::is_finished);
         self.over = replayed || self.end().is_some();
-        Ok(Some(shot))
+        Ok(Some(step))
     }
 
     /// What an agent carries after a tick is still what it acted on.
-    fn shot(&self) -> Shot {
+    fn step(&self) -> EpisodeStep {
         let agent = self.world.entity(self.agent);
         let by_policy = agent.get::<Control>() == Some(&Control::Policy);
         let decided = agent.get::<Decision>().filter(|_| by_policy);
-        Shot {
+        EpisodeStep {
             tick: self.ticks,
             image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
             vector: agent.get::<Observation>().map(|seen| seen.vector.clone()).unwrap_or_default(),

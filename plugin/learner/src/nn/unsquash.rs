@@ -1,6 +1,6 @@
 //! A Gaussian decoder as a squashed Gaussian policy sees it.
 
-use crate::nn::HostDist;
+use super::HostDist;
 
 /// Actions are taken to lie within ± this before the inverse of tanh is applied.
 const EDGE: f64 = 0.999;

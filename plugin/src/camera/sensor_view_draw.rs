@@ -1,9 +1,9 @@
-//! Drawing many eyes with the work of one camera, in the render World.
+//! Drawing the views of many sensors with the work of one camera, in the render World.
 //!
 //! Bevy prepares the shared camera as any other: it extracts, specialises, queues and sorts everything once. Before
-//! buffers are filled, the sorted items are dealt out to one phase for each eye, by what lies in its sight. All eyes
+//! buffers are filled, the sorted items are dealt out to one phase for each view, by what lies in its sight. All views
 //! are then drawn in one pass, each with its own view uniform, viewport and scissor. Items that Bevy keeps in bins
-//! (opaque 2D meshes) are few and are drawn for each eye.
+//! (opaque 2D meshes) are few and are drawn for each view.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -28,24 +28,24 @@ use bevy::{
     sprite_render::{Mesh2dViewBindGroup, SpriteViewBindGroup},
 };
 
-use super::eye::{Eyes, Stamp};
+use super::sensor_view::{SensorViews, Stamp};
 
 /// What the shared camera does instead of Bevy's 2D rendering.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct DrawEyes;
+pub(super) struct DrawSensorViews;
 
-/// The eyes in the render World. Their phases and entities are used again and again.
+/// The views in the render World. Their phases and entities are used again and again.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
-struct RenderEyes {
+struct RenderSensorViews {
     #[reflect(ignore)]
-    scene: Eyes,
+    scene: SensorViews,
     #[reflect(ignore)]
     entities: Vec<Entity>,
     /// Empty phases between two pictures.
     #[reflect(ignore)]
     phases: Vec<SortedRenderPhase<Transparent2d>>,
-    /// The shared camera's own phase, while the eyes' ones stand in for it.
+    /// The shared camera's own phase, while the views' ones stand in for it.
     #[reflect(ignore)]
     whole: Option<SortedRenderPhase<Transparent2d>>,
     #[reflect(ignore)]
@@ -57,7 +57,7 @@ struct RenderEyes {
 #[reflect(Resource)]
 pub(super) struct ExtractedStamp(pub(super) Stamp);
 
-/// The stamp of the scene that the eyes were drawn from last.
+/// The stamp of the scene that the views were drawn from last.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct DrawnStamp {
@@ -76,66 +76,66 @@ impl DrawnStamp {
     }
 }
 
-/// Adds the eyes to the renderer, if the app has one.
-pub(super) fn add_eyes(app: &mut App) {
+/// Adds the views of sensors to the renderer, if the app has one.
+pub(super) fn add_sensor_views(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-    let mut draw = Schedule::new(DrawEyes);
+    let mut draw = Schedule::new(DrawSensorViews);
     draw.set_executor(SingleThreadedExecutor::new());
-    draw.add_systems(draw_eyes);
+    draw.add_systems(draw_views);
     render_app
-        .init_resource::<RenderEyes>()
+        .init_resource::<RenderSensorViews>()
         .init_resource::<ExtractedStamp>()
         .init_resource::<DrawnStamp>()
         .add_schedule(draw)
-        .add_systems(ExtractSchedule, extract_eyes)
+        .add_systems(ExtractSchedule, extract_views)
         .add_systems(
             Render,
             (
-                open_eyes.after(RenderSystems::PhaseSort).before(RenderSystems::Prepare),
+                make_views.after(RenderSystems::PhaseSort).before(RenderSystems::Prepare),
                 lend_bind_groups.after(RenderSystems::PrepareBindGroups).before(RenderSystems::Render),
-                close_eyes.in_set(RenderSystems::Cleanup),
+                restore_phases.in_set(RenderSystems::Cleanup),
             ),
         );
 }
 
-fn extract_eyes(
-    mut eyes: ResMut<RenderEyes>,
+fn extract_views(
+    mut views: ResMut<RenderSensorViews>,
     mut stamp: ResMut<ExtractedStamp>,
-    main_eyes: Extract<Res<Eyes>>,
+    main_views: Extract<Res<SensorViews>>,
     main_stamp: Extract<Res<Stamp>>,
 ) {
     stamp.0 = **main_stamp;
-    let RenderEyes { scene, bounds, .. } = &mut *eyes;
-    scene.camera = main_eyes.camera;
-    scene.eyes.clone_from(&main_eyes.eyes);
+    let RenderSensorViews { scene, bounds, .. } = &mut *views;
+    scene.camera = main_views.camera;
+    scene.views.clone_from(&main_views.views);
     bounds.clear();
-    bounds.extend(main_eyes.bounds.iter().copied());
+    bounds.extend(main_views.bounds.iter().copied());
 }
 
-/// The view of eye number `eye`.
-fn eye_view(camera: Entity, eye: usize) -> RetainedViewEntity {
-    RetainedViewEntity::new(MainEntity::from(camera), None, eye as u32 + 1)
+/// The view number `number`.
+fn retained_view(camera: Entity, number: usize) -> RetainedViewEntity {
+    RetainedViewEntity::new(MainEntity::from(camera), None, number as u32 + 1)
 }
 
-/// Gives each eye a view and deals out what the shared camera would draw.
-fn open_eyes(world: &mut World) {
-    world.resource_scope(|world, mut eyes: Mut<RenderEyes>| {
-        let Some(camera) = eyes.scene.camera else { return };
-        while eyes.entities.len() < eyes.scene.eyes.len() {
-            eyes.entities.push(world.spawn_empty().id());
+/// Makes each view and deals out what the shared camera would draw.
+fn make_views(world: &mut World) {
+    world.resource_scope(|world, mut views: Mut<RenderSensorViews>| {
+        let Some(camera) = views.scene.camera else { return };
+        while views.entities.len() < views.scene.views.len() {
+            views.entities.push(world.spawn_empty().id());
         }
-        while eyes.entities.len() > eyes.scene.eyes.len() {
-            eyes.entities.pop().map(|entity| world.despawn(entity));
+        while views.entities.len() > views.scene.views.len() {
+            views.entities.pop().map(|entity| world.despawn(entity));
         }
-        for (i, (&entity, eye)) in eyes.entities.iter().zip(&eyes.scene.eyes).enumerate() {
-            let size = eye.cell.size();
+        for (i, (&entity, view)) in views.entities.iter().zip(&views.scene.views).enumerate() {
+            let size = view.cell.size();
             world.entity_mut(entity).insert(ExtractedView {
-                retained_view_entity: eye_view(camera, i),
-                clip_from_view: eye.projection(),
-                world_from_view: GlobalTransform::from_translation(eye.centre.extend(0.0)),
+                retained_view_entity: retained_view(camera, i),
+                clip_from_view: view.projection(),
+                world_from_view: GlobalTransform::from_translation(view.centre.extend(0.0)),
                 clip_from_world: None,
                 target_format: TextureFormat::Rgba8UnormSrgb,
-                viewport: UVec4::new(eye.cell.min.x, eye.cell.min.y, size.x, size.y),
+                viewport: UVec4::new(view.cell.min.x, view.cell.min.y, size.x, size.y),
                 color_grading: default(),
                 invert_culling: false,
             });
@@ -143,23 +143,23 @@ fn open_eyes(world: &mut World) {
         let mut phases = world.resource_mut::<ViewSortedRenderPhases<Transparent2d>>();
         let shared = RetainedViewEntity::new(MainEntity::from(camera), None, 0);
         let Some(whole) = phases.get_mut(&shared).map(std::mem::take) else { return };
-        deal_out(&mut eyes, &whole, camera, &mut phases);
-        eyes.whole = Some(whole);
+        deal_out(&mut views, &whole, camera, &mut phases);
+        views.whole = Some(whole);
         tone(world, camera, true);
     });
 }
 
 fn deal_out(
-    eyes: &mut RenderEyes,
+    views: &mut RenderSensorViews,
     whole: &SortedRenderPhase<Transparent2d>,
     camera: Entity,
     phases: &mut ViewSortedRenderPhases<Transparent2d>,
 ) {
-    let areas: Vec<Rect> = eyes.scene.eyes.iter().map(|eye| eye.area()).collect();
-    let mut seen: Vec<_> = areas.iter().map(|_| eyes.phases.pop().unwrap_or_default()).collect();
+    let areas: Vec<Rect> = views.scene.views.iter().map(|view| view.area()).collect();
+    let mut seen: Vec<_> = areas.iter().map(|_| views.phases.pop().unwrap_or_default()).collect();
     for item in whole.items.values() {
         // What has no bounds may be anywhere.
-        let bounds = eyes.bounds.get(&item.entity.1.id());
+        let bounds = views.bounds.get(&item.entity.1.id());
         for (area, phase) in areas.iter().zip(&mut seen) {
             if bounds.is_none_or(|bounds| touches(area, bounds)) {
                 phase.add_transient(copy(item));
@@ -167,7 +167,7 @@ fn deal_out(
         }
     }
     for (i, phase) in seen.into_iter().enumerate() {
-        phases.insert(eye_view(camera, i), phase);
+        phases.insert(retained_view(camera, i), phase);
     }
 }
 
@@ -206,26 +206,26 @@ fn tone(world: &mut World, camera: Entity, on: bool) {
 
 /// All views share one buffer of uniforms, and so one bind group each for sprites and meshes.
 fn lend_bind_groups(
-    eyes: Res<RenderEyes>,
+    views: Res<RenderSensorViews>,
     shared: Query<(&MainEntity, &SpriteViewBindGroup, &Mesh2dViewBindGroup)>,
     mut commands: Commands,
 ) {
-    let Some((_, sprites, meshes)) = shared.iter().find(|(main, ..)| Some(main.id()) == eyes.scene.camera) else {
+    let Some((_, sprites, meshes)) = shared.iter().find(|(main, ..)| Some(main.id()) == views.scene.camera) else {
         return;
     };
-    for &eye in &eyes.entities {
-        commands.entity(eye).insert((
+    for &view in &views.entities {
+        commands.entity(view).insert((
             SpriteViewBindGroup { value: sprites.value.clone() },
             Mesh2dViewBindGroup { value: meshes.value.clone() },
         ));
     }
 }
 
-/// Draws all eyes in one pass.
-fn draw_eyes(
+/// Draws all views in one pass.
+fn draw_views(
     world: &World,
     shared: ViewQuery<(&ExtractedView, &ViewTarget, &ViewDepthTexture)>,
-    eyes: Res<RenderEyes>,
+    views: Res<RenderSensorViews>,
     drawn: Res<DrawnStamp>,
     stamp: Res<ExtractedStamp>,
     background: Res<ClearColor>,
@@ -234,19 +234,19 @@ fn draw_eyes(
     masked: Res<ViewBinnedRenderPhases<AlphaMask2d>>,
     mut context: RenderContext,
 ) {
-    let (view, target, depth) = shared.into_inner();
-    let Some(camera) = eyes.scene.camera else { return };
+    let (shared_view, target, depth) = shared.into_inner();
+    let Some(camera) = views.scene.camera else { return };
     let Some(attachment) = target.out_texture_color_attachment(Some(background.to_linear())) else { return };
     let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
-        label: Some("eyes"),
+        label: Some("sensor views"),
         color_attachments: &[Some(attachment)],
         depth_stencil_attachment: Some(depth.get_attachment(StoreOp::Discard)),
         ..default()
     });
-    let opaque = opaque.get(&view.retained_view_entity).filter(|phase| !phase.is_empty());
-    let masked = masked.get(&view.retained_view_entity).filter(|phase| !phase.is_empty());
-    for (i, (&entity, eye)) in eyes.entities.iter().zip(&eyes.scene.eyes).enumerate() {
-        let (corner, size) = (eye.cell.min, eye.cell.size());
+    let opaque = opaque.get(&shared_view.retained_view_entity).filter(|phase| !phase.is_empty());
+    let masked = masked.get(&shared_view.retained_view_entity).filter(|phase| !phase.is_empty());
+    for (i, (&entity, view)) in views.entities.iter().zip(&views.scene.views).enumerate() {
+        let (corner, size) = (view.cell.min, view.cell.size());
         let rect = [corner.x as f32, corner.y as f32, size.x as f32, size.y as f32];
         pass.set_viewport(rect[0], rect[1], rect[2], rect[3], 0.0, 1.0);
         pass.set_scissor_rect(corner.x, corner.y, size.x, size.y);
@@ -254,7 +254,9 @@ fn draw_eyes(
             .map_or(Ok(()), |phase| phase.render(&mut pass, world, entity))
             .and_then(|()| masked.map_or(Ok(()), |phase| phase.render(&mut pass, world, entity)))
             .and_then(|()| {
-                transparent.get(&eye_view(camera, i)).map_or(Ok(()), |phase| phase.render(&mut pass, world, entity))
+                transparent
+                    .get(&retained_view(camera, i))
+                    .map_or(Ok(()), |phase| phase.render(&mut pass, world, entity))
             });
         if let Err(error) = result {
             // The stamp stays behind, so that the picture counts as missing.
@@ -265,18 +267,18 @@ fn draw_eyes(
 }
 
 /// Puts everything back as Bevy left it.
-fn close_eyes(world: &mut World) {
-    world.resource_scope(|world, mut eyes: Mut<RenderEyes>| {
-        let Some(camera) = eyes.scene.camera else { return };
+fn restore_phases(world: &mut World) {
+    world.resource_scope(|world, mut views: Mut<RenderSensorViews>| {
+        let Some(camera) = views.scene.camera else { return };
         let mut phases = world.resource_mut::<ViewSortedRenderPhases<Transparent2d>>();
-        for i in 0..eyes.entities.len() {
-            if let Some(mut phase) = phases.remove(&eye_view(camera, i)) {
+        for i in 0..views.entities.len() {
+            if let Some(mut phase) = phases.remove(&retained_view(camera, i)) {
                 phase.items.clear();
                 phase.transient_items.clear();
-                eyes.phases.push(phase);
+                views.phases.push(phase);
             }
         }
-        if let Some(whole) = eyes.whole.take() {
+        if let Some(whole) = views.whole.take() {
             phases.insert(RetainedViewEntity::new(MainEntity::from(camera), None, 0), whole);
         }
         tone(world, camera, false);
