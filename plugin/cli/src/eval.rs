@@ -35,7 +35,8 @@ use super::{
 /// Measure policies and baselines, every level equally often.
 ///
 /// Those are trained runs, behaviour cloning, policy files and bots, on the held-out levels. The table's ± is one standard
-/// error of the mean return over levels: playing the same levels more often hardly makes it smaller, more levels do.
+/// error of the mean return over levels: playing more levels makes it smaller, playing the same ones more often
+/// makes little difference.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eval --run runs/first

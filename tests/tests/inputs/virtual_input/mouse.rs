@@ -71,8 +71,9 @@ fn a_motion_by_messages_lasts_one_frame() {
 
 /// What is wrong when agent 4 has this input, too.
 fn second(input: VirtualInput, other: VirtualInput, script: Vec<ActionValue>) -> String {
+    let action = Action(script[0].clone());
     let (mut app, _) = app_with(InputRoute::Direct, input, script);
-    let second = app.world_mut().spawn((Agent::new(4, other.space()), other, Control::Policy)).id();
+    let second = app.world_mut().spawn((Agent::new(4, other.space()), other, Control::Policy, action)).id();
     let fault = app.tick().expect_err("both claim it").to_string();
     assert_eq!(app.world().get::<Control>(second), Some(&Control::Idle), "only one of them plays on");
     fault

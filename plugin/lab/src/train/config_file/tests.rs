@@ -63,7 +63,7 @@ fn a_wrong_value_says_what_was_expected_and_where() {
         assert!(text.starts_with(line) && text.contains(words), "{text}");
     }
     let text = error(&GOOD.replace("hard:0..63", "hard:9..3"));
-    assert!(text.starts_with("x.ron:2:") && text.contains("`train`") && text.contains("hard:64..127"), "{text}");
+    assert!(text.starts_with("x.ron:2:") && text.contains("`train`") && text.contains("write hard:3..9"), "{text}");
 }
 
 #[test]
