@@ -11,7 +11,9 @@ use playbot_lab::{
     benchmark::Benchmark,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
+    level_files::{LevelDesign, LevelTextError},
     mode::ModeError,
+    proof::LevelProof,
 };
 
 /// The eight ways that rays go, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
@@ -66,6 +68,7 @@ impl<G: SenseRays> Game for WithRays<G> {
         fn check_mode(mode: &str) -> Result<(), ModeError>;
         fn family(mode: &str) -> String;
         fn fingerprint(mode: &str, level: u64) -> Option<u64>;
+        fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
         fn tick_hz() -> f64;
         fn placement() -> TickPlacement;
         fn headless_plugins(usual: HeadlessPlugins) -> PluginGroupBuilder;
@@ -79,6 +82,8 @@ impl<G: SenseRays> Game for WithRays<G> {
         fn build_picture(app: &mut App);
         fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
         fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
+        fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
+        fn prove(mode: &str, level: u64) -> LevelProof;
         fn blind_bots() -> Vec<(&'static str, BlindBot)>;
         fn demonstrator() -> Option<&'static str>;
         fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);

@@ -31,7 +31,7 @@ use crate::{
     fault::Faults,
     level::LevelQueue,
     reward::Reward,
-    streams::AgentStreams,
+    streams::{AgentStreams, EpisodeSeeds},
 };
 
 /// How an episode ended.
@@ -215,11 +215,15 @@ pub(crate) fn plugin(app: &mut App) {
 
 /// Starts an episode for every agent that waits for one and is not idle.
 pub(crate) fn begin_episodes(
-    mut agents: Query<(Entity, &Agent, &mut Control, &mut Episode, &mut LevelQueue, &mut AgentStreams, &mut Reward)>,
+    mut agents: Query<(
+        (Entity, &Agent, &mut Control, &mut Episode),
+        (&mut LevelQueue, &mut AgentStreams, Option<&mut EpisodeSeeds>),
+        &mut Reward,
+    )>,
     mut faults: ResMut<Faults>,
     mut commands: Commands,
 ) {
-    for (entity, agent, mut control, mut episode, mut queue, mut streams, mut reward) in &mut agents {
+    for ((entity, agent, mut control, mut episode), (mut queue, mut streams, seeds), mut reward) in &mut agents {
         if episode.is_running() || episode.is_loading() || !control.is_active() {
             continue;
         }
@@ -227,6 +231,9 @@ pub(crate) fn begin_episodes(
             *control = Control::Idle;
             continue;
         };
+        if let Some(begun) = seeds.and_then(|mut seeds| seeds.next_streams()) {
+            *streams = begun;
+        }
         let late = reward.start_episode();
         if late != 0.0 {
             faults.report(format!(

@@ -99,9 +99,11 @@ pub mod key_bindings;
 pub mod keyboard;
 mod known_plugins;
 pub mod level;
+// For playbot_lab, playbot_cli and tests; games need none of it.
+#[doc(hidden)]
+pub mod level_files;
 mod no_screen;
 pub mod observation;
-// For playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub mod panics;
 pub mod placement;

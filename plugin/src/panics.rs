@@ -19,6 +19,7 @@ use crate::{
     },
     episode::Episode,
     fault::Fault,
+    level_files::LevelFiles,
     placement::TickSchedules,
     reward::Reward,
     state_hash::StateHash,
@@ -32,7 +33,8 @@ use crate::{
 #[reflect(Resource, Clone, Debug)]
 pub struct PanicReports {
     header: DemoHeader,
-    folder: PathBuf,
+    /// `None` if nothing is written.
+    folder: Option<PathBuf>,
 }
 
 /// What an agent has done in its running episode, kept for the report of a panic.
@@ -49,7 +51,7 @@ struct Broken;
 impl PanicReports {
     /// Reports for recordings with this header, written below `folder`.
     pub fn new(header: DemoHeader, folder: impl Into<PathBuf>) -> Self {
-        Self { header, folder: folder.into() }
+        Self { header, folder: Some(folder.into()) }
     }
 
     /// Adds the reports to an app that has the [`PlaybotPlugin`](crate::plugin::PlaybotPlugin). Agents need an
@@ -63,7 +65,12 @@ impl PanicReports {
 
     /// Writes elsewhere from now on.
     pub fn move_to(&mut self, folder: impl Into<PathBuf>) {
-        self.folder = folder.into();
+        self.folder = Some(folder.into());
+    }
+
+    /// Writes no files from now on: for who can play the episodes again anyway.
+    pub fn keep_no_files(&mut self) {
+        self.folder = None;
     }
 }
 
@@ -161,7 +168,9 @@ fn report(world: &mut World, words: &str) -> String {
         }
         at.push(episode.moment(agent));
         let trace = world.get::<EpisodeTrace>(entity).and_then(|trace| trace.0.clone());
-        episodes.push(whole(trace.filter(|_| episode.is_running()), agent, episode));
+        let mut kept = whole(trace.filter(|_| episode.is_running()), agent, episode);
+        kept.level_file = world.get_resource::<LevelFiles>().and_then(|files| files.of(episode.level)).cloned();
+        episodes.push(kept);
     }
     let place = if at.is_empty() { "before any level was played".to_owned() } else { at.join("; ") };
     let kept = match keep(world, &at, &episodes) {
@@ -195,10 +204,11 @@ fn keep(
     episodes: &[DemoEpisode],
 ) -> Result<Option<PathBuf>, crate::demo::file::DemoFileError> {
     let (Some(reports), Some(first)) = (world.get_resource::<PanicReports>(), at.first()) else { return Ok(None) };
+    let Some(folder) = &reports.folder else { return Ok(None) };
     let place = first.replace(", ", "-").replace(' ', "");
     // The folder may be everybody's, and two programs may well panic at the same place.
     let name = format!("panic-{}-{place}-{}.demo", reports.header.game, std::process::id());
-    let path = reports.folder.join(name);
+    let path = folder.join(name);
     let note = "kept when the game panicked in its last tick".to_owned();
     let mut writer = DemoWriter::replace(&path, DemoHeader { note, ..reports.header.clone() })?;
     episodes.iter().try_for_each(|episode| writer.push(episode))?;

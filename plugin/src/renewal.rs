@@ -48,7 +48,7 @@ use crate::{
     policy::{ActivePolicy, Decision},
     skill_prior::{ActiveSkill, SkillPrior},
     state_hash::StateHash,
-    streams::{AgentStreams, PlaybotSeed},
+    streams::{AgentStreams, EpisodeSeeds, PlaybotSeed},
     vision::BlankEpisodes,
 };
 
@@ -109,6 +109,7 @@ impl Renewal {
             .component::<Control>()
             .component::<Decision>()
             .component::<EpisodeCount>()
+            .component::<EpisodeSeeds>()
             .component::<EpisodeTrace>()
             .component::<LevelQueue>()
             .component::<Recording>()

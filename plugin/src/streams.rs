@@ -77,9 +77,53 @@ impl AgentStreams {
     }
 }
 
+/// Seeds of an agent's next episodes, in their order: at the start of each, the agent's streams begin anew from the next
+/// seed. So no draw depends on the episodes before, nor on which agent of which World plays it. Once they are used up the
+/// streams run on.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
+// Hidden here and below: for playbot_lab; games need none of it.
+#[doc(hidden)]
+pub struct EpisodeSeeds {
+    seeds: Vec<u64>,
+    used: usize,
+}
+
+impl EpisodeSeeds {
+    /// These, the one of the next episode first.
+    pub fn new(seeds: impl Into<Vec<u64>>) -> Self {
+        Self { seeds: seeds.into(), used: 0 }
+    }
+
+    /// The streams that an episode with this seed begins with.
+    pub fn streams(seed: u64) -> AgentStreams {
+        AgentStreams::new(seed, 0)
+    }
+
+    /// The streams of the episode that begins now.
+    pub(crate) fn next_streams(&mut self) -> Option<AgentStreams> {
+        let seed = self.seeds.get(self.used).copied()?;
+        self.used += 1;
+        Some(Self::streams(seed))
+    }
+}
+
 /// Gives agents their streams, unless they brought their own.
 pub(crate) fn seed_streams(seed: Res<PlaybotSeed>, mut added: Query<(&Agent, &mut AgentStreams), Added<Agent>>) {
     for (agent, mut streams) in &mut added {
         streams.seed(*seed, agent.index);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_seed_begins_one_episode() {
+        let mut seeds = EpisodeSeeds::new([7, 8]);
+        assert_eq!(seeds.next_streams(), Some(AgentStreams::new(7, 0)));
+        assert_eq!(seeds.next_streams(), Some(EpisodeSeeds::streams(8)));
+        assert_eq!(seeds.next_streams(), None);
     }
 }

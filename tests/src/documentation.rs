@@ -13,5 +13,9 @@ struct Tutorial;
 struct OwnGame;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/level-files.md")]
+struct LevelFiles;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/recording-in-builds.md")]
 struct RecordingInBuilds;

@@ -7,8 +7,9 @@ use bevy_playbot::fault::Faults;
 use playbot_lab::prelude::*;
 
 use super::{
-    components::{AntMazeRules, InMaze, MazeAnt, PlaysIn},
-    level::{AntMazeLevel, generate},
+    components::{InMaze, MazeAnt, PlaysIn},
+    level::AntMazeLevel,
+    levels::Levels,
     walls::wall_boxes,
 };
 use crate::ant::AntBody;
@@ -16,13 +17,13 @@ use crate::ant::AntBody;
 /// Makes the level an episode asks for and puts the agent's ant into it.
 pub(super) fn start_episode(
     event: On<StartEpisode>,
-    rules: Res<AntMazeRules>,
+    levels: Levels,
     agents: Query<&Agent, With<PlaysIn>>,
     mut faults: ResMut<Faults>,
     mut commands: Commands,
 ) {
     let Ok(agent) = agents.get(event.entity) else { return };
-    match generate(&rules.0, event.level) {
+    match levels.get(event.level) {
         Ok(level) => build(&mut commands, event.entity, level),
         Err(error) => {
             faults.report(format!("agent {}, level {}: {error}", agent.index, event.level));
@@ -33,8 +34,8 @@ pub(super) fn start_episode(
 
 /// Puts an agent with a new ant into a level. The physics begins anew with every episode: what happened in the last one
 /// changes nothing, not even the order in which contacts are solved.
-fn build(commands: &mut Commands, agent: Entity, level: AntMazeLevel) {
+fn build(commands: &mut Commands, agent: Entity, level: Arc<AntMazeLevel>) {
     let mut body = AntBody::new(&wall_boxes(&level.maze));
     body.set_state(&level.reset);
-    commands.entity(agent).insert((MazeAnt(body), InMaze(Arc::new(level))));
+    commands.entity(agent).insert((MazeAnt(body), InMaze(level)));
 }

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::{level::AntMazeLevel, mode::AntMazeMode};
 use crate::ant::{AntBody, AntState, steering::AntComponent};
 
-/// Mode in which levels are made.
+/// Mode in which levels are made where none are drawn.
 #[derive(Resource, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug, PartialEq)]

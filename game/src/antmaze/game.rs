@@ -8,14 +8,18 @@ use playbot_lab::{
     benchmark::Benchmark,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
+    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
     prelude::*,
+    proof::LevelProof,
 };
 
 use super::{
     components::{MazeAnt, PlaysIn},
     demonstrator_bot::DemonstratorBot,
-    level::generate,
+    level::AntMazeLevel,
+    level_text::{self, LevelText},
+    levels::level_of,
     mode::AntMazeMode,
     picture::AntMazePicturePlugin,
     plugin::AntMazePlugin,
@@ -29,8 +33,10 @@ use crate::{
         view::VIEW,
     },
     maze::{
-        Map, Maze, read_mode,
-        show_level::{self, MazeSource, unfit},
+        Map, MazeSpec,
+        proof::prove,
+        read_mode,
+        show_level::{self, MazeSource, ShownMaze, unfit},
     },
 };
 
@@ -66,6 +72,10 @@ impl Game for AntMaze {
     }
 
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        if is_level_files(mode) {
+            LevelDesigns::read(self.name(), mode, &|text| self.parse_level(text))?;
+            return Ok(());
+        }
         read_mode::<AntMazeMode>(mode).map(drop)
     }
 
@@ -75,6 +85,9 @@ impl Game for AntMaze {
     }
 
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        if is_level_files(mode) {
+            return LevelDesigns::of(self.name(), mode, &|text| self.parse_level(text)).ok()?.hash(level);
+        }
         mode.parse::<AntMazeMode>().ok()?.map.fingerprint(level)
     }
 
@@ -99,8 +112,15 @@ impl Game for AntMaze {
     }
 
     fn build(&self, app: &mut App, mode: &str) {
-        let mode = mode.parse().expect("callers check the mode with `check_mode`");
+        // Drawn levels bring their rules.
+        let is_drawn = is_level_files(mode);
+        let mode = if is_drawn { Ok(AntMazeMode::on(Map::Random(MazeSpec::default()))) } else { mode.parse() };
+        let mode = mode.expect("callers check the mode with `check_mode`");
         app.add_plugins(AntMazePlugin { mode });
+    }
+
+    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
+        level_text::parse(text)
     }
 
     fn picture(&self) -> Option<Picture> {
@@ -116,12 +136,17 @@ impl Game for AntMaze {
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        Some(generate(&mode.parse().ok()?, level).ok()?.floor_plan())
+        Some(level_of(self, mode, level).ok()?.floor_plan())
     }
 
     fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
         let [x, y, ..] = world.get::<MazeAnt>(agent)?.0.state().qpos;
         Some(Vec2::new(x, y))
+    }
+
+    fn prove(&self, mode: &str, level: u64) -> LevelProof {
+        let level = level_of(self, mode, level);
+        level.map_or(LevelProof::Unknown, |level| prove(&level.maze, level.start, level.goal))
     }
 
     fn demonstrator(&self) -> Option<&'static str> {
@@ -138,7 +163,7 @@ impl Game for AntMaze {
     }
 
     fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        show_level::show(request, &MazeSource { map: Map::antmaze, level: maze_of })
+        show_level::show(self, request, &MazeSource { map: Map::antmaze, level: shown_level, drawn: shown_drawn })
     }
 
     fn has_space_view(&self) -> bool {
@@ -151,9 +176,18 @@ impl Game for AntMaze {
     }
 }
 
-/// The maze of a level, with its start and goal.
-fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
-    let mode: AntMazeMode = read_mode(mode)?;
-    let level = generate(&mode, seed).map_err(unfit)?;
-    level.maze.with_ends(level.start, level.goal).map_err(unfit)
+/// A level of a mode, as it is played.
+fn shown_level(game: &dyn Game, mode: &str, seed: u64) -> Result<ShownMaze, InspectError> {
+    game.check_mode(mode)?;
+    shown(&level_of(game, mode, seed).map_err(InspectError::Usage)?)
+}
+
+/// The level of a file.
+fn shown_drawn(designs: &LevelDesigns) -> Result<ShownMaze, InspectError> {
+    shown(&designs.get::<AntMazeLevel>(0).map_err(InspectError::Usage)?)
+}
+
+fn shown(level: &AntMazeLevel) -> Result<ShownMaze, InspectError> {
+    let maze = level.maze.clone().with_any_ends(level.start, level.goal).map_err(unfit)?;
+    Ok(ShownMaze { maze, json: serde_json::json!(LevelText::of(level)) })
 }

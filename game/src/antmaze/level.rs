@@ -4,14 +4,14 @@ use playbot_learner::rng::{ChaCha8Rng, Streams, below, unit};
 
 use super::{
     geometry::centre_of,
-    mode::{AntMazeMode, GoalNoise, Goals},
+    mode::{AntMazeMode, GoalNoise, Goals, Pay},
 };
 use crate::{
     ant::AntState,
     maze::{Cell, Maze, MazeError},
 };
 
-/// A level, as its mode and seed make it.
+/// A level, as its mode and seed make it or as somebody drew it, with the rules by which it is played.
 #[derive(Clone, Debug)]
 pub struct AntMazeLevel {
     /// The walls. Its start cell is the origin of all coordinates, wherever the ant starts.
@@ -24,6 +24,10 @@ pub struct AntMazeLevel {
     pub goal_at: [f32; 2],
     /// The ant at the start.
     pub reset: AntState,
+    /// What the ant is paid.
+    pub pay: Pay,
+    /// Ticks after which an episode is truncated.
+    pub limit: u32,
 }
 
 /// Makes a level. Everything is drawn from the seed, each thing from a stream of its own: an option changes what it says
@@ -51,7 +55,7 @@ pub fn generate(mode: &AntMazeMode, seed: u64) -> Result<AntMazeLevel, MazeError
     }
     reset.qpos[0] += at[0];
     reset.qpos[1] += at[1];
-    Ok(AntMazeLevel { maze, start, goal, goal_at, reset })
+    Ok(AntMazeLevel { maze, start, goal, goal_at, reset, pay: mode.pay, limit: mode.limit })
 }
 
 fn goal_cell(mode: &AntMazeMode, maze: &Maze, rng: &mut ChaCha8Rng) -> Cell {

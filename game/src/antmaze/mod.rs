@@ -11,6 +11,8 @@ mod floor_plan;
 pub mod game;
 pub mod geometry;
 pub mod level;
+mod level_text;
+mod levels;
 pub mod mode;
 pub mod picture;
 pub mod play;

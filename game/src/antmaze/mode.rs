@@ -83,7 +83,7 @@ impl AntMazeMode {
         }
     }
 
-    fn set(&mut self, option: &str) -> Result<(), MazeModeError> {
+    pub(super) fn set(&mut self, option: &str) -> Result<(), MazeModeError> {
         let (key, value) = option.split_once('=').unwrap_or((option, ""));
         match option {
             "sparse" => self.pay = Pay::Sparse,
@@ -120,7 +120,7 @@ fn usual_limit(map: &Map) -> u32 {
 }
 
 /// What an option is about, so that it is said only once.
-fn subject(option: &str) -> &str {
+pub(super) fn subject(option: &str) -> &str {
     match option.split_once('=').map_or(option, |(key, _)| key) {
         "dense" => "sparse",
         key => key,

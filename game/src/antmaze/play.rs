@@ -5,7 +5,7 @@ use bevy_playbot::fault::Faults;
 use playbot_lab::prelude::*;
 
 use super::{
-    components::{AntMazeRules, InMaze, MazeAnt},
+    components::{InMaze, MazeAnt},
     geometry::{cell_at, distance},
     level::AntMazeLevel,
     mode::Pay,
@@ -20,7 +20,6 @@ const HEIGHTS: std::ops::Range<f32> = 0.0..20.0;
 
 /// Physics, reward and end of every ant whose agent plays.
 pub(super) fn play(
-    rules: Res<AntMazeRules>,
     mut ants: Query<(&Agent, &mut Control, &Action, &InMaze, &mut MazeAnt, &mut Episode, &mut Reward, &mut StateHash)>,
     mut faults: ResMut<Faults>,
 ) {
@@ -37,15 +36,15 @@ pub(super) fn play(
         }
         let away = distance([state.qpos[0], state.qpos[1]], level.0.goal_at);
         *hash = state.hash();
-        reward.add(pay(rules.0.pay, away));
+        reward.add(pay(level.0.pay, away));
         if away <= GOAL_RADIUS {
-            match rules.0.pay {
+            match level.0.pay {
                 // Nobody would end what pays for every tick.
                 Pay::Exponential => episode.reach(),
                 Pay::Distance | Pay::Sparse => episode.terminate(true),
             }
         }
-        if episode.tick + 1 >= rules.0.limit {
+        if episode.tick + 1 >= level.0.limit {
             episode.truncate();
         }
     }

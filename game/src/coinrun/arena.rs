@@ -8,26 +8,24 @@ use playbot_lab::prelude::*;
 
 use super::{
     Level, PlayerState, Spawn,
-    components::{
-        Arena, ArenaBody, Coin, CoinRunMode, Crate, Enemy, InArena, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
-    },
-    generate,
+    components::{Arena, ArenaBody, Coin, Crate, Enemy, InArena, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles},
+    levels::Levels,
     rules::Body,
 };
 
-/// Generates the level an episode asks for and puts it into the player's arena.
+/// Makes the level an episode asks for, or takes the one that was drawn, and puts it into the player's arena.
 pub(super) fn start_episode(
     event: On<StartEpisode>,
-    mode: Res<CoinRunMode>,
+    levels: Levels,
     players: Query<&PlaysIn>,
     mut faults: ResMut<Faults>,
     mut commands: Commands,
 ) {
     let Ok(plays_in) = players.get(event.entity) else { return };
-    let Ok(seed) = u32::try_from(event.level) else {
-        return faults.report(format!("level {} does not exist: CoinRun's seeds have 32 bits", event.level));
-    };
-    build(&mut commands, plays_in.0, event.entity, Arc::new(generate(mode.0, seed)));
+    match levels.get(event.level) {
+        Ok(level) => build(&mut commands, plays_in.0, event.entity, level),
+        Err(why) => faults.report(why),
+    }
 }
 
 /// Replaces whatever is in the arena by this level, with the player at its start.

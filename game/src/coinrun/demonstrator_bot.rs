@@ -1,12 +1,10 @@
 //! The planning bot as an agent of the game.
 
-use std::sync::Arc;
-
 use bevy::prelude::*;
 use bevy_playbot::{bot::with_noise, fault::Faults, streams::AgentStreams};
 use playbot_lab::prelude::*;
 
-use super::{Sim, components::CoinRunMode, generate, planner::Demonstrator, play::NOTHING};
+use super::{Sim, levels::Levels, planner::Demonstrator, play::NOTHING};
 
 /// Plays by planning ahead with the exact rules.
 ///
@@ -29,10 +27,11 @@ impl DemonstratorBot {
     }
 }
 
-pub(super) fn start_episode(event: On<StartEpisode>, mode: Res<CoinRunMode>, mut bots: Query<&mut DemonstratorBot>) {
+pub(super) fn start_episode(event: On<StartEpisode>, levels: Levels, mut bots: Query<&mut DemonstratorBot>) {
     // Levels that do not exist are reported where the arena is built.
-    if let (Ok(mut bot), Ok(seed)) = (bots.get_mut(event.entity), u32::try_from(event.level)) {
-        bot.sim = Some(Sim::new(Arc::new(generate(mode.0, seed))));
+    let Ok(mut bot) = bots.get_mut(event.entity) else { return };
+    if let Ok(level) = levels.get(event.level) {
+        bot.sim = Some(Sim::new(level));
         bot.planner = Demonstrator::default();
     }
 }

@@ -10,14 +10,19 @@ use playbot_lab::{
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
+    level_files::{LevelDesign, LevelTextError, is_level_files},
+    proof::LevelProof,
 };
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
     demonstrator_bot::DemonstratorBot,
-    generate,
+    level::Mode,
+    level_text,
+    levels::level_of,
     picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
+    proof::prove,
     rules::ACTIONS,
     show_level, view,
 };
@@ -93,8 +98,15 @@ impl Game for CoinRun {
     }
 
     fn build(&self, app: &mut App, mode: &str) {
-        let mode = mode.parse().expect("callers check the mode against `modes`");
+        // What is drawn has no difficulty.
+        let is_drawn = is_level_files(mode);
+        let mode = if is_drawn { Ok(Mode::Hard) } else { mode.parse() };
+        let mode = mode.expect("callers check the mode with `check_mode`");
         app.add_plugins(CoinRunPlugin { mode, physics: self.physics });
+    }
+
+    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
+        level_text::parse(text)
     }
 
     fn picture(&self) -> Option<Picture> {
@@ -110,12 +122,15 @@ impl Game for CoinRun {
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        let level = generate(mode.parse().ok()?, u32::try_from(level).ok()?);
-        Some(level.floor_plan())
+        Some(level_of(self, mode, level).ok()?.floor_plan())
     }
 
     fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
         world.get::<PlayerBody>(agent).map(|body| Vec2::new(body.0.x, body.0.y))
+    }
+
+    fn prove(&self, mode: &str, level: u64) -> LevelProof {
+        level_of(self, mode, level).map_or(LevelProof::Unknown, prove)
     }
 
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {

@@ -1,5 +1,7 @@
 //! A level of CoinRun for people, for programs, and as a picture of the whole of it.
 
+use std::sync::Arc;
+
 use bevy::prelude::*;
 use bevy_playbot::{
     raster::RasterSensor,
@@ -7,11 +9,12 @@ use bevy_playbot::{
 };
 use playbot_lab::{
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
+    level_files::{LevelDesign, LevelDesigns},
     prelude::*,
     worlds::build_observing_world,
 };
 
-use super::{Level, Mode, components::PlaysIn, generate};
+use super::{Level, components::PlaysIn, levels::level_of};
 
 const LEGEND: &str =
     "A start  C coin  # = ground  ~ ^ lava  S saw  < > enemy and where it goes  x crate  | enemies turn here";
@@ -21,16 +24,22 @@ pub fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, Inspec
     if request.map.is_some() {
         return Err(InspectError::Usage("CoinRun has no maps: name a --mode and a --seed".to_owned()));
     }
-    let mode = request.mode.unwrap_or("hard");
-    game.check_mode(mode)?;
-    let mode: Mode = mode.parse().map_err(|error| InspectError::Usage(format!("{error}")))?;
-    let seed = u32::try_from(request.seed.unwrap_or(0))
-        .map_err(|_| InspectError::Usage("CoinRun's seeds have 32 bits: choose one up to 4294967295".to_owned()))?;
-    let level = generate(mode, seed);
+    let level = match request.file {
+        Some(path) => {
+            let designs = LevelDesigns::of_file(&path.to_string_lossy(), &|text| game.parse_level(text));
+            designs.map_err(|error| InspectError::Usage(error.to_string()))?.get(0)
+        }
+        None => {
+            let mode = request.mode.unwrap_or("hard");
+            game.check_mode(mode)?;
+            level_of(game, mode, request.seed.unwrap_or(0))
+        }
+    };
+    let level = level.map_err(InspectError::Usage)?;
     Ok(LevelView {
         text: format!("{}\n{LEGEND}", level.to_text()),
-        json: serde_json::json!(level.to_golden_json()).to_string(),
-        picture: request.picture.then(|| draw(game, &level)).transpose()?,
+        json: serde_json::json!(level.to_level_text()).to_string(),
+        picture: request.picture.then(|| draw(game, level)).transpose()?,
     })
 }
 
@@ -38,16 +47,16 @@ pub fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, Inspec
 const TILE: u32 = 16;
 
 /// The used part of a level: what an agent would see that sees all of it.
-fn draw(game: &dyn Game, level: &Level) -> Result<LevelPicture, InspectError> {
+fn draw(game: &dyn Game, level: Arc<Level>) -> Result<LevelPicture, InspectError> {
     let [columns, rows] = level.used_size().map(i32::unsigned_abs);
     let image = ImageOptions { width: columns * TILE, height: rows * TILE, ..ImageOptions::default() };
     let config = ObservationConfig { kind: ObservationKind::Raster, image };
-    let (mut world, agents) = build_observing_world(game, level.mode.name(), &config, 0, 0, 1)?;
+    let (mut world, agents) = build_observing_world(game, "hard", &config, 0, 0, 1)?;
+    world.insert_resource(LevelDesigns::one("the level", LevelDesign::new(Arc::unwrap_or_clone(level), "")));
     let (agent, (width, height)) = (agents[0], (columns as f32, rows as f32));
     let arena = world.get::<PlaysIn>(agent).expect("every player has an arena").0;
     let centre = world.spawn((ChildOf(arena), Transform::from_xyz(width / 2.0, height / 2.0, 0.0))).id();
-    let seed = LevelQueue::Always(level.seed.into());
-    world.entity_mut(agent).insert((RasterSensor { target: centre, width }, Control::Human, seed));
+    world.entity_mut(agent).insert((RasterSensor { target: centre, width }, Control::Human, LevelQueue::Always(0)));
     world.tick()?;
     let seen = world.get::<Observation>(agent).expect("required by Agent");
     Ok(LevelPicture::Pixels { image, pixels: seen.image.clone() })

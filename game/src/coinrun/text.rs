@@ -57,7 +57,10 @@ impl Level {
 
     /// Columns and rows of the part of the level that is used.
     pub fn used_size(&self) -> [i32; 2] {
-        let width = (self.coin[0] + 3).min(SIZE);
+        // Nothing but rock is behind the coin, unless somebody drew more.
+        let is_rock = |x: i32| (0..SIZE).all(|y| self.tiles.get(x, y) == Tile::Wall);
+        let last = (self.coin[0]..SIZE).rev().find(|&x| !is_rock(x)).unwrap_or(self.coin[0]);
+        let width = (last + 3).min(SIZE);
         [width, self.used_height(width)]
     }
 

@@ -4,7 +4,9 @@ use bevy_playbot::state_hash::StateHash;
 
 use super::{cell::Cell, distances::Distances, error::MazeError, walls::Walls};
 
-/// Walls and free cells in rows, closed all around, with a goal that can be reached from the start.
+/// Walls and free cells in rows, closed all around, with a start and a goal.
+///
+/// The goal can be reached from the start, unless somebody drew the maze otherwise: see [`parse_drawn`](Self::parse_drawn).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Maze {
     walls: Walls,
@@ -14,12 +16,29 @@ pub struct Maze {
 
 impl Maze {
     pub(super) fn new(walls: Walls, start: Cell, goal: Cell) -> Result<Self, MazeError> {
+        Self::drawn(walls, start, goal)?.with_ends(start, goal)
+    }
+
+    /// A maze as somebody drew it: whether the goal can be reached is for the players to find out.
+    pub(super) fn drawn(walls: Walls, start: Cell, goal: Cell) -> Result<Self, MazeError> {
         let on_border =
             |cell: &Cell| [0, walls.rows - 1].contains(&cell.row) || [0, walls.columns - 1].contains(&cell.col);
         if let Some(gap) = walls.free_cells().find(on_border) {
             return Err(MazeError::Open(gap));
         }
-        Self { walls, start, goal }.with_ends(start, goal)
+        Self { walls, start, goal }.with_any_ends(start, goal)
+    }
+
+    /// The same walls with another start and goal, whether there is a way between them or not.
+    ///
+    /// # Errors
+    ///
+    /// One of them is no free cell.
+    pub fn with_any_ends(self, start: Cell, goal: Cell) -> Result<Self, MazeError> {
+        match [start, goal].into_iter().find(|&cell| !self.is_free(cell)) {
+            Some(cell) => Err(MazeError::NotFree(cell)),
+            None => Ok(Self { start, goal, ..self }),
+        }
     }
 
     /// The same walls with another start and goal.
@@ -28,10 +47,7 @@ impl Maze {
     ///
     /// One of them is no free cell, or there is no way between them.
     pub fn with_ends(self, start: Cell, goal: Cell) -> Result<Self, MazeError> {
-        if let Some(cell) = [start, goal].into_iter().find(|&cell| !self.is_free(cell)) {
-            return Err(MazeError::NotFree(cell));
-        }
-        let maze = Self { start, goal, ..self };
+        let maze = self.with_any_ends(start, goal)?;
         maze.distances_to(goal).get(start).ok_or(MazeError::Unreachable { start, goal })?;
         Ok(maze)
     }
@@ -87,9 +103,9 @@ impl Maze {
         Distances::to(&self.walls, cell)
     }
 
-    /// A shortest path from the start to the goal, both included.
+    /// A shortest path from the start to the goal, both included; empty if there is none.
     pub fn shortest_path(&self) -> Vec<Cell> {
-        self.shortest_path_between(self.start, self.goal).expect("checked when the maze was made")
+        self.shortest_path_between(self.start, self.goal).unwrap_or_default()
     }
 
     /// A shortest path between two free cells, both included; `None` if there is none. Where several are equally short,
@@ -107,8 +123,8 @@ impl Maze {
         Some(path)
     }
 
-    /// Number of moves on a shortest path from the start to the goal.
+    /// Number of moves on a shortest path from the start to the goal; 0 if there is none.
     pub fn difficulty(&self) -> usize {
-        self.shortest_path().len() - 1
+        self.shortest_path().len().saturating_sub(1)
     }
 }

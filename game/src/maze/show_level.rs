@@ -5,9 +5,11 @@ use std::{fs::File, io::Read, path::Path};
 use bevy::math::{Rect, Vec2};
 use playbot_lab::{
     drawing::{Drawing, MarkForm, Rgb, Shape},
+    game::Game,
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
+    level_files::{LevelDesigns, is_level_files},
 };
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
 
@@ -18,8 +20,34 @@ const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
 pub struct MazeSource {
     /// A map and a seed, with the start and the goal of the map.
     pub map: fn(&Map, u64) -> Result<Maze, MazeError>,
-    /// A whole mode and a seed, with the start and the goal of that level.
-    pub level: fn(&str, u64) -> Result<Maze, InspectError>,
+    /// A whole mode and a seed, as that level is played.
+    pub level: fn(&dyn Game, &str, u64) -> Result<ShownMaze, InspectError>,
+    /// The first of these drawn levels, as it is played.
+    pub drawn: fn(&LevelDesigns) -> Result<ShownMaze, InspectError>,
+}
+
+/// A maze, and what programs are told of it.
+pub struct ShownMaze {
+    /// The maze, with start and goal.
+    pub maze: Maze,
+    /// What can be read back as a level file.
+    pub json: Value,
+}
+
+impl ShownMaze {
+    /// A maze of which nothing else is known.
+    fn plain(maze: Maze) -> Self {
+        let mut json = json!({ "rows": maze.to_rows(), "start": maze.start(), "goal": maze.goal() });
+        if let Some(moves) = moves(&maze) {
+            json["shortest_path_length"] = moves.into();
+        }
+        Self { maze, json }
+    }
+}
+
+/// Moves on a shortest path, if there is any.
+fn moves(maze: &Maze) -> Option<usize> {
+    maze.shortest_path().len().checked_sub(1)
 }
 
 /// A maze that cannot be, as something that was asked for.
@@ -28,21 +56,14 @@ pub fn unfit(error: MazeError) -> InspectError {
 }
 
 /// Shows a maze.
-pub fn show(request: &LevelRequest, game: &MazeSource) -> Result<LevelView, InspectError> {
-    if request.mode.is_some() {
-        return Err(InspectError::Usage(
-            "mazes are named by --map, which takes whole modes too, and --seed".to_owned(),
-        ));
-    }
-    let maze = maze(request, game)?;
-    let json = json!({
-        "rows": maze.to_rows(),
-        "start": maze.start(),
-        "goal": maze.goal(),
-        "shortest_path_length": maze.difficulty(),
-    });
+pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result<LevelView, InspectError> {
+    let ShownMaze { maze, json } = shown(game, request, source)?;
+    let way = match moves(&maze) {
+        Some(moves) => format!(". shortest path: {moves} moves"),
+        None => "there is no way from the start to the goal".to_owned(),
+    };
     // The empty line ends the rows for whoever reads this as a file.
-    let legend = format!("S start  G goal  # wall  . shortest path: {} moves", maze.difficulty());
+    let legend = format!("S start  G goal  # wall  {way}");
     Ok(LevelView {
         text: format!("{}\n\n{legend}", picture(&maze).join("\n")),
         json: json.to_string(),
@@ -50,21 +71,37 @@ pub fn show(request: &LevelRequest, game: &MazeSource) -> Result<LevelView, Insp
     })
 }
 
-fn maze(request: &LevelRequest, game: &MazeSource) -> Result<Maze, InspectError> {
-    let text = request.map.unwrap_or("random");
+fn shown(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result<ShownMaze, InspectError> {
     let seed = request.seed.unwrap_or(0);
+    if let Some(path) = request.file {
+        let designs = LevelDesigns::of_file(&path.to_string_lossy(), &|text| game.parse_level(text));
+        return (source.drawn)(&designs.map_err(|error| InspectError::Usage(error.to_string()))?);
+    }
+    match request.mode {
+        Some(mode) if is_level_files(mode) => return (source.level)(game, mode, seed),
+        Some(_) => {
+            return Err(InspectError::Usage(
+                "mazes are named by --map, which takes whole modes too, and --seed".to_owned(),
+            ));
+        }
+        None => {}
+    }
+    let text = request.map.unwrap_or("random");
+    if is_level_files(text) {
+        return (source.level)(game, text, seed);
+    }
     let map: Map = match text.parse() {
         Ok(map) => map,
         Err(MazeModeError::Name(error)) if error.what == "map" => {
-            return from_file(Path::new(text), request, &error.to_string());
+            return from_file(Path::new(text), request, &error.to_string()).map(ShownMaze::plain);
         }
         // Not an option of the map: one of the game's.
-        Err(_) => return (game.level)(text, seed),
+        Err(_) => return (source.level)(game, text, seed),
     };
     if request.seed.is_some() && !matches!(map, Map::Random(_)) {
         return Err(no_seed(&map.to_string()));
     }
-    (game.map)(&map, seed).map_err(unfit)
+    (source.map)(&map, seed).map(ShownMaze::plain).map_err(unfit)
 }
 
 fn no_seed(map: &str) -> InspectError {

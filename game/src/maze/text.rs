@@ -10,27 +10,25 @@ impl Maze {
     ///
     /// [`MazeError`] says what is wrong and in which row and column.
     pub fn parse<Row: AsRef<str>>(rows: &[Row]) -> Result<Self, MazeError> {
-        let expected = rows.first().map_or(0, |row| row.as_ref().chars().count());
-        let mut walls = Walls::solid(rows.len(), expected)?;
-        let (mut start, mut goal) = (None, None);
-        for (row, text) in rows.iter().enumerate() {
-            let columns = text.as_ref().chars().count();
-            if columns != expected {
-                return Err(MazeError::Ragged { row, columns, expected });
-            }
-            for (col, character) in text.as_ref().chars().enumerate() {
-                let cell = Cell { row, col };
-                match character {
-                    '#' | '1' => continue,
-                    'O' | '0' | ' ' | '.' => {}
-                    'S' | 'r' => mark(&mut start, cell, "start")?,
-                    'G' | 'g' => mark(&mut goal, cell, "goal")?,
-                    _ => return Err(MazeError::UnknownCharacter { row, column: col, character }),
-                }
-                walls.open(cell);
-            }
-        }
+        let (walls, start, goal) = read(rows)?;
         Self::new(walls, start.ok_or(MazeError::NoStart)?, goal.ok_or(MazeError::NoGoal)?)
+    }
+
+    /// Reads a maze that somebody drew: like [`parse`](Self::parse), but start and goal may be named besides or instead of
+    /// being drawn, and there need not be a way between them.
+    ///
+    /// # Errors
+    ///
+    /// [`MazeError`] says what is wrong and in which row and column.
+    pub fn parse_drawn<Row: AsRef<str>>(
+        rows: &[Row],
+        start: Option<Cell>,
+        goal: Option<Cell>,
+    ) -> Result<Self, MazeError> {
+        let (walls, drawn_start, drawn_goal) = read(rows)?;
+        let start = only(drawn_start, start, "start")?.ok_or(MazeError::NoStart)?;
+        let goal = only(drawn_goal, goal, "goal")?.ok_or(MazeError::NoGoal)?;
+        Self::drawn(walls, start, goal)
     }
 
     /// The rows as [`parse`](Self::parse) reads them, with the letters `#`, `O`, `S` and `G`.
@@ -44,6 +42,39 @@ impl Maze {
             _ => '#',
         };
         (0..self.rows()).map(|row| (0..self.columns()).map(|col| letter(Cell { row, col })).collect()).collect()
+    }
+}
+
+/// Walls, start and goal as they are drawn.
+fn read<Row: AsRef<str>>(rows: &[Row]) -> Result<(Walls, Option<Cell>, Option<Cell>), MazeError> {
+    let expected = rows.first().map_or(0, |row| row.as_ref().chars().count());
+    let mut walls = Walls::solid(rows.len(), expected)?;
+    let (mut start, mut goal) = (None, None);
+    for (row, text) in rows.iter().enumerate() {
+        let columns = text.as_ref().chars().count();
+        if columns != expected {
+            return Err(MazeError::Ragged { row, columns, expected });
+        }
+        for (col, character) in text.as_ref().chars().enumerate() {
+            let cell = Cell { row, col };
+            match character {
+                '#' | '1' => continue,
+                'O' | '0' | ' ' | '.' => {}
+                'S' | 'r' => mark(&mut start, cell, "start")?,
+                'G' | 'g' => mark(&mut goal, cell, "goal")?,
+                _ => return Err(MazeError::UnknownCharacter { row, column: col, character }),
+            }
+            walls.open(cell);
+        }
+    }
+    Ok((walls, start, goal))
+}
+
+/// A place that is drawn, or named, or both.
+fn only(drawn: Option<Cell>, named: Option<Cell>, what: &'static str) -> Result<Option<Cell>, MazeError> {
+    match (drawn, named) {
+        (Some(first), Some(second)) if first != second => Err(MazeError::Twice { what, first, second }),
+        _ => Ok(named.or(drawn)),
     }
 }
 
@@ -92,6 +123,32 @@ mod tests {
         let cut = error(&["#####", "#S#G#", "#####"]);
         assert_eq!(cut, MazeError::Unreachable { start: Cell::new(1, 1), goal: Cell::new(1, 3) });
         assert!(cut.to_string().contains("(1, 1)") && cut.to_string().contains("(1, 3)"), "{cut}");
+    }
+
+    #[test]
+    fn ends_of_a_drawn_maze_are_letters_or_named_and_may_be_cut_off() {
+        let drawn = |rows: &[&str], start: Option<[usize; 2]>, goal: Option<[usize; 2]>| {
+            Maze::parse_drawn(rows, start.map(Cell::from), goal.map(Cell::from))
+        };
+        let sealed = drawn(&["#####", "#S#G#", "#####"], None, Some([1, 3])).expect("a maze");
+        assert_eq!(
+            (sealed.start(), sealed.goal(), sealed.shortest_path().len()),
+            (Cell::new(1, 1), Cell::new(1, 3), 0)
+        );
+        let plain = drawn(&["####", "#OO#", "####"], Some([1, 1]), Some([1, 2])).expect("a maze");
+        assert_eq!(plain, Maze::parse(&["####", "#SG#", "####"]).expect("a maze"));
+        let stands = drawn(&["###", "#G#", "###"], Some([1, 1]), None).expect("a maze");
+        assert_eq!((stands.start(), stands.difficulty()), (stands.goal(), 0));
+        let error = |rows: &[&str], start, goal| drawn(rows, start, goal).expect_err("wrong");
+        assert_eq!(error(&["####", "#OG#", "####"], None, None), MazeError::NoStart);
+        assert_eq!(error(&["####", "#SO#", "####"], None, None), MazeError::NoGoal);
+        let twice = MazeError::Twice { what: "start", first: Cell::new(1, 1), second: Cell::new(1, 2) };
+        assert_eq!(error(&["#####", "#SOG#", "#####"], Some([1, 2]), None), twice);
+        assert_eq!(error(&["####", "#SG#", "####"], None, Some([0, 2])), {
+            MazeError::Twice { what: "goal", first: Cell::new(1, 2), second: Cell::new(0, 2) }
+        });
+        assert_eq!(error(&["####", "#SO#", "####"], None, Some([0, 2])), MazeError::NotFree(Cell::new(0, 2)));
+        assert_eq!(error(&["####", "#SGO", "####"], None, None), MazeError::Open(Cell::new(1, 3)));
     }
 
     #[test]

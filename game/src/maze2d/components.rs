@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::{ball::Ball, level::Maze2dLevel, mode::Maze2dMode};
 
-/// Map and rules of all arenas.
+/// Map and rules of all arenas whose levels bring no rules of their own.
 #[derive(Resource, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug, PartialEq)]
@@ -20,6 +20,9 @@ pub struct MazeArena {
     /// The level.
     #[reflect(ignore)]
     pub level: Arc<Maze2dLevel>,
+    /// The rules by which it is played: those of the mode, unless the level brings its own.
+    #[reflect(ignore)]
+    pub rules: Maze2dMode,
     /// Its agent.
     pub player: Entity,
 }

@@ -5,7 +5,7 @@ use bevy_playbot::streams::AgentStreams;
 use playbot_lab::prelude::*;
 
 use super::{
-    components::{Maze2dRules, MazeArena, MazeBall, PlaysIn},
+    components::{MazeArena, MazeBall, PlaysIn},
     demonstrator::Demonstrator,
 };
 
@@ -27,7 +27,6 @@ impl DemonstratorBot {
 }
 
 pub(super) fn decide(
-    rules: Res<Maze2dRules>,
     mut bots: Query<(&Control, &Episode, &PlaysIn, &MazeBall, &mut DemonstratorBot, &mut AgentStreams, &mut Action)>,
     arenas: Query<&MazeArena>,
 ) {
@@ -40,7 +39,8 @@ pub(super) fn decide(
         if episode.tick == 0 {
             bot.walker = None;
         }
-        let walker = bot.walker.get_or_insert_with(|| Demonstrator::new(arena.level.clone(), rules.0.retarget, rng));
+        let walker =
+            bot.walker.get_or_insert_with(|| Demonstrator::new(arena.level.clone(), arena.rules.retarget, rng));
         let push = walker.act(&ball.0, noise, rng);
         action.0 = ActionValue::Continuous(push.map(|axis| axis as f32).to_vec());
     }

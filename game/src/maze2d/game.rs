@@ -9,7 +9,9 @@ use playbot_lab::{
     benchmark::Benchmark,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
+    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
+    proof::LevelProof,
 };
 
 use super::{
@@ -17,6 +19,8 @@ use super::{
     demonstrator_bot::DemonstratorBot,
     floor_plan::point,
     level::Maze2dLevel,
+    level_text::{self, LevelText},
+    levels::{drawn, level_of},
     mode::Maze2dMode,
     picture::{Maze2dPicturePlugin, VIEW},
     play::OBSERVED,
@@ -25,8 +29,10 @@ use super::{
 };
 use crate::{
     maze::{
-        Map, Maze, read_mode,
-        show_level::{self, MazeSource, unfit},
+        Map, MazeSpec,
+        proof::prove,
+        read_mode,
+        show_level::{self, MazeSource, ShownMaze, unfit},
     },
     with_rays::WithRays,
 };
@@ -72,6 +78,10 @@ impl Game for Maze2d {
     }
 
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        if is_level_files(mode) {
+            LevelDesigns::read(self.name(), mode, &|text| self.parse_level(text))?;
+            return Ok(());
+        }
         read_mode::<Maze2dMode>(mode).map(drop)
     }
 
@@ -81,6 +91,9 @@ impl Game for Maze2d {
     }
 
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        if is_level_files(mode) {
+            return LevelDesigns::of(self.name(), mode, &|text| self.parse_level(text)).ok()?.hash(level);
+        }
         mode.parse::<Maze2dMode>().ok()?.map.fingerprint(level)
     }
 
@@ -109,8 +122,15 @@ impl Game for Maze2d {
     }
 
     fn build(&self, app: &mut App, mode: &str) {
-        let mode = mode.parse().expect("callers check the mode with `check_mode`");
+        // Drawn levels bring their rules.
+        let is_drawn = is_level_files(mode);
+        let mode = if is_drawn { Ok(Maze2dMode::new(Map::Random(MazeSpec::default()))) } else { mode.parse() };
+        let mode = mode.expect("callers check the mode with `check_mode`");
         app.add_plugins(Maze2dPlugin { mode, physics: self.physics });
+    }
+
+    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
+        level_text::parse(text)
     }
 
     fn picture(&self) -> Option<Picture> {
@@ -126,11 +146,16 @@ impl Game for Maze2d {
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        Some(Maze2dLevel::new(&mode.parse().ok()?, level).ok()?.floor_plan())
+        Some(level_of(self, mode, level).ok()?.0.floor_plan())
     }
 
     fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
         world.get::<MazeBall>(agent).map(|ball| point(ball.0.position))
+    }
+
+    fn prove(&self, mode: &str, level: u64) -> LevelProof {
+        let level = level_of(self, mode, level);
+        level.map_or(LevelProof::Unknown, |(level, _)| prove(&level.maze, level.start_cell, level.goal_cell))
     }
 
     fn demonstrator(&self) -> Option<&'static str> {
@@ -162,17 +187,29 @@ impl Game for Maze2d {
     }
 
     fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        show_level::show(request, &MazeSource { map: Map::maze2d, level: maze_of })
+        show_level::show(self, request, &MazeSource { map: Map::maze2d, level: shown_level, drawn: shown_drawn })
     }
 
     fn trace(&self, request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>> {
-        Some(trace::run(request, print))
+        Some(trace::run(self, request, print))
     }
 }
 
-/// The maze of a level, with its start and goal.
-fn maze_of(mode: &str, seed: u64) -> Result<Maze, InspectError> {
-    let mode: Maze2dMode = read_mode(mode)?;
-    let Maze2dLevel { maze, start_cell, goal_cell, .. } = Maze2dLevel::new(&mode, seed).map_err(unfit)?;
-    maze.with_ends(start_cell, goal_cell).map_err(unfit)
+/// A level of a mode, as it is played.
+fn shown_level(game: &dyn Game, mode: &str, seed: u64) -> Result<ShownMaze, InspectError> {
+    game.check_mode(mode)?;
+    let (level, rules) = level_of(game, mode, seed).map_err(InspectError::Usage)?;
+    shown(&level, &rules)
+}
+
+/// The level of a file.
+fn shown_drawn(designs: &LevelDesigns) -> Result<ShownMaze, InspectError> {
+    let (level, rules) = drawn(designs, 0).map_err(InspectError::Usage)?;
+    shown(&level, &rules)
+}
+
+fn shown(level: &Maze2dLevel, rules: &Maze2dMode) -> Result<ShownMaze, InspectError> {
+    let Maze2dLevel { maze, start_cell, goal_cell, .. } = level;
+    let maze = maze.clone().with_any_ends(*start_cell, *goal_cell).map_err(unfit)?;
+    Ok(ShownMaze { maze, json: serde_json::json!(LevelText::of(level, rules)) })
 }

@@ -89,7 +89,7 @@ impl Maze2dMode {
     }
 
     /// Takes one option.
-    fn set(&mut self, option: &str) -> Result<(), MazeModeError> {
+    pub(super) fn set(&mut self, option: &str) -> Result<(), MazeModeError> {
         let (key, value) = option.split_once('=').unwrap_or((option, ""));
         match (key, value) {
             ("sparse", "") => self.sparse = true,
@@ -113,8 +113,17 @@ impl Maze2dMode {
         Ok(())
     }
 
+    /// Checks that no two options contradict each other.
+    pub(super) fn check_together(&self) -> Result<(), MazeModeError> {
+        if self.retarget && self.end_at_goal {
+            let why = "`retarget` needs episodes that go on at the goal: leave out end-at-goal";
+            return Err(MazeModeError::Together(why));
+        }
+        Ok(())
+    }
+
     /// What differs from the map's defaults besides its own options, in the order in which it is written.
-    fn options(&self) -> Vec<String> {
+    pub(super) fn options(&self) -> Vec<String> {
         let usual = Self::new(self.map.clone());
         let mut options = Vec::new();
         let mut add = |differs: bool, option: &str| {
@@ -151,7 +160,7 @@ fn steps_for(cells: u32) -> u32 {
 }
 
 /// What an option is about, so that it is said only once.
-fn subject(option: &str) -> &str {
+pub(super) fn subject(option: &str) -> &str {
     let key = option.split_once('=').map_or(option, |(key, _)| key);
     key.strip_prefix("no-").unwrap_or(key)
 }
@@ -171,10 +180,7 @@ impl FromStr for Maze2dMode {
         map.check()?;
         let mut mode = Self::new(map);
         options.iter().try_for_each(|option| mode.set(option))?;
-        if mode.retarget && mode.end_at_goal {
-            let why = "`retarget` needs episodes that go on at the goal: leave out end-at-goal";
-            return Err(MazeModeError::Together(why));
-        }
+        mode.check_together()?;
         Ok(mode)
     }
 }

@@ -5,7 +5,7 @@ use playbot_lab::prelude::*;
 
 use super::{
     ball::clip_action,
-    components::{Maze2dRules, MazeArena, MazeBall, PlaysIn},
+    components::{MazeArena, MazeBall, PlaysIn},
     mode::{Contact, Maze2dMode},
     physics::MazePhysics,
     sim::{hash_state, is_at_goal, reward, step_rapier, step_soft},
@@ -13,11 +13,9 @@ use super::{
 
 /// Moves every ball whose agent plays, and pays for where it comes to lie.
 pub(super) fn play(
-    rules: Res<Maze2dRules>,
     mut players: Query<(&Control, &Action, &PlaysIn, &mut Episode, &mut MazeBall, &mut Reward, &mut StateHash)>,
     mut arenas: Query<(&MazeArena, Option<&mut MazePhysics>)>,
 ) {
-    let mode = &rules.0;
     for (control, action, plays_in, mut episode, mut ball, mut paid, mut hash) in &mut players {
         if !control.is_active() || !episode.is_running() {
             continue;
@@ -29,7 +27,7 @@ pub(super) fn play(
         if clipped {
             episode.note_clipped();
         }
-        let (ball, level) = (&mut ball.0, &arena.level);
+        let (ball, level, mode) = (&mut ball.0, &arena.level, &arena.rules);
         match (physics, mode.contact) {
             (Some(mut physics), Contact::Rapier) => step_rapier(ball, push, &mut physics),
             (physics, _) => {

@@ -1,19 +1,21 @@
 //! Tracing Maze2D: the ball under given pushes.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
-use playbot_lab::inspect::{InspectError, Print, TraceRequest, plain, read_text};
-
-use crate::maze::{read_mode, show_level::unfit};
+use playbot_lab::{
+    game::Game,
+    inspect::{InspectError, Print, TraceRequest, plain, read_text},
+};
 
 use super::{
-    Ball, Maze2dLevel, Maze2dMode,
+    Ball, Maze2dLevel,
     ball::{Vec2d, clip_action},
+    levels::level_of,
     sim::BallSim,
 };
 
 /// Plays the pushes of a file and prints the ball after each; says how many of them had to be clipped.
-pub(super) fn run(request: &TraceRequest, print: Print) -> Result<Option<String>, InspectError> {
+pub(super) fn run(game: &dyn Game, request: &TraceRequest, print: Print) -> Result<Option<String>, InspectError> {
     let Some(path) = request.file else {
         return Err(InspectError::Usage(
             "the pushes of maze2d are numbers: write them to a file, one `ux uy` a line, and \
@@ -21,13 +23,15 @@ pub(super) fn run(request: &TraceRequest, print: Print) -> Result<Option<String>
                 .to_owned(),
         ));
     };
-    let mode: Maze2dMode = read_mode(request.mode.unwrap_or("medium"))?;
-    let mut level = Maze2dLevel::new(&mode, request.seed).map_err(unfit)?;
+    let mode = request.mode.unwrap_or("medium");
+    game.check_mode(mode)?;
+    let (level, rules) = level_of(game, mode, request.seed).map_err(InspectError::Usage)?;
+    let mut level = Arc::unwrap_or_clone(level);
     if !request.start.is_empty() {
         level.start = start(request.start, &level)?;
     }
     let (pushes, clipped) = pushes(&read_text(path)?, path)?;
-    let mut sim = BallSim::new(&mode, &level);
+    let mut sim = BallSim::new(&rules, &level);
     if !request.json {
         print(format!("{:>5} {:>22} {:>22} {:>22} {:>22}", "step", "x", "y", "vx", "vy"))?;
     }

@@ -1,9 +1,11 @@
 //! The program as its users call it.
 
 mod eval;
+mod explore;
 #[path = "../shared/program.rs"]
 mod program;
 mod switches;
+mod testing;
 mod trace;
 mod usage;
 mod work;

@@ -3,13 +3,13 @@
 use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
 use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
-use playbot_lab::{game::Game, games::Games};
+use playbot_lab::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
 
 use crate::{
     bench, config, demo, doctor,
     error::{CliError, Outcome},
-    eval, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, runs, study,
-    trace, train, view,
+    eval, explore, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, report,
+    runs, study, test, trace, train, view,
 };
 
 /// Playtesting bots that learn from demonstrations.
@@ -32,9 +32,11 @@ Examples:
   playbot play GAME --seed 7 --record my.demo   play it yourself
   playbot demo verify my.demo   does it replay?
   playbot doctor GAME   is the game the same every time?
+  playbot explore GAME --level MODE:7   what can be reached?
   playbot learn-skills --out skills.safetensors
   playbot train --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
+  playbot test GAME --levels MODE:0..99 --out runs/test   which levels can be solved?
   playbot policy export --run runs/first --out GAME.policy
   playbot config show --set ppo.lr=0.0003   an experiment with all its values
   playbot study --experiment my.ron --out study
@@ -57,6 +59,9 @@ enum Verb {
     Study(study::Args),
     Config(config::Args),
     Eval(eval::Args),
+    Test(test::Args),
+    Report(report::Args),
+    Explore(explore::Args),
     Eyes(eyes::Args),
     Policy(policy::Args),
     Runs(runs::Args),
@@ -67,7 +72,7 @@ enum Verb {
 }
 
 /// Whether the command line can be read: whoever writes commands into documentation asks it. `args` begin with the name of
-/// the program. Nothing is run, and no game is asked whether it has what they name.
+/// the program. Nothing is run, no game is asked whether it has what they name, and no level file has to be there.
 ///
 /// # Errors
 ///
@@ -80,9 +85,14 @@ where
     match Cli::try_parse_from(args) {
         Ok(_) => Ok(()),
         // Asking for help is no mistake.
-        Err(error) if !error.use_stderr() => Ok(()),
+        Err(error) if !error.use_stderr() || is_about_missing_files(&error) => Ok(()),
         Err(error) => Err(error.to_string()),
     }
+}
+
+fn is_about_missing_files(error: &clap::Error) -> bool {
+    let split = std::error::Error::source(error).and_then(|source| source.downcast_ref::<SplitError>());
+    matches!(split, Some(SplitError::Files(LevelFileError::NoFiles { .. })))
 }
 
 /// Runs the command line on the process's arguments, for these games. The first one is meant by verbs that name none.
@@ -165,6 +175,9 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Study(args) => study::run(args, games),
         Verb::Config(args) => config::run(args, games),
         Verb::Eval(args) => eval::run(args, games),
+        Verb::Test(args) => test::run(&args, games),
+        Verb::Report(args) => report::run(&args, games),
+        Verb::Explore(args) => explore::run(args, games),
         Verb::Eyes(args) => eyes::run(args, games),
         Verb::Policy(args) => policy::run(args, games),
         Verb::Runs(args) => runs::run(args, games),

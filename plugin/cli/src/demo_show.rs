@@ -2,8 +2,11 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use bevy_playbot::demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, EpisodeActions};
-use serde_json::json;
+use bevy_playbot::{
+    demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, EpisodeActions},
+    level_files::LevelFile,
+};
+use serde_json::{Value, json};
 
 use super::{
     error::{CliError, Outcome, print_line},
@@ -82,18 +85,24 @@ fn observations(header: &DemoHeader) -> String {
 fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
     if as_json {
         return print_line(json!({
-            "episode": index, "level": episode.level_seed, "steps": episode.len(),
+            "episode": index, "level": episode.level_seed, "level_file": episode.level_file.as_ref().map(level_file), "steps": episode.len(),
             "return": episode.episode_return(), "end": episode.end, "steps_by_decider": episode.steps_by_decider(),
         }));
     }
     print_line(format!(
-        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:<11}  by {}",
+        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:<11}  by {}{}",
         episode.level_seed,
         episode.len(),
         episode.episode_return(),
         end(episode.end),
-        deciders(&episode.steps_by_decider())
+        deciders(&episode.steps_by_decider()),
+        episode.level_file.as_ref().map_or_else(String::new, |file| format!("  on {}", file.path)),
     ))
+}
+
+/// The hash in letters: few programs read numbers that large without loss.
+fn level_file(file: &LevelFile) -> Value {
+    json!({ "path": file.path, "hash": format!("{:016x}", file.hash) })
 }
 
 fn end(end: DemoEnd) -> &'static str {

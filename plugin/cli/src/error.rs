@@ -22,6 +22,7 @@ use playbot_lab::{
         TrainError, arena_state::RestoreError, config::ExperimentError, config_file::ConfigError, run_dir::RunError,
         study::StudyError,
     },
+    verdict::TestError,
 };
 use playbot_learner::{FileError, LearnError};
 use thiserror::Error;
@@ -127,6 +128,8 @@ pub enum CliError {
     Misfit(#[from] PolicyMisfit),
     #[error(transparent)]
     Export(#[from] ExportError),
+    #[error(transparent)]
+    Test(#[from] TestError),
     #[cfg(feature = "window")]
     #[error(transparent)]
     Window(#[from] crate::window::WindowError),
@@ -158,6 +161,13 @@ impl CliError {
             Self::NotSaved { error, .. } | Self::NeverSaved { error, .. } => run_code(error),
             Self::Demo(error) | Self::Verify(VerifyError::File(error)) => demo_code(error),
             Self::Train(error) => train_code(error),
+            Self::Test(error) => {
+                if error.is_usage() {
+                    3
+                } else {
+                    2
+                }
+            }
             Self::Verify(VerifyError::Fault(_)) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),

@@ -41,6 +41,7 @@ use super::{
 #[command(after_help = "Examples:
   playbot eval --run runs/first
   playbot eval --bot BOT --bot random --levels MODE:0..63 --json
+  playbot eval --bot BOT --levels files:levels/**/*.json
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
@@ -64,7 +65,7 @@ pub struct Args {
     /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
     #[arg(long)]
     observation: Option<ObservationKind>,
-    /// Levels, as mode:first..last, both included; the experiment's held-out levels if none are named, or those of
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/**/*.json"; the experiment's held-out levels if none are named, or those of
     /// the game's own experiment if a policy file is of another game than the experiment.
     #[arg(long)]
     levels: Vec<LevelSplit>,
@@ -106,7 +107,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
         experiment.check_test(game).map_err(or_levels)?;
     }
-    splits.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    splits.iter().try_for_each(|split| split.check(game))?;
     let players = players(game, &experiment, &args, games)?;
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();

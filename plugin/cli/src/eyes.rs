@@ -95,7 +95,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     check_picture(game)?;
     let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
-    game.check_mode(&levels.mode)?;
+    levels.check(game)?;
     if args.frames == 0 {
         return Err(CliError::Usage("--frames is 0: compare at least one frame a level".to_owned()));
     }

@@ -22,6 +22,7 @@ use crate::{
   playbot level GAME --mode MODE --seed 7
   playbot level GAME --seed 0 --json
   playbot level GAME --seed 7 --png level.png
+  playbot level GAME --file my-level.json
   playbot level antmaze --map large
   playbot level maze2d --seed 7 --json
   playbot level maze2d --map random+size=21x21+loops=0.2 --seed 7
@@ -40,6 +41,9 @@ pub struct Args {
     /// start and goal that it draws for the seed, or a file of rows; if none is named, the game chooses.
     #[arg(long, value_name = "MAP", conflicts_with = "mode")]
     map: Option<String>,
+    /// Level file to show, in the form that --json prints.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mode", "map", "seed"])]
+    file: Option<PathBuf>,
     /// Seed of the level; 0 if none is named.
     #[arg(long)]
     seed: Option<u64>,
@@ -66,8 +70,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 /// maps take no mode, and choose a map themselves.
 fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, InspectError> {
     let (mode, map) = (args.mode.as_deref(), args.map.as_deref());
-    let request = LevelRequest { mode, map, seed: args.seed, picture };
-    if mode.is_some() || map.is_some() {
+    let request = LevelRequest { mode, map, file: args.file.as_deref(), seed: args.seed, picture };
+    if mode.is_some() || map.is_some() || args.file.is_some() {
         return game.show_level(&request);
     }
     let (mode, seed) = (usual_mode(game), args.seed.unwrap_or(0));

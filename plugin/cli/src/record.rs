@@ -31,7 +31,7 @@ use super::{
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included; played in order, again and again until --steps is reached. Without it
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; played in order, again and again until --steps is reached. Without it
     /// levels 0 to 499 of the mode that `train` trains in, but for the held-out ones of the game's own experiment.
     #[arg(long)]
     levels: Option<LevelSplit>,
@@ -65,7 +65,7 @@ const LAST_LEVEL: u64 = 499;
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
-    game.check_mode(&levels.mode)?;
+    levels.check(game)?;
     check_demonstrator(game)?;
     check_noise(game, args.noise)?;
     if args.steps == Some(0) {
@@ -164,7 +164,7 @@ fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
 
 /// The levels but for those that are held out.
 fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
-    held_out.iter().try_for_each(|split| game.check_mode(&split.mode))?;
+    held_out.iter().try_for_each(|split| split.check(game))?;
     let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
     let chosen: Vec<u64> =
         levels.levels().filter(|&level| !hidden.iter().any(|hidden| hidden.contains(&levels.mode, level))).collect();

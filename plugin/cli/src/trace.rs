@@ -9,7 +9,10 @@ use playbot_lab::{
     trace::trace_actions,
 };
 
-use crate::error::{CliError, Outcome, print_line};
+use crate::{
+    error::{CliError, Outcome, print_line},
+    one_level::LevelsArg,
+};
 
 /// Play given actions and print the state after each.
 ///
@@ -20,6 +23,7 @@ use crate::error::{CliError, Outcome, print_line};
 #[command(after_help = "Examples:
   playbot trace GAME --seed 2 --actions 0,0,0,0 --json
   playbot trace GAME --mode MODE --seed 2 --actions-file actions.txt
+  playbot trace GAME --levels files:my-level.json --actions-file actions.txt
   playbot trace maze2d --map medium --start 1,1,0,0 --actions-file pushes.txt --json
   playbot trace maze2d --map large+contact=rapier --seed 3 --actions-file pushes.txt")]
 pub struct Args {
@@ -28,9 +32,11 @@ pub struct Args {
     /// Mode of the game, or its map where levels are maps; if none is named, the game's last mode or its own choice.
     #[arg(long, visible_alias = "map")]
     mode: Option<String>,
-    /// Seed of the level.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
+    #[command(flatten)]
+    levels: LevelsArg,
+    /// Seed of the level; 0, or the first of the levels, if none is named.
+    #[arg(long)]
+    seed: Option<u64>,
     /// Discrete actions: their numbers, from 0, separated by commas.
     #[arg(long, value_delimiter = ',')]
     actions: Vec<u32>,
@@ -48,9 +54,10 @@ pub struct Args {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
+    let (mode, seed) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
     let request = TraceRequest {
-        mode: args.mode.as_deref(),
-        seed: args.seed,
+        mode,
+        seed,
         start: &args.start,
         actions: &args.actions,
         file: args.actions_file.as_deref(),

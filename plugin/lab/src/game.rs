@@ -9,7 +9,9 @@ use crate::{
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
+    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
+    proof::LevelProof,
 };
 use bevy_playbot::{
     action::ActionSpace,
@@ -38,12 +40,17 @@ pub trait Game: Send + Sync {
     /// Modes, such as difficulties. At least one. Where modes take options, these are the names in front of them.
     fn modes(&self) -> &'static [&'static str];
 
-    /// Checks that there is such a mode: one of [`modes`](Self::modes), unless the game reads options behind the name.
+    /// Checks that there is such a mode: one of [`modes`](Self::modes), unless the game reads options behind the name; or
+    /// level files, each of which is read with [`parse_level`](Self::parse_level).
     ///
     /// # Errors
     ///
     /// [`ModeError`] with what is valid.
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        if is_level_files(mode) {
+            LevelDesigns::read(self.name(), mode, &|text| self.parse_level(text))?;
+            return Ok(());
+        }
         let valid = self.modes();
         if valid.contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, valid).into()) }
     }
@@ -55,9 +62,22 @@ pub trait Game: Send + Sync {
     }
 
     /// A hash of the places of a level, where different seeds may happen to draw the same ones. `None` where they cannot, or
-    /// where the places are the mode's own.
-    fn fingerprint(&self, _mode: &str, _level: u64) -> Option<u64> {
-        None
+    /// where the places are the mode's own. Of a level file it is the hash of the level in it.
+    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        if !is_level_files(mode) {
+            return None;
+        }
+        LevelDesigns::of(self.name(), mode, &|text| self.parse_level(text)).ok()?.hash(level)
+    }
+
+    /// Reads a level that somebody drew, in the game's own format. Worlds of level files have what was read as the resource
+    /// [`LevelDesigns`] before the game is built, and the game plays level number i of it instead of making one.
+    ///
+    /// # Errors
+    ///
+    /// It is no level of the game: what is wrong, and on which line. By default the game has no level files.
+    fn parse_level(&self, _text: &str) -> Result<LevelDesign, LevelTextError> {
+        Err(LevelTextError::whole(format!("`{}` has no level files: name one of its modes", self.name())))
     }
 
     /// Ticks per second of game time.
@@ -142,6 +162,20 @@ pub trait Game: Send + Sync {
         None
     }
 
+    /// The state of an agent in a few whole numbers, for an explorer to whom states with the same numbers are the same: see
+    /// [`explore`](crate::explore). `None`, by default, for squares of the grid in which it [is](Self::whereabouts), or where
+    /// that is not known, for its observation, downscaled.
+    fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
+        None
+    }
+
+    /// What is known for certain of a level: whether its aim can be reached at all. Asked of levels that no bot has solved,
+    /// so it may take some milliseconds. Only what a search to its end has shown is a proof; a search that gave up has
+    /// shown nothing. By default nothing is known.
+    fn prove(&self, _mode: &str, _level: u64) -> LevelProof {
+        LevelProof::Unknown
+    }
+
     /// Bots that every learner is compared with, by name.
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
         vec![("random", BlindBot::Uniform)]
@@ -209,7 +243,8 @@ pub trait Game: Send + Sync {
 
     /// The head of a recording of the game in this mode.
     fn demo_header(&self, mode: &str) -> DemoHeader {
-        DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()))
+        let header = DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()));
+        if is_level_files(mode) { header.with_level_files() } else { header }
     }
 
     /// What the game says of itself to policy files.

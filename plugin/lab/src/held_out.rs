@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use bevy_playbot::level_files::LevelFile;
+
 use crate::{game::Game, split::LevelSplit};
 
 /// Held-out levels, as nobody may see them before the test: neither under the rules of another mode, nor where another seed
@@ -29,6 +31,11 @@ impl<'a> HeldOut<'a> {
     pub fn contains(&self, mode: &str, level: u64) -> bool {
         let is_named = self.split.contains(&self.split.mode, level) && self.game.family(mode) == self.family;
         is_named || self.game.fingerprint(mode, level).is_some_and(|print| self.fingerprints.contains(&print))
+    }
+
+    /// Whether one of them is the level in this file, whatever number it has.
+    pub fn contains_file(&self, file: &LevelFile) -> bool {
+        self.fingerprints.contains(&file.hash)
     }
 
     /// The first of these levels that is held out.

@@ -41,6 +41,8 @@ pub struct LevelRequest<'a> {
     pub mode: Option<&'a str>,
     /// Map, for games whose levels are maps: a name, a whole mode, or a file.
     pub map: Option<&'a str>,
+    /// File with a level in the game's own format, if one is named.
+    pub file: Option<&'a Path>,
     /// Seed, if one is named.
     pub seed: Option<u64>,
     /// Whether a picture is wanted too.

@@ -1,8 +1,12 @@
 //! The laboratory of [`bevy_playbot`]: everything that trains, measures and compares bots, headless and on many levels.
 //!
 //! - A [`Game`](game::Game) says how a game is built without a window, many arenas at a time.
+//! - [`level_files`] are levels that somebody drew, in ranges like those that are made from seeds.
 //! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
 //! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
+//! - [`verdict`] says of each level whether bots solved it, failed, or nobody can; results of shards and of two states of a
+//!   game are joined and compared there.
+//! - [`explore`] finds its way through a level by itself, without training: what can be reached, and how.
 //! - [`doctor`] finds out whether a game plays the same when it is given the same actions, and what differs if not.
 //! - [`pipeline`] goes the whole road with five functions; [`policy_export`] makes the one file that a game ships with, for
 //!   [`policy_file`](bevy_playbot::policy_file) to load there.
@@ -17,17 +21,20 @@ pub mod drawing;
 mod escape;
 pub mod eval;
 pub mod experiment_text;
+pub mod explore;
 pub mod floor_plan;
 pub mod foreign;
 pub mod game;
 pub mod games;
 pub mod held_out;
 pub mod inspect;
+pub mod level_files;
 pub mod mode;
 pub mod parallel;
 pub mod pipeline;
 pub mod policy_export;
 pub mod prelude;
+pub mod proof;
 pub mod report;
 pub mod runs;
 pub mod sensors;
@@ -36,4 +43,5 @@ pub mod split;
 pub mod stage_clock;
 pub mod trace;
 pub mod train;
+pub mod verdict;
 pub mod worlds;

@@ -81,7 +81,7 @@ pub enum PipelineError {
 ///
 /// Nobody demonstrates the game, it broke its contract, or the file exists or cannot be written.
 pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> Result<u64, PipelineError> {
-    game.check_mode(&levels.mode)?;
+    levels.check(game)?;
     if game.demonstrator().is_none() {
         return Err(PipelineError::NoDemonstrator(game.name()));
     }

@@ -5,10 +5,19 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::{
+    game::Game,
+    level_files::{LevelDesigns, LevelFileError, find_level_files, is_level_files, level_file_pattern},
+    mode::ModeError,
+};
+
 /// Most levels in one split: more could not be listed in memory.
 const MAX_LEVELS: u64 = 1 << 24;
 
 /// Levels `first..=last` of one mode of a game. Written `hard:64..127`, both ends included.
+///
+/// Levels that are files are written `files:levels/**/*.json`, which counts the files that match when it is read, or with
+/// numbers behind it, `files:levels/**/*.json:0..9`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LevelSplit {
@@ -41,6 +50,23 @@ impl LevelSplit {
         self.mode == mode && (self.first..=self.last).contains(&level)
     }
 
+    /// Checks that a game has all of these levels, and reads those that are files.
+    ///
+    /// # Errors
+    ///
+    /// [`ModeError`] with what is valid.
+    pub fn check(&self, game: &dyn Game) -> Result<(), ModeError> {
+        game.check_mode(&self.mode)?;
+        if !is_level_files(&self.mode) {
+            return Ok(());
+        }
+        let count = LevelDesigns::of(game.name(), &self.mode, &|text| game.parse_level(text))?.count();
+        if self.last < count {
+            return Ok(());
+        }
+        Err(LevelFileError::NoLevel { mode: self.mode.clone(), level: self.last, count }.into())
+    }
+
     /// Whether some level belongs to both.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.mode == other.mode && self.first <= other.last && other.first <= self.last
@@ -57,7 +83,10 @@ impl fmt::Display for LevelSplit {
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum SplitError {
     /// It is written in another way.
-    #[error("`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127")]
+    #[error(
+        "`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, or name level files, \
+         as in files:levels/*.json"
+    )]
     NotARange(String),
     /// The range goes backwards.
     #[error("`{text}`: first level {first} is after last level {last}; write {mode}:{last}..{first}")]
@@ -74,6 +103,15 @@ pub enum SplitError {
     /// There are too many levels in it.
     #[error("`{0}` has too many levels: a range has at most 16,777,216")]
     TooMany(String),
+    /// The levels are files that are not there.
+    #[error(transparent)]
+    Files(#[from] LevelFileError),
+}
+
+/// `4..9` or `4`.
+fn range(text: &str) -> Option<(u64, u64)> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    Some((first.parse().ok()?, last.parse().ok()?))
 }
 
 impl FromStr for LevelSplit {
@@ -81,11 +119,15 @@ impl FromStr for LevelSplit {
 
     fn from_str(text: &str) -> Result<Self, SplitError> {
         let parse = || {
-            let (mode, range) = text.split_once(':')?;
-            let (first, last) = range.split_once("..").unwrap_or((range, range));
-            let (first, last) = (first.parse::<u64>().ok()?, last.parse::<u64>().ok()?);
-            (!mode.is_empty()).then(|| (mode.to_owned(), first, last))
+            let (mode, levels) = if is_level_files(text) { text.rsplit_once(':') } else { text.split_once(':') }?;
+            let (first, last) = range(levels)?;
+            let is_whole = !mode.is_empty() && is_level_files(mode) == is_level_files(text);
+            is_whole.then(|| (mode.to_owned(), first, last))
         };
+        if let (Some(pattern), None) = (level_file_pattern(text), parse()) {
+            let count = find_level_files(pattern)?.len() as u64;
+            return Ok(Self { mode: text.to_owned(), first: 0, last: count - 1 });
+        }
         let (mode, first, last) = parse().ok_or_else(|| SplitError::NotARange(text.to_owned()))?;
         if first > last {
             return Err(SplitError::Reversed { text: text.to_owned(), mode, first, last });
@@ -128,6 +170,25 @@ mod tests {
         assert_eq!(words("easy:9..3"), "`easy:9..3`: first level 9 is after last level 3; write easy:3..9");
         assert!(words("easy:0..16777216").contains("at most 16,777,216"));
         assert_eq!("easy:0..16777215".parse::<LevelSplit>().expect("just as many").len(), MAX_LEVELS);
+    }
+
+    #[test]
+    fn files_are_counted_unless_there_are_numbers_behind_them() {
+        let split: LevelSplit = "files:no/such/*.json:3..9".parse().expect("nothing is looked for");
+        assert_eq!((split.mode.as_str(), split.first, split.last), ("files:no/such/*.json", 3, 9));
+        assert_eq!(split.to_string(), "files:no/such/*.json:3..9");
+        assert_eq!("files:a.json:2".parse::<LevelSplit>().expect("one file").len(), 1);
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["b.json", "a.json"] {
+            std::fs::write(folder.path().join(name), "").expect("writable");
+        }
+        let text = format!("files:{}/*.json", folder.path().display());
+        let counted: LevelSplit = text.parse().expect("two files");
+        assert_eq!(counted.to_string(), format!("{text}:0..1"));
+        assert_eq!(counted.to_string().parse(), Ok(counted));
+        let words = "files:no/such/*.json".parse::<LevelSplit>().expect_err("no files").to_string();
+        assert!(words.contains("files:no/such/*.json matches no file"), "{words}");
+        assert!("files:a.json:9..3".parse::<LevelSplit>().is_err());
     }
 
     #[test]

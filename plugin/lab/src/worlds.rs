@@ -14,6 +14,7 @@ use bevy_playbot::{
 
 use crate::{
     game::Game,
+    level_files::{LevelDesigns, is_level_files},
     sensors::GameSensors,
     stage_clock::{self, StageClock},
 };
@@ -99,6 +100,18 @@ pub fn add_game(
     }
     if let (Some(problem), Some(mut faults)) = (game.problem(), app.world_mut().get_resource_mut::<Faults>()) {
         faults.report(problem);
+    }
+    if is_level_files(mode) {
+        match LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text)) {
+            Ok(designs) => {
+                app.insert_resource(designs.files()).insert_resource(designs);
+            }
+            Err(error) => {
+                if let Some(mut faults) = app.world_mut().get_resource_mut::<Faults>() {
+                    faults.report(error.to_string());
+                }
+            }
+        }
     }
     stage_clock::add_readings(app);
     game.build(app, mode);

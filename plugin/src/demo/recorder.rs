@@ -30,6 +30,7 @@ use crate::{
     control::Control,
     episode::{Episode, EpisodeEnd},
     fault::Faults,
+    level_files::LevelFiles,
     observation::Observation,
     reward::Reward,
     state_hash::StateHash,
@@ -128,6 +129,7 @@ pub(crate) fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
 pub fn record_ticks(
     recorder: Option<ResMut<Recorder>>,
     order: Res<AgentOrder>,
+    files: Option<Res<LevelFiles>>,
     mut agents: Query<(&Agent, &Control, &Action, &Reward, &StateHash, &Observation, &Episode, &mut Recording)>,
     mut faults: ResMut<Faults>,
 ) {
@@ -150,7 +152,9 @@ pub fn record_ticks(
             {
                 faults.report(error.to_string());
             }
-            recording.episode = Some(DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+            let mut demo = DemoEpisode::new(episode.level, demo_actions(&agent.actions));
+            demo.level_file = files.as_ref().and_then(|files| files.of(episode.level)).cloned();
+            recording.episode = Some(demo);
         }
         // Without its first ticks an episode could not be replayed: recording waits for the next one.
         let Some(demo) = recording.episode.as_mut() else { continue };

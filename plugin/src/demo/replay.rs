@@ -42,6 +42,7 @@ use crate::{
     control::Control,
     episode::{Episode, EpisodeEnd},
     level::LevelQueue,
+    level_files::LevelFiles,
     reward::Reward,
     state_hash::StateHash,
     streams::AgentStreams,
@@ -84,12 +85,15 @@ impl Replay {
         Self { episode, divergence: None, finished: false }
     }
 
-    /// Hands an agent over to this recording, from its first tick on: whatever it was playing is left at once.
+    /// Hands an agent over to this recording, from its first tick on: whatever it was playing is left at once. Where levels
+    /// are files, the level is the one that the recorded file has now.
     pub fn begin(episode: Arc<DemoEpisode>, agent: &mut EntityWorldMut) {
         if let Some(mut running) = agent.get_mut::<Episode>() {
             running.abandon();
         }
-        let queue = LevelQueue::Always(episode.level_seed);
+        let files = agent.world().get_resource::<LevelFiles>();
+        let recorded = episode.level_file.as_ref().zip(files).and_then(|(file, files)| files.number_of(file));
+        let queue = LevelQueue::Always(recorded.unwrap_or(episode.level_seed));
         agent.insert((Control::Replay, queue, Self::new(episode), AgentStreams::new(0, 0)));
     }
 
@@ -135,6 +139,7 @@ pub(crate) fn run_replays(mut agents: Query<(&Control, &Episode, &mut Replay, &m
 
 pub(crate) fn check_replays(
     mut agents: Query<(Entity, &Control, &Episode, &Reward, &StateHash, &mut Replay)>,
+    files: Option<Res<LevelFiles>>,
     mut commands: Commands,
 ) {
     for (entity, control, episode, reward, hash, mut replay) in &mut agents {
@@ -143,7 +148,10 @@ pub(crate) fn check_replays(
         }
         // Judge has counted this tick already.
         let tick = episode.tick.saturating_sub(1);
-        let what = difference(&replay.episode, tick as usize, reward.get(), hash.folded(), episode.end());
+        let demo = &*replay.episode;
+        // Of another level nothing else needs to be said.
+        let is_other = (tick == 0).then(|| other_level(demo, episode.level, files.as_deref())).flatten();
+        let what = is_other.or_else(|| difference(demo, tick as usize, reward.get(), hash.folded(), episode.end()));
         if replay.divergence.is_none()
             && let Some(what) = what
         {
@@ -152,6 +160,15 @@ pub(crate) fn check_replays(
             commands.trigger(ReplayDiverged { entity, divergence });
         }
         replay.finished = episode.end().is_some() || tick as usize + 1 >= replay.episode.len();
+    }
+}
+
+/// Why the level is not the file that was recorded, if it is not.
+fn other_level(demo: &DemoEpisode, level: u64, files: Option<&LevelFiles>) -> Option<String> {
+    let recorded = demo.level_file.as_ref()?;
+    match files {
+        Some(files) => files.difference(level, recorded),
+        None => Some(format!("recorded was the level file {recorded}, but the levels played here are no files")),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
 
 mod episodes;
+mod explore;
 mod faults;
 mod lander;
 mod orders;
@@ -12,4 +13,5 @@ mod takeover;
 mod trails;
 mod training;
 mod truncation;
+mod verdicts;
 mod vision;

@@ -4,6 +4,7 @@
 mod blocks;
 mod commands;
 mod experiments;
+mod level_files;
 mod links;
 #[allow(dead_code, reason = "its `main` is what a reader of the tutorial starts")]
 mod runner;

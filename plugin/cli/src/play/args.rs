@@ -20,6 +20,7 @@ A won level is followed by the next one, a lost one is played again. Every finis
 Examples:
   playbot play GAME --seed 7
   playbot play GAME --levels 0..63 --record my.demo
+  playbot play GAME --levels files:levels/*.json
   playbot play GAME --run runs/first --record mixed.demo
   playbot play GAME --mode MODE --bot BOT")]
 #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window only"))]
@@ -32,7 +33,8 @@ pub struct Args {
     /// Level to begin with; the first of the levels if none is named.
     #[arg(long)]
     pub(super) seed: Option<u64>,
-    /// Levels, as first..last or mode:first..last, both included; all if none are named.
+    /// Levels, as first..last or mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; all if none
+    /// are named.
     #[arg(long)]
     pub(super) levels: Option<String>,
     /// Recording to write.

@@ -8,7 +8,7 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_lab::games::Games;
-use playbot_lab::{game::Game, split::LevelSplit};
+use playbot_lab::{game::Game, level_files::is_level_files, split::LevelSplit};
 
 use super::Args;
 use crate::{
@@ -49,9 +49,10 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
     let levels = match args.levels.as_deref() {
         Some(text) if text.contains(':') => text.parse()?,
         Some(text) => format!("{mode}:{text}").parse()?,
+        None if is_level_files(mode) => mode.parse()?,
         None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL },
     };
-    game.check_mode(&levels.mode)?;
+    levels.check(game)?;
     if named.is_some_and(|mode| mode != levels.mode) {
         return Err(CliError::Usage(format!(
             "--mode and --levels name different modes: leave out --mode, or {levels}"

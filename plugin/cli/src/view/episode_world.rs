@@ -79,7 +79,7 @@ impl EpisodeWorld {
     ) -> Result<Self, CliError> {
         let mut new = Self::new(game, mode, observation_config, episode.level_seed)?;
         new.over = episode.is_empty();
-        new.world.entity_mut(new.agent).insert((Control::Replay, Replay::new(Arc::new(episode))));
+        Replay::begin(Arc::new(episode), &mut new.world.entity_mut(new.agent));
         Ok(new)
     }
 

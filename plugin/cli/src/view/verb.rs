@@ -23,7 +23,9 @@ use super::{
 use crate::{
     defaults::usual_mode,
     error::{CliError, Outcome},
-    interrupt, open, output,
+    interrupt,
+    one_level::LevelsArg,
+    open, output,
     player::{Chosen, PlayerArgs},
     progress,
 };
@@ -39,6 +41,7 @@ use crate::{
   playbot view GAME --seed 5
   playbot view GAME --seed 5 --tick 40 --bot BOT --image stack=4
   playbot view GAME --seed 64 --run runs/first --episode --out episode.png
+  playbot view GAME --levels files:my-level.json --episode
   playbot view GAME --demo my.demo --episode-number 3 --episode --scale 4
   playbot view GAME --image width=84 --image height=84 --image grayscale --image paint_velocity
 
@@ -49,9 +52,11 @@ pub struct Args {
     /// Mode of the game; the one that it is trained in, or that of the recording.
     #[arg(long, conflicts_with = "demo")]
     mode: Option<String>,
-    /// Seed of the level.
-    #[arg(long, default_value_t = 0, conflicts_with = "demo")]
-    seed: u64,
+    #[command(flatten)]
+    levels: LevelsArg,
+    /// Seed of the level; 0, or the first of the levels, if none is named.
+    #[arg(long, conflicts_with = "demo")]
+    seed: Option<u64>,
     /// Tick of the episode, from 0, whose observation is written.
     #[arg(long, default_value_t = 0, conflicts_with = "episode")]
     tick: u32,
@@ -112,7 +117,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         path: &args.out,
         game,
         mode: &mode,
-        is_mode_named: args.mode.is_some() || args.demo.is_some(),
+        is_mode_named: args.mode.is_some() || args.levels.is_named() || args.demo.is_some(),
         level: episode_world.level(),
         player: &player,
         demo: args.demo.as_deref(),
@@ -146,6 +151,9 @@ struct Opened {
 
 fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, CliError> {
     if let Some(path) = &args.demo {
+        if args.levels.is_named() {
+            return Err(CliError::Usage("--demo says what level is shown: leave out --levels".to_owned()));
+        }
         let reader = open_recording(game, path, games)?;
         let mode = reader.header().mode.clone();
         game.check_mode(&mode).map_err(|error| CliError::Usage(format!("{}: {error}", path.display())))?;
@@ -154,14 +162,15 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
         let episode_world = EpisodeWorld::replaying(game, &mode, &observation_config, episode)?;
         return Ok(Opened { episode_world, observation_config, mode, player: "recording".to_owned() });
     }
-    let mode = args.mode.as_deref().unwrap_or_else(|| usual_mode(game));
+    let (mode, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let mode = mode.unwrap_or_else(|| usual_mode(game));
     game.check_mode(mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,
         None => Chosen::usual(game)?,
     };
     let observation_config = observation_config(game, args, Some(&chosen))?;
-    let episode_world = EpisodeWorld::playing(game, mode, &observation_config, args.seed, &chosen.player)?;
+    let episode_world = EpisodeWorld::playing(game, mode, &observation_config, level, &chosen.player)?;
     Ok(Opened { episode_world, observation_config, mode: mode.to_owned(), player: chosen.name })
 }
 

@@ -66,7 +66,11 @@ impl Demonstrations {
             for (index, episode) in reader.enumerate() {
                 let mut episode = episode?;
                 let level = episode.level_seed;
-                if let Some(hidden) = held_out.as_ref().filter(|hidden| hidden.contains(&header.mode, level)) {
+                let is_hidden = |hidden: &&HeldOut| match &episode.level_file {
+                    Some(file) => hidden.contains_file(file),
+                    None => hidden.contains(&header.mode, level),
+                };
+                if let Some(hidden) = held_out.as_ref().filter(is_hidden) {
                     return Err(VerifyError::HeldOut { path: file, level, split: hidden.split().clone() });
                 }
                 if !is_seen {

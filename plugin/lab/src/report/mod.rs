@@ -3,6 +3,7 @@
 //! - [`Chart`] draws [`Curve`]s as SVG, [`to_svg`] several charts in one file, [`sparkline`] a curve as text.
 //! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`]; a [`PlainTable`] holds any text.
 //! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
+//! - [`CellChart`] draws which cells of a level an explorer has reached.
 //! - [`TrailChart`] draws where agents went on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a [`Drawing`](crate::drawing::Drawing).
 //! - [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
@@ -39,4 +40,4 @@ pub use study::{StudyReport, StudyResult, SuccessCurve, TestResult, TrainingResu
 pub use svg::to_svg;
 pub use table::{PlainTable, Table};
 pub use text_table::to_text_table;
-pub use trails::{Floor, TrailChart, Visits, Walker};
+pub use trails::{CellChart, Floor, TrailChart, Visits, Walker};

@@ -177,7 +177,7 @@ impl Experiment {
 
 fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result<(), ExperimentError> {
     let example = game.modes().first().copied().unwrap_or_default();
-    game.check_mode(&levels.mode).map_err(|source| ExperimentError::Mode {
+    levels.check(game).map_err(|source| ExperimentError::Mode {
         key,
         levels: Box::new(levels.clone()),
         source: Box::new(source),

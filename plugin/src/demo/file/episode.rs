@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::episode_fault::EpisodeFault;
 use super::header::{DemoActions, DemoHeader};
+use crate::level_files::LevelFile;
 
 /// Who decided the action of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -69,6 +70,9 @@ pub enum EpisodeActions {
 pub struct DemoEpisode {
     /// Seed of the level: with the game, its version and its mode it gives the layout.
     pub level_seed: u64,
+    /// The file of the level, where levels are files; its number may be another one by now.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level_file: Option<LevelFile>,
     /// The action of each tick.
     pub actions: EpisodeActions,
     /// The reward of each tick, `[steps]`.
@@ -89,6 +93,7 @@ impl DemoEpisode {
     pub fn new(level_seed: u64, actions: DemoActions) -> Self {
         Self {
             level_seed,
+            level_file: None,
             actions: match actions {
                 DemoActions::Discrete(_) => EpisodeActions::Discrete(Vec::new()),
                 DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values: Vec::new() },

@@ -4,8 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use super::error::DemoFault;
 
-/// Format written by this version of the crate, and the newest one it reads.
-pub const DEMO_FORMAT: u32 = 1;
+/// Newest format that this version of the crate reads and writes.
+pub const DEMO_FORMAT: u32 = LEVEL_FILES_FORMAT;
+/// Format of recordings that name no level files. Written wherever it will do, since older programs read it too.
+const PLAIN_FORMAT: u32 = 1;
+/// First format in which every episode says which level file it was played on.
+pub(super) const LEVEL_FILES_FORMAT: u32 = 2;
 
 /// The kind and number of actions of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,7 +42,7 @@ impl std::fmt::Display for DemoActions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DemoHeader {
-    /// Format of the file, see [`DEMO_FORMAT`].
+    /// Format of the file: 1, or 2 where levels are files.
     pub format: u32,
     /// Name of the game.
     pub game: String,
@@ -62,10 +66,10 @@ pub struct DemoHeader {
 }
 
 impl DemoHeader {
-    /// A header in the current format, without observations, noise or a note.
+    /// A header in the oldest format that will do, without observations, noise or a note.
     pub fn new(game: &str, game_version: u32, mode: &str, tick_hz: f64, actions: DemoActions) -> Self {
         Self {
-            format: DEMO_FORMAT,
+            format: PLAIN_FORMAT,
             game: game.to_owned(),
             game_version,
             mode: mode.to_owned(),
@@ -76,6 +80,13 @@ impl DemoHeader {
             action_noise: 0.0,
             note: String::new(),
         }
+    }
+
+    /// The same for a recording of levels that are files, which the episodes name.
+    // For playbot_lab; games need none of it.
+    #[doc(hidden)]
+    pub fn with_level_files(self) -> Self {
+        Self { format: LEVEL_FILES_FORMAT, ..self }
     }
 
     /// Checks the values.

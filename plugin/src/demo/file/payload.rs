@@ -12,6 +12,7 @@
 //! | deciders | list of `u8`: 0 human, 1 bot, 2 policy, 3 replay, 4 idle |
 //! | observation width | `u32` |
 //! | observations | `steps` × width × `f32` |
+//! | level file | from format 2 on: `u32` bytes of its path, 0 for none; the path in UTF-8; the level's hash, `u64` |
 //!
 //! All numbers are little-endian. A list is one byte and then either the plain values (byte 0) or runs
 //! of a count (seven bits a byte, lowest first) and a value (byte 1), whichever is shorter.
@@ -20,7 +21,8 @@
 use super::bytes::{Cursor, malformed, put_list, put_plain};
 use super::episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions};
 use super::episode_fault::EpisodeFault;
-use super::header::{DemoActions, DemoHeader};
+use super::header::{DemoActions, DemoHeader, LEVEL_FILES_FORMAT};
+use crate::level_files::LevelFile;
 
 /// Appends the episode to `out`, after [`DemoEpisode::check`] against the header.
 pub(super) fn encode(episode: &DemoEpisode, header: &DemoHeader, out: &mut Vec<u8>) -> Result<(), EpisodeFault> {
@@ -56,7 +58,39 @@ pub(super) fn encode(episode: &DemoEpisode, header: &DemoHeader, out: &mut Vec<u
     put_list(&episode.deciders.iter().map(|&d| decider_code(d)).collect::<Vec<_>>(), out);
     put_plain(&[header.observation_names.len() as u32], out);
     put_plain(&episode.observations, out);
+    put_level_file(episode.level_file.as_ref(), header, out)
+}
+
+fn put_level_file(file: Option<&LevelFile>, header: &DemoHeader, out: &mut Vec<u8>) -> Result<(), EpisodeFault> {
+    match (file, header.format < LEVEL_FILES_FORMAT) {
+        (None, true) => {}
+        (Some(file), true) => {
+            let (path, format) = (&file.path, header.format);
+            return Err(malformed(format!("level {path} is a file, which recordings in format {format} cannot name")));
+        }
+        (None, false) => put_plain(&[0u32], out),
+        (Some(LevelFile { path, hash }), false) => {
+            let length = u32::try_from(path.len()).ok().filter(|&length| length > 0);
+            put_plain(&[length.ok_or_else(|| malformed("the path of the level file is empty or endless"))?], out);
+            out.extend_from_slice(path.as_bytes());
+            put_plain(&[*hash], out);
+        }
+    }
     Ok(())
+}
+
+fn level_file(cursor: &mut Cursor, header: &DemoHeader) -> Result<Option<LevelFile>, EpisodeFault> {
+    if header.format < LEVEL_FILES_FORMAT {
+        return Ok(None);
+    }
+    let what = "the level file";
+    let length = cursor.scalar::<u32>(what)? as usize;
+    if length == 0 {
+        return Ok(None);
+    }
+    let path = String::from_utf8(cursor.plain(length, what)?);
+    let path = path.map_err(|_| malformed("the path of the level file is not text"))?;
+    Ok(Some(LevelFile { path, hash: cursor.scalar(what)? }))
 }
 
 /// Reads an episode and checks it against the header.
@@ -88,10 +122,11 @@ pub(super) fn decode(payload: &[u8], header: &DemoHeader) -> Result<DemoEpisode,
     let width = cursor.scalar::<u32>("the observation width")? as usize;
     let count = steps.checked_mul(width).ok_or_else(|| malformed("too many observation values"))?;
     let observations = cursor.plain(count, "observation values")?;
+    let level_file = level_file(&mut cursor, header)?;
     if !cursor.0.is_empty() {
         return Err(malformed(format!("{} bytes after the last field", cursor.0.len())));
     }
-    let episode = DemoEpisode { level_seed, actions, rewards, state_hashes, deciders, end, observations };
+    let episode = DemoEpisode { level_seed, level_file, actions, rewards, state_hashes, deciders, end, observations };
     episode.check(header)?;
     Ok(episode)
 }
@@ -125,4 +160,44 @@ fn decider(code: u8) -> Result<Decider, EpisodeFault> {
         4 => Decider::Idle,
         other => return Err(malformed(format!("unknown decider {other}"))),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{episode, header};
+    use super::*;
+
+    fn coded(episode: &DemoEpisode, header: &DemoHeader) -> Result<Vec<u8>, EpisodeFault> {
+        let mut bytes = Vec::new();
+        encode(episode, header, &mut bytes).map(|()| bytes)
+    }
+
+    #[test]
+    fn level_files_are_kept_from_format_2_on_and_cost_older_recordings_nothing() {
+        let plain = episode(3, 5);
+        let file = LevelFile { path: "levels/höhle.json".to_owned(), hash: u64::MAX - 1 };
+        let drawn = DemoEpisode { level_file: Some(file), ..plain.clone() };
+        let with_files = header().with_level_files();
+        for episode in [&plain, &drawn] {
+            let bytes = coded(episode, &with_files).expect("writable");
+            assert_eq!(decode(&bytes, &with_files).as_ref(), Ok(episode));
+        }
+        let bytes = coded(&plain, &header()).expect("writable");
+        assert_eq!(coded(&plain, &with_files).expect("writable").len(), bytes.len() + 4);
+        assert_eq!(decode(&bytes, &header()), Ok(plain));
+        let refused = coded(&drawn, &header()).expect_err("format 1").to_string();
+        assert!(refused.contains("levels/höhle.json") && refused.contains("format 1"), "{refused}");
+    }
+
+    #[test]
+    fn a_level_file_that_is_cut_off_or_no_text_is_malformed() {
+        let with_files = header().with_level_files();
+        let file = LevelFile { path: "ab".to_owned(), hash: 7 };
+        let bytes = coded(&DemoEpisode { level_file: Some(file), ..episode(3, 2) }, &with_files).expect("writable");
+        assert!(decode(&bytes[..bytes.len() - 1], &with_files).is_err());
+        let mut bad = bytes.clone();
+        let path = bytes.len() - 10;
+        bad[path] = 0xff;
+        assert!(decode(&bad, &with_files).expect_err("no text").to_string().contains("not text"));
+    }
 }

@@ -242,7 +242,7 @@ prop_compose! {
             DemoActions::Discrete(_) => EpisodeActions::Discrete(discrete),
             DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values },
         };
-        DemoEpisode { level_seed, actions, rewards, state_hashes, deciders, end, observations }
+        DemoEpisode { level_seed, level_file: None, actions, rewards, state_hashes, deciders, end, observations }
     }
 }
 

@@ -1,0 +1,46 @@
+//! Where the levels of a mode come from: a seed, or a file that somebody drew.
+
+use std::sync::Arc;
+
+use bevy::{ecs::system::SystemParam, prelude::*};
+use playbot_lab::{
+    game::Game,
+    level_files::{LevelDesigns, is_level_files},
+};
+
+use super::{
+    components::AntMazeRules,
+    level::{AntMazeLevel, generate},
+    mode::AntMazeMode,
+};
+use crate::maze::MazeModeError;
+
+/// The levels of a World.
+#[derive(SystemParam)]
+pub(super) struct Levels<'w> {
+    rules: Res<'w, AntMazeRules>,
+    designs: Option<Res<'w, LevelDesigns>>,
+}
+
+impl Levels<'_> {
+    /// A level, or in words why there is none.
+    pub fn get(&self, level: u64) -> Result<Arc<AntMazeLevel>, String> {
+        match &self.designs {
+            Some(designs) => designs.get(level),
+            None => generated(&self.rules.0, level),
+        }
+    }
+}
+
+/// A level of a mode that has been checked, or in words why there is none.
+pub(super) fn level_of(game: &dyn Game, mode: &str, level: u64) -> Result<Arc<AntMazeLevel>, String> {
+    if is_level_files(mode) {
+        let designs = LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text));
+        return designs.map_err(|error| error.to_string())?.get(level);
+    }
+    generated(&mode.parse().map_err(|error: MazeModeError| error.to_string())?, level)
+}
+
+fn generated(mode: &AntMazeMode, level: u64) -> Result<Arc<AntMazeLevel>, String> {
+    generate(mode, level).map(Arc::new).map_err(|error| error.to_string())
+}

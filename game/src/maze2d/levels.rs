@@ -1,0 +1,48 @@
+//! Where the levels of a mode come from: a seed, or a file that somebody drew.
+
+use std::sync::Arc;
+
+use bevy::{ecs::system::SystemParam, prelude::*};
+use playbot_lab::{
+    game::Game,
+    level_files::{LevelDesigns, is_level_files},
+};
+
+use super::{components::Maze2dRules, level::Maze2dLevel, level_text::DrawnLevel, mode::Maze2dMode};
+use crate::maze::MazeModeError;
+
+/// The levels of a World, each with its rules.
+#[derive(SystemParam)]
+pub(super) struct Levels<'w> {
+    rules: Res<'w, Maze2dRules>,
+    designs: Option<Res<'w, LevelDesigns>>,
+}
+
+impl Levels<'_> {
+    /// A level and its rules, or in words why there is none.
+    pub fn get(&self, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dMode), String> {
+        match &self.designs {
+            Some(designs) => drawn(designs, level),
+            None => generated(self.rules.0.clone(), level),
+        }
+    }
+}
+
+/// A level of a mode that has been checked, and its rules, or in words why there is none.
+pub(super) fn level_of(game: &dyn Game, mode: &str, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dMode), String> {
+    if is_level_files(mode) {
+        let designs = LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text));
+        return drawn(&designs.map_err(|error| error.to_string())?, level);
+    }
+    generated(mode.parse().map_err(|error: MazeModeError| error.to_string())?, level)
+}
+
+pub(super) fn drawn(designs: &LevelDesigns, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dMode), String> {
+    let drawn = designs.get::<DrawnLevel>(level)?;
+    Ok((Arc::new(drawn.level.clone()), drawn.rules.clone()))
+}
+
+fn generated(rules: Maze2dMode, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dMode), String> {
+    let level = Maze2dLevel::new(&rules, level).map_err(|error| error.to_string())?;
+    Ok((Arc::new(level), rules))
+}

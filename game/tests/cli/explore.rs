@@ -1,0 +1,73 @@
+//! Exploring a level from the shell.
+
+use std::fs;
+
+use crate::program::{code, done, ended, errors, json_lines, playbot};
+
+const MAZE: [&str; 6] = ["explore", "maze2d", "--level", "random+size=7x7:3", "--steps", "1000000"];
+
+#[test]
+fn a_maze_is_covered_and_its_solution_recorded_and_drawn() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let files = ["--out", "new/way.demo", "--png", "new/way.png", "--json"];
+    let (out, _) = done(folder, &[&MAZE[..], &files, &["--threads", "2"]].concat());
+    let found = json_lines(&out).remove(0);
+    assert_eq!((found["coverage"].as_f64(), found["stop"].as_str()), (Some(1.0), Some("covered")), "{found}");
+    assert!(found["open_cells"].as_u64().is_some_and(|open| open >= 17), "{found}");
+    let ticks = found["solution_ticks"].as_u64().expect("a goal in reach");
+    let shown = json_lines(&done(folder, &["demo", "show", "new/way.demo", "--json"]).0);
+    assert_eq!((shown.len(), shown[0]["level"].as_u64()), (1, Some(3)));
+    assert_eq!(shown[0]["steps"].as_u64(), Some(ticks), "{}", shown[0]);
+    done(folder, &["demo", "verify", "new/way.demo"]);
+    let png = fs::read(folder.join("new/way.png")).expect("drawn");
+    assert!(png.starts_with(b"\x89PNG"));
+    let left: Vec<_> = fs::read_dir(folder.join("new")).expect("a folder").collect();
+    assert_eq!(left.len(), 2, "nothing else is left there: {left:?}");
+
+    let (again, _) = done(folder, &[&MAZE[..], &["--json", "--threads", "1"]].concat());
+    assert_eq!(again, out, "threads change nothing");
+    let taken = playbot(folder, &[&MAZE[..], &files].concat());
+    assert_eq!(code(&taken), 3);
+    assert!(errors(&taken).contains("--force"), "{}", errors(&taken));
+    done(folder, &[&MAZE[..], &["--out", "new/way.demo", "--force"]].concat());
+}
+
+#[test]
+fn a_goal_that_is_not_found_is_a_finding() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let args = ["explore", "coinrun", "--level", "hard:0", "--steps", "1", "--out", "none.demo"];
+    let (out, told) = ended(folder, &args, 1);
+    assert!(out.contains("solution  none was found") && out.contains("coinrun hard:0"), "{out}");
+    assert!(told.contains("nothing is recorded: no solution was found"), "{told}");
+    assert!(!folder.join("none.demo").exists());
+}
+
+#[test]
+fn mistakes_are_told_before_anything_is_explored() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    for (args, words) in [
+        (&["maze2d", "--level", "medum:1"][..], "did you mean `medium`?"),
+        (&["coinrun", "--level", "hard:0..3"], "one at a time is explored, such as hard:0"),
+        (&["coinrun", "--level", "hard"], "is not a range of levels"),
+        (&["coinrun", "--sticky", "2"], "it lies between 0 and 1"),
+        (&["coinrun", "--cell-size", "0"], "the size of a cell is 0"),
+        (&["coinrun", "--steps", "0"], "--steps"),
+        (&["coinrun", "--until", "solvd"], "did you mean `solved`?"),
+        (&["coinrun", "--skills", "s", "--policy", "p"], "cannot be used with"),
+        (&["coinrun", "--policy", "none.policy"], "`playbot policy export --run RUN --out none.policy`"),
+        (&["coinrun", "--png", "x.svg"], "written as .png"),
+        (&["ant", "--level", "chase:0", "--png", "x.png"], "has no floor plan of level chase:0"),
+        (&["coinrun", "--force"], "--out <FILE>"),
+        (&["coinrun", "--cell", "a", "--out", "a.demo"], "`a` is no cell"),
+        (&["coinrn"], "did you mean `coinrun`?"),
+    ] {
+        let output = playbot(folder, &[&["explore"], args].concat());
+        assert_eq!(code(&output), 3, "{args:?}: {}", errors(&output));
+        assert!(errors(&output).contains(words), "{args:?}: {}", errors(&output));
+        assert!(output.stdout.is_empty(), "{args:?}");
+    }
+    assert_eq!(fs::read_dir(folder).expect("a folder").count(), 0, "nothing is left behind");
+}

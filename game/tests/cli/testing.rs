@@ -1,0 +1,203 @@
+//! Verdicts about levels.
+
+use std::{fs, path::Path, process::Output};
+
+use serde_json::Value;
+
+use crate::program::{code, done, ended, errors, lines, playbot};
+
+const FILES: [&str; 3] = ["results.json", "junit.xml", "summary.md"];
+
+fn test(folder: &Path, out: &str, rest: &[&str]) -> Output {
+    playbot(folder, &[&["test", "coinrun", "--out", out], rest].concat())
+}
+
+fn read(folder: &Path, file: &str) -> String {
+    fs::read_to_string(folder.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
+fn results(folder: &Path, out: &str) -> Value {
+    serde_json::from_str(&read(folder, &format!("{out}/results.json"))).expect("JSON")
+}
+
+/// Checks that two folders hold the same results and reports.
+fn assert_same(folder: &Path, one: &str, other: &str) {
+    for file in FILES {
+        assert!(read(folder, &format!("{one}/{file}")) == read(folder, &format!("{other}/{file}")), "{other}/{file}");
+    }
+}
+
+#[test]
+fn the_demonstrator_solves_levels_that_a_blind_bot_does_not() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let levels = ["--levels", "hard:0..9"];
+    let output = test(folder, "search", &levels);
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let found = results(folder, "search");
+    assert_eq!((found["game"].as_str(), found["testers"][0]["name"].as_str()), (Some("coinrun"), Some("search")));
+    let rows = found["levels"].as_array().expect("levels");
+    assert_eq!(rows.len(), 10);
+    for (index, row) in rows.iter().enumerate() {
+        assert_eq!(row["level"], format!("hard:{index}"));
+        assert_eq!((row["outcome"].as_str(), row["solved"].as_u64()), (Some("solved"), Some(1)), "{row}");
+        assert!(row["ticks"]["median"].as_f64().is_some_and(|ticks| ticks > 10.0), "{row}");
+        assert_eq!(row["testers"][0]["exact"], true, "{row}");
+    }
+    let output = test(folder, "blind", &[&levels[..], &["--bot", "right-jump,random", "--json"]].concat());
+    assert_eq!(code(&output), 1, "{}", errors(&output));
+    let rows = lines(&output);
+    assert_eq!(rows, *results(folder, "blind")["levels"].as_array().expect("levels"));
+    let failed: Vec<&Value> = rows.iter().filter(|row| row["outcome"] == "bot-failed").collect();
+    assert!((1..10).contains(&failed.len()), "{rows:?}");
+    let ends = |row: &Value| {
+        let counts = row["ends"].as_array().expect("ends").iter();
+        counts.map(|end| end["lost"].as_u64().unwrap_or(0) + end["timed_out"].as_u64().unwrap_or(0)).sum::<u64>()
+    };
+    assert!(failed.iter().all(|row| ends(row) == 2 && row["proof"] == "unknown"), "{failed:?}");
+    assert!(rows.iter().all(|row| row["testers"][0]["exact"] == true && row["testers"][1]["exact"] == false));
+    let junit = read(folder, "blind/junit.xml");
+    assert!(
+        junit.contains(&format!("failures=\"{}\"", failed.len())) && junit.contains("playbot test coinrun"),
+        "{junit}"
+    );
+    assert!(read(folder, "blind/summary.md").contains("| random |"));
+}
+
+#[test]
+fn threads_shards_and_a_kill_change_no_byte() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let plan = ["--levels", "easy:3..16", "--bot", "random,search", "--episodes", "3", "--seed", "5"];
+    let run = |out: &str, rest: &[&str]| {
+        let output = test(folder, out, &[&plan[..], rest].concat());
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+    };
+    run("whole", &["--threads", "1"]);
+    run("two", &["--threads", "2"]);
+    assert_same(folder, "whole", "two");
+    for count in [1, 2, 7] {
+        let shards: Vec<String> = (0..count).map(|index| format!("{index}/{count}")).collect();
+        let outs: Vec<String> = shards.iter().map(|shard| shard.replace('/', "-of-")).collect();
+        for (shard, out) in shards.iter().zip(&outs) {
+            run(out, &["--shard", shard]);
+        }
+        let joined = format!("joined-{count}");
+        let outs = outs.iter().rev().map(String::as_str);
+        let merge: Vec<&str> = ["report", "merge"].into_iter().chain(outs).chain(["--out", &joined]).collect();
+        done(folder, &merge);
+        assert_same(folder, "whole", &joined);
+    }
+    // What a kill leaves: some levels, half a line, no results.
+    fs::create_dir(folder.join("killed")).expect("writable");
+    let journal = read(folder, "whole/levels.jsonl");
+    let torn: String = journal.lines().take(5).map(|line| format!("{line}\n")).chain(["{\"level\":".into()]).collect();
+    fs::write(folder.join("killed/levels.jsonl"), torn).expect("writable");
+    fs::copy(folder.join("whole/test.json"), folder.join("killed/test.json")).expect("writable");
+    let output = test(folder, "killed", &[&plan[..], &["--resume"]].concat());
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    assert!(errors(&output).contains("the last 9 bytes are no whole level"), "{}", errors(&output));
+    assert_same(folder, "whole", "killed");
+    let other = test(folder, "killed", &["--levels", "easy:3..16", "--bot", "random", "--resume"]);
+    assert_eq!(code(&other), 3);
+    for words in ["killed holds another test", "seeds 5 and 0", "testers random + search and random"] {
+        assert!(errors(&other).contains(words), "{}", errors(&other));
+    }
+    assert!(errors(&test(folder, "whole", &plan)).contains("--resume"), "results are not overwritten");
+}
+
+#[test]
+fn what_cannot_be_tested_is_an_error_and_never_a_pass() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let said = |rest: &[&str]| {
+        let output = test(folder, "out", rest);
+        assert_eq!(code(&output), 3, "{rest:?}: {}", errors(&output));
+        errors(&output)
+    };
+    for (rest, words) in [
+        (&["--levels", "hard:9..3"][..], "hard:3..9"),
+        (&["--levels", "hard:0..2", "--shard", "3/7"], "shard 3/7 has no level"),
+        (&["--levels", "hard:0..2", "--shard", "7/7"], "the last one is 6/7"),
+        (&["--levels", "hurd:0..2"], "hard"),
+        (&["--levels", "hard:0..2", "--bot", "seach"], "search"),
+        (&["--levels", "hard:0..2", "--bot", "search,search"], "two testers are called `search`"),
+        (&["--levels", "hard:0..2", "--policy", "none.policy"], "none.policy"),
+        (&["--levels", "hard:0..2", "--against", "none"], "none has no results.json"),
+        (&["--levels", "hard:0..2", "--episodes", "0"], "at least 1"),
+    ] {
+        let found = said(rest);
+        assert!(found.contains(words), "{rest:?}: {found}");
+    }
+    assert!(!folder.join("out/results.json").exists());
+    let merge = ["report", "merge", "none", "--out", "joined"];
+    let (_, words) = ended(folder, &merge, 3);
+    assert!(words.contains("none has no results.json"), "{words}");
+}
+
+#[test]
+fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_alarm() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let plan = ["--levels", "hard:0..29", "--bot", "search,random", "--episodes", "2"];
+    let run = |out: &str, rest: &[&str], wanted: i32| {
+        let output = test(folder, out, &[&plan[..], rest].concat());
+        assert_eq!(code(&output), wanted, "{}", errors(&output));
+        errors(&output)
+    };
+    run("before", &["--seed", "1"], 0);
+    let words = run("same", &["--seed", "2", "--against", "before"], 0);
+    assert!(words.contains("nothing has changed by more than chance in 30 levels"), "{words}");
+    // Earlier results in which level 7 was not solved by the one that leaves nothing to chance, and level 3 was proved
+    // unsolvable.
+    let before = read(folder, "before/results.json");
+    let changed: Vec<String> = before.lines().map(|line| changed(line, "7", "3")).collect();
+    fs::create_dir(folder.join("other")).expect("writable");
+    fs::write(folder.join("other/results.json"), changed.join("\n") + "\n").expect("writable");
+    let words = run("easier", &["--against", "other"], 0);
+    assert!(words.contains("easier: hard:7: solved 0 of 2, now 2 of 2 (search,"), "{words}");
+    assert!(words.contains("easier: hard:3: ") && words.contains("no longer proved unsolvable"), "{words}");
+    let against: Value = serde_json::from_str(&read(folder, "easier/against.json")).expect("JSON");
+    assert_eq!(against["easier"].as_array().map(Vec::len), Some(2));
+    assert!(read(folder, "easier/summary.md").contains("Easier (2)"));
+    fs::write(folder.join("other/results.json"), before.replace("\"game_version\":1", "\"game_version\":0"))
+        .expect("writable");
+    let words = run("refused", &["--against", "other"], 3);
+    assert!(words.contains("other cannot be compared with: versions 0 and 1 of `coinrun`"), "{words}");
+    assert!(run("before", &["--against", "before", "--force"], 3).contains("cannot be compared with themselves"));
+}
+
+/// A line of results in which `search` failed on one level, and another level was proved unsolvable.
+fn changed(line: &str, failed: &str, unsolvable: &str) -> String {
+    let is_level = |number: &str| line.contains(&format!("\"level\":\"hard:{number}\""));
+    if !is_level(failed) && !is_level(unsolvable) {
+        return line.to_owned();
+    }
+    let comma = if line.ends_with(',') { "," } else { "" };
+    let mut level: Value = serde_json::from_str(line.trim_end_matches(',')).expect("a level");
+    if is_level(failed) {
+        level["testers"][0]["solved"] = 0.into();
+    } else {
+        level["proof"] = serde_json::json!({ "unsolvable": { "why": "walled in" } });
+    }
+    format!("{level}{comma}")
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_finished_outlives_a_full_disk() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let plan = "test coinrun --levels easy:0..63 --bot random --out out";
+    // Eight blocks of 512 bytes hold a few levels.
+    let output = crate::program::on_full_disk(folder, 8, plan);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
+    assert!(errors(&output).contains("--resume"), "{}", errors(&output));
+    let kept = read(folder, "out/levels.jsonl");
+    assert!(kept.lines().count() > 1 && kept.ends_with('\n'), "{kept}");
+    assert!(kept.lines().all(|line| serde_json::from_str::<Value>(line).is_ok()), "{kept}");
+    let words: Vec<&str> = plan.split(' ').collect();
+    let resumed = playbot(folder, &[&words[..], &["--resume"]].concat());
+    assert!([0, 1].contains(&code(&resumed)), "{}", errors(&resumed));
+    assert_eq!(results(folder, "out")["levels"].as_array().map(Vec::len), Some(64));
+}

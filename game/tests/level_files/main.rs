@@ -1,0 +1,9 @@
+//! Levels that are files: what games read, and what the program does with them.
+
+mod errors;
+mod held_out;
+#[path = "../shared/program.rs"]
+mod program;
+mod recordings;
+mod round_trip;
+mod verbs;

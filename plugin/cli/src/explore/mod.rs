@@ -1,0 +1,9 @@
+//! `playbot explore`.
+
+mod chart;
+mod failed;
+mod recorded;
+mod talents;
+mod verb;
+
+pub use verb::{Args, run};

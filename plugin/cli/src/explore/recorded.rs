@@ -1,0 +1,78 @@
+//! A way that was found, as a recording.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bevy_playbot::demo::file::DemoWriter;
+use playbot_lab::{
+    demo::verify::verify_file,
+    explore::{Exploration, Route, record_route},
+    game::Game,
+};
+
+use crate::{
+    error::CliError,
+    output::{beside, prepare},
+};
+
+/// A file for a recording, looked at before the work whose result it is to hold.
+pub struct RecordingFile(PathBuf);
+
+impl RecordingFile {
+    /// A file that may be written.
+    ///
+    /// # Errors
+    ///
+    /// It exists and nobody said that it may be overwritten, or nothing can be written there.
+    pub fn new(path: &Path, force: bool) -> Result<Self, CliError> {
+        if path.is_file() && !force {
+            return Err(CliError::Usage(format!(
+                "{} exists: name another file, or overwrite it with --force",
+                path.display()
+            )));
+        }
+        prepare(path)?;
+        Ok(Self(path.to_owned()))
+    }
+
+    /// Plays a way under the recorder, replays what was recorded, and puts it in its place if it is the same.
+    ///
+    /// # Errors
+    ///
+    /// The game breaks its contract or does not replay, or the disk fails. What was there before stays.
+    pub fn write(&self, game: &dyn Game, exploration: &Exploration, route: &Route) -> Result<(), CliError> {
+        let fresh = beside(&self.0, ".fresh");
+        let written = self.record(game, exploration, route, &fresh);
+        if written.is_err() {
+            // It is of no use, and the error says why.
+            let _ = fs::remove_file(&fresh);
+        }
+        written
+    }
+
+    fn record(&self, game: &dyn Game, exploration: &Exploration, route: &Route, fresh: &Path) -> Result<(), CliError> {
+        let (mode, level, path) = (exploration.mode.as_str(), exploration.level, self.0.display());
+        let mut header = game.demo_header(mode);
+        header.demonstrator = "explorer".to_owned();
+        header.note = format!("found by {} with seed {}", exploration.explorer, exploration.seed);
+        record_route(game, mode, level, &route.actions, DemoWriter::replace(fresh, header)?)?;
+        let report = verify_file(game, fresh, |_| {})?;
+        if report.episodes != 1 || report.ticks != route.len() as u64 {
+            return Err(CliError::Io(format!(
+                "{path}: the way that was found has {} ticks, and only {} of them could be played again",
+                route.len(),
+                report.ticks
+            )));
+        }
+        if let Some((_, divergence)) = report.divergences.first() {
+            return Err(CliError::Io(format!(
+                "{path}: the way that was found does not replay ({divergence}): `playbot doctor {} --mode {mode} --seed \
+                 {level}` names what differs",
+                game.name()
+            )));
+        }
+        fs::rename(fresh, &self.0).map_err(|error| CliError::Io(format!("cannot write {path}: {error}")))
+    }
+}

@@ -1,0 +1,54 @@
+//! Who explores, as the command line names it.
+
+use std::path::Path;
+
+use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
+use playbot_lab::{eval::Player, explore::Explorer, game::Game, games::Games};
+use playbot_learner::{DeviceKind, ScoreConfig, SkillDraw, SkillModel, SkillSource};
+
+use crate::{
+    cloning::check_skills, defaults::usual_experiment, error::CliError, experiment::ExperimentArgs, player::Chosen,
+};
+
+/// An explorer, and what it sees.
+pub struct Talents {
+    pub explorer: Explorer,
+    pub observation_config: ObservationConfig,
+}
+
+impl Talents {
+    /// Random actions.
+    pub fn none() -> Self {
+        Self { explorer: Explorer::Random, observation_config: ObservationConfig::default() }
+    }
+
+    /// Skills of a model, drawn from its prior and held as long as the game's experiment says.
+    ///
+    /// # Errors
+    ///
+    /// The model cannot be read, or was learned for another game.
+    pub fn skills(path: &Path, game: &dyn Game, games: &Games, device: DeviceKind) -> Result<Self, CliError> {
+        let model = SkillModel::load(path, device)?;
+        // The game is named, so that nobody is told to name an experiment.
+        let named = ExperimentArgs { experiment: None, set: vec![format!("game={}", game.name())] };
+        let observation_config = check_skills(path, &model, game, &named, games)?;
+        let horizon = usual_experiment(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
+        let source = SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw: SkillDraw::Sample };
+        Ok(Self { explorer: Explorer::skills(SkillPrior::from(&source), source.decoder), observation_config })
+    }
+
+    /// The policy of a file, whose actions are drawn.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn policy(path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Self, CliError> {
+        let chosen = Chosen::policy_file(game, path, ActionDraw::Sample, device)?;
+        chosen.check_fit(game)?;
+        let explorer = match chosen.player {
+            Player::Policy { policy, prior, draw } => Explorer::Policy { policy, prior, draw },
+            Player::Blind(_) | Player::Demonstrator => Explorer::Random,
+        };
+        Ok(Self { explorer, observation_config: chosen.observation_config })
+    }
+}

@@ -1,0 +1,216 @@
+//! The verb.
+
+use std::{ops::ControlFlow, path::PathBuf};
+
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{
+    explore::{Cell, Exploration, ExplorePlan, Explorer, Route, Stop, Until, explore},
+    game::Game,
+    games::Games,
+    split::LevelSplit,
+};
+
+use super::{chart::chart, recorded::RecordingFile, talents::Talents};
+use crate::{
+    compute::Compute,
+    defaults::first_levels,
+    error::{CliError, Outcome, print_line},
+    interrupt, output,
+    plot::PlotFile,
+    progress,
+};
+
+/// Find out what can be reached in a level, and how, without training.
+///
+/// That is Go-Explore (Ecoffet et al. 2021): cells that were seldom seen are returned to by the same actions, and explored
+/// from. Cells are squares of the level where the game says where agents are, else observations that are alike. With skills
+/// or a policy these explore instead of random actions. A game that does not play the same by the same actions is told so at
+/// the first tick that differs.
+///
+/// Exit code 1 if the level has a goal and no way to it was found.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot explore GAME
+  playbot explore GAME --level MODE:7 --steps 1000000 --png reached.png
+  playbot explore GAME --level MODE:7 --until solved --out solution.demo
+  playbot explore GAME --level MODE:7 --skills skills.safetensors --json
+  playbot explore GAME --level MODE:7 --until spent --cell 3,4 --out there.demo")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Level, as mode:number; level 0 of the mode that `train` trains in if none is named.
+    #[arg(long, value_name = "MODE:N")]
+    level: Option<LevelSplit>,
+    /// Environment steps to use, ways back included. The last visits may take some more.
+    #[arg(long, default_value_t = 200_000, value_parser = clap::value_parser!(u64).range(1..))]
+    steps: u64,
+    /// End sooner: solved (a way to the goal is found), covered (and every open cell is reached, where their number is known),
+    /// or spent (never, so that shorter ways are found).
+    #[arg(long, default_value_t, value_name = "WHEN")]
+    until: Until,
+    /// Skill model: explores with skills drawn from its prior.
+    #[arg(long, value_name = "FILE", group = "explorer")]
+    skills: Option<PathBuf>,
+    /// Policy file, as written by `playbot policy export`: explores with the policy.
+    #[arg(long, value_name = "FILE", group = "explorer")]
+    policy: Option<PathBuf>,
+    /// Ticks that a visit explores without finding anything new before it ends.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+    explore_ticks: u32,
+    /// Probability with which a random action is repeated in the next tick.
+    #[arg(long, default_value_t = 0.95)]
+    sticky: f64,
+    /// Side of a cell, in the units of the level, instead of one tile; for cells of observations, the step to which values
+    /// are rounded, instead of 1/8.
+    #[arg(long, value_name = "LENGTH")]
+    cell_size: Option<f32>,
+    /// Visits between two updates of what is known.
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    batch: u32,
+    /// Seed of all that is drawn.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    compute: Compute,
+    /// Record the shortest solution, or the way to --cell, into this .demo, once it has been replayed.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Record and draw the way to this cell instead of the solution; cells are called by their numbers, such as 3,4.
+    #[arg(long, value_name = "CELL", allow_hyphen_values = true)]
+    cell: Option<Cell>,
+    /// Overwrite a recording that exists.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Draw the cells that were reached, and how often, on the floor plan of the level.
+    #[arg(long, value_name = "FILE", value_parser = output::png)]
+    png: Option<PathBuf>,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let split = level(game, args.level.as_ref())?;
+    split.check(game)?;
+    let device = args.compute.device();
+    let Talents { explorer, observation_config } = match (&args.skills, &args.policy) {
+        (Some(path), _) => Talents::skills(path, game, games, device)?,
+        (None, Some(path)) => Talents::policy(path, game, device)?,
+        (None, None) => Talents::none(),
+    };
+    let plan = plan(&args, &split, explorer, observation_config);
+    plan.check(game)?;
+    let recording = args.out.as_deref().map(|path| RecordingFile::new(path, args.force)).transpose()?;
+    let floor = match &args.png {
+        None => None,
+        Some(path) => {
+            let missing = || {
+                CliError::Usage(format!(
+                    "`{}` has no floor plan of level {}: leave --png out",
+                    game.name(),
+                    shown(&split)
+                ))
+            };
+            let floor_plan = game.floor_plan(&split.mode, split.first).ok_or_else(missing)?;
+            Some((PlotFile::new(path)?, floor_plan))
+        }
+    };
+    let exploration = search(game, &plan)?;
+    let summary = exploration.summary(game);
+    if args.json {
+        let line = serde_json::to_string(&summary)
+            .map_err(|error| CliError::Io(format!("the summary cannot be written as JSON: {error}")))?;
+        print_line(line)?;
+    } else {
+        print_line(&summary)?;
+    }
+    let way = wanted(&exploration, args.cell.as_ref());
+    // Last: what was found is not lost because it cannot be written.
+    if let Some(recording) = recording {
+        match &way {
+            Some(route) => recording.write(game, &exploration, route)?,
+            None => tell!("nothing is recorded: {}", why_nothing(args.cell.as_ref())),
+        }
+    }
+    if let Some((file, floor_plan)) = floor {
+        file.write(&chart(game, floor_plan, &exploration, way.as_ref())?.draw())?;
+    }
+    Ok(match (exploration.stop, exploration.solution_ticks()) {
+        (Stop::Asked, _) => Outcome::Stopped,
+        (_, None) if exploration.has_goal => Outcome::Findings,
+        _ => Outcome::Pass,
+    })
+}
+
+/// The level that is named, or the first one.
+fn level(game: &dyn Game, named: Option<&LevelSplit>) -> Result<LevelSplit, CliError> {
+    match named {
+        None => {
+            let usual = first_levels(game, 0);
+            tell!("no --level is named: {}", shown(&usual));
+            Ok(usual)
+        }
+        Some(split) if split.len() == 1 => Ok(split.clone()),
+        Some(split) => Err(CliError::Usage(format!(
+            "--level is {split}, which are {} levels: one at a time is explored, such as {}:{}",
+            split.len(),
+            split.mode,
+            split.first
+        ))),
+    }
+}
+
+fn shown(split: &LevelSplit) -> String {
+    format!("{}:{}", split.mode, split.first)
+}
+
+fn plan(args: &Args, split: &LevelSplit, explorer: Explorer, observation_config: ObservationConfig) -> ExplorePlan {
+    ExplorePlan {
+        steps: args.steps,
+        until: args.until,
+        explorer,
+        observation_config,
+        explore_ticks: args.explore_ticks,
+        sticky: args.sticky,
+        cell_size: args.cell_size,
+        batch: args.batch,
+        seed: args.seed,
+        threads: args.compute.threads(),
+        ..ExplorePlan::new(split.mode.clone(), split.first)
+    }
+}
+
+/// Explores, with a bar, until it is done or somebody presses Ctrl-C.
+fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> {
+    interrupt::listen();
+    let bar = progress::bar("explore", plan.steps, "steps");
+    let explored = explore(
+        game,
+        plan,
+        |ticks| bar.inc(ticks),
+        |round| {
+            let solved = round.solution.map_or_else(String::new, |ticks| format!(", solved in {ticks} ticks"));
+            bar.set_message(format!("{} cells{solved}", round.cells));
+            if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    );
+    bar.finish_and_clear();
+    Ok(explored?)
+}
+
+/// The way to a cell, or the solution.
+fn wanted(exploration: &Exploration, cell: Option<&Cell>) -> Option<Route> {
+    let way = match cell {
+        Some(cell) => exploration.route_to(cell),
+        None => exploration.solution(),
+    };
+    way.filter(|route| !route.is_empty())
+}
+
+fn why_nothing(cell: Option<&Cell>) -> String {
+    match cell {
+        Some(cell) => format!("cell {cell} was not reached, or the level starts in it"),
+        None => "no solution was found; with --cell the way to a cell is recorded".to_owned(),
+    }
+}

@@ -1,0 +1,6 @@
+//! `playbot report`.
+
+mod merge;
+mod verb;
+
+pub use verb::{Args, run};

@@ -1,0 +1,27 @@
+//! What can be done with results of tests.
+
+use playbot_lab::games::Games;
+
+use super::merge;
+use crate::error::{CliError, Outcome};
+
+/// Work with the results of tests.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot report merge runs/shard-0 runs/shard-1 --out runs/test")]
+pub struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(clap::Subcommand)]
+enum Verb {
+    /// Join the results of all shards of a test.
+    Merge(merge::Args),
+}
+
+pub fn run(args: &Args, _games: &Games) -> Result<Outcome, CliError> {
+    match &args.verb {
+        Verb::Merge(args) => merge::run(args),
+    }
+}

@@ -1,0 +1,142 @@
+//! What is said of results, and the files that go with them.
+
+use std::{fs, path::Path};
+
+use playbot_lab::{
+    report::{PlainTable, readable, whole},
+    verdict::{
+        AGAINST, Comparison, JUNIT, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, Trials, wilson,
+        write_reports,
+    },
+};
+
+use crate::{
+    error::{CliError, Outcome, print_line},
+    number::counted,
+    program,
+};
+
+/// Results, and how they are told.
+pub struct Results<'a> {
+    /// Their folder.
+    pub folder: &'a Path,
+    /// Folder of earlier ones.
+    pub against: Option<&'a Path>,
+    /// Whether to print the levels as JSON instead of tables.
+    pub json: bool,
+}
+
+impl Results<'_> {
+    /// Checks that earlier results are not to be overwritten by those that are compared with them.
+    ///
+    /// # Errors
+    ///
+    /// Both folders are the same.
+    pub fn check_folders(&self) -> Result<(), CliError> {
+        let is_same = |before: &Path| match (fs::canonicalize(before), fs::canonicalize(self.folder)) {
+            (Ok(before), Ok(folder)) => before == folder,
+            _ => before == self.folder,
+        };
+        match self.against {
+            Some(before) if is_same(before) => Err(CliError::Usage(format!(
+                "--against and --out are both {}: results cannot be compared with themselves; choose another --out",
+                before.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Compares results if that is asked for, writes the files that go with them, and prints them. The outcome is what was
+/// found: in the comparison if there is one, else in the results.
+pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
+    let comparison = results.against.map(|before| Comparison::read(before, results.folder)).transpose()?;
+    let overview = write_reports(results.folder, comparison.as_ref(), program::name())?;
+    if results.json {
+        let mut lines = ResultLines::open(results.folder)?;
+        while let Some(line) = lines.next_line()? {
+            print_line(line)?;
+        }
+    } else {
+        print_line(testers(&overview).to_text().trim_end())?;
+        if !overview.worst.is_empty() {
+            print_line(format!("\n{}", worst(&overview).to_text().trim_end()))?;
+        }
+    }
+    tell!("{}", counts(&overview));
+    if let Some(comparison) = &comparison {
+        tell_comparison(comparison);
+    }
+    let names = [RESULTS, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
+    tell!("{}: {}", results.folder.display(), names.collect::<Vec<_>>().join(", "));
+    let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
+    Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+fn counts(overview: &Overview) -> String {
+    format!(
+        "{}: {} solved, {} not solved by any tester, {} proved unsolvable; {}",
+        counted(overview.levels, "level"),
+        overview.solved,
+        overview.bot_failed,
+        overview.proved_unsolvable,
+        counted(overview.findings, "finding")
+    )
+}
+
+fn testers(overview: &Overview) -> PlainTable {
+    let share = |of: Trials| {
+        let [low, high] = wilson(of.successes, of.trials).map(|share| 100.0 * share);
+        format!("{} of {} ({low:.1} to {high:.1} %)", whole(of.successes as f64), whole(of.trials as f64))
+    };
+    let rows =
+        overview.testers.iter().map(|tester| vec![tester.name.clone(), share(tester.levels), share(tester.episodes)]);
+    PlainTable {
+        caption: format!("{} {}", overview.record.game, overview.record.range),
+        columns: ["tester", "levels solved", "episodes solved"].map(str::to_owned).to_vec(),
+        rows: rows.collect(),
+    }
+}
+
+fn worst(overview: &Overview) -> PlainTable {
+    let row = |level: &LevelVerdict| {
+        let score = &level.score;
+        let median = score.ticks.map_or(f64::NAN, |ticks| ticks.median);
+        let finding = level.findings.first().map_or_else(String::new, |finding| finding.detector.clone());
+        vec![
+            level.level.clone(),
+            level.outcome.name().to_owned(),
+            format!("{} of {}", score.solved, score.episodes),
+            readable(median),
+            whole(score.lost as f64),
+            whole(score.timed_out as f64),
+            finding,
+        ]
+    };
+    PlainTable {
+        caption: "levels to look at".to_owned(),
+        columns: ["level", "outcome", "solved", "ticks", "lost", "timed out", "finding"].map(str::to_owned).to_vec(),
+        rows: overview.worst.iter().map(row).collect(),
+    }
+}
+
+fn tell_comparison(comparison: &Comparison) {
+    comparison.left_out.iter().for_each(|why| tell!("left out of the comparison: {why}"));
+    let lists = [
+        ("unsolvable", texts(&comparison.unsolvable)),
+        ("harder", texts(&comparison.harder)),
+        ("easier", texts(&comparison.easier)),
+        ("new finding", texts(&comparison.new_findings)),
+        ("gone finding", texts(&comparison.gone_findings)),
+    ];
+    for (what, changes) in &lists {
+        changes.iter().for_each(|change| tell!("{what}: {change}"));
+    }
+    if lists.iter().all(|(_, changes)| changes.is_empty()) {
+        tell!("nothing has changed by more than chance in {}", counted(comparison.levels, "level"));
+    }
+}
+
+fn texts(changes: &[impl ToString]) -> Vec<String> {
+    changes.iter().map(ToString::to_string).collect()
+}

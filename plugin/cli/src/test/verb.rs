@@ -1,0 +1,145 @@
+//! Tests from the command line to their results.
+
+use std::path::PathBuf;
+
+use playbot_lab::{
+    game::Game,
+    games::Games,
+    split::LevelSplit,
+    verdict::{Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, run_tests},
+};
+
+use super::{
+    testers::TesterArgs,
+    told::{Results, tell_results},
+};
+use crate::{
+    compute::Compute,
+    defaults::{first_levels, usual_held_out},
+    error::{CliError, Outcome},
+    interrupt,
+    number::at_least_one,
+    progress,
+};
+
+/// Test levels: which of them bots and policies solve, and which nobody can.
+///
+/// Each level is solved, or no tester solved it, or it is proved that nobody can; a game that panics or breaks its contract
+/// on a level is a finding of that level, and the others go on. DIR/results.json has every level, with 95 % intervals, and
+/// is the same on any number of threads; DIR/junit.xml is for build servers and DIR/summary.md for a pull request.
+///
+/// Exit code 1 if a level was not solved or something was found; with --against, if a level is solved less often than
+/// before, can no longer be solved, or has a new finding.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot test GAME --levels MODE:0..99 --out runs/test
+  playbot test GAME --levels MODE:0..99 --bot BOT,random --episodes 5 --out runs/test
+  playbot test GAME --levels MODE:0..99 --policy bot.policy --out runs/test --resume
+  playbot test GAME --levels MODE:0..99 --against runs/before --out runs/after
+  playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; the held-out levels of the
+    /// game's experiment if none are named.
+    #[arg(long)]
+    levels: Option<LevelSplit>,
+    #[command(flatten)]
+    testers: TesterArgs,
+    /// Episodes of each tester on each level.
+    #[arg(long, default_value = "1", value_parser = at_least_one)]
+    episodes: usize,
+    /// Seed of the testers' draws.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Test only one part of the levels, as index/count, counted from 0; `playbot report merge` joins the results.
+    #[arg(long, value_name = "INDEX/COUNT")]
+    shard: Option<Shard>,
+    /// Folder of earlier results of the same version of the game: tell what has changed since.
+    #[arg(long, value_name = "DIR")]
+    against: Option<PathBuf>,
+    /// Folder for the results.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Go on with a test that was stopped or killed; begin it if there is none.
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Replace results that are there.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    compute: Compute,
+    /// Print one line of JSON per level instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let plan = plan(args, game)?;
+    let record = plan.record(game);
+    let results = Results { folder: &args.out, against: args.against.as_deref(), json: args.json };
+    results.check_folders()?;
+    if let Some(before) = results.against {
+        Comparison::check(before, &record)?;
+    }
+    let earlier = match (args.resume, args.force) {
+        (true, _) => Earlier::Resume,
+        (false, true) => Earlier::Replace,
+        (false, false) => Earlier::Keep,
+    };
+    let (mut folder, message) = TestFolder::open(&args.out, &record, earlier)?;
+    message.iter().for_each(|message| tell!("warning: {message}"));
+    interrupt::listen();
+    match test(game, &plan, &mut folder)? {
+        TestEnd::Stopped => {
+            tell!(
+                "stopped; {} of {} levels are finished: go on with the same command and --resume",
+                folder.finished().len(),
+                plan.places().len()
+            );
+            Ok(Outcome::Stopped)
+        }
+        TestEnd::Done => {
+            folder.finish()?;
+            tell_results(&results)
+        }
+    }
+}
+
+fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
+    let split = match &args.levels {
+        Some(split) => split.clone(),
+        None => {
+            let usual = usual_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+            tell!("no --levels are named: {usual}");
+            usual
+        }
+    };
+    split.check(game)?;
+    let episodes = u32::try_from(args.episodes)
+        .map_err(|_| CliError::Usage("--episodes has too many digits: choose fewer".to_owned()))?;
+    let plan = TestPlan {
+        split,
+        testers: args.testers.load(game, args.compute.device())?,
+        episodes,
+        seed: args.seed,
+        shard: args.shard,
+        threads: args.compute.threads(),
+    };
+    plan.check()?;
+    Ok(plan)
+}
+
+/// Tests what is not finished, with a progress bar.
+fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder) -> Result<TestEnd, CliError> {
+    let finished = folder.finished();
+    let levels = plan.places().len().saturating_sub(finished.len()) as u64;
+    let total = levels * plan.testers.len() as u64 * u64::from(plan.episodes);
+    let bar = progress::bar(&format!("test {}", game.name()), total, "episodes");
+    let progress = |episodes: u64| bar.inc(episodes);
+    let watch = TestWatch { progress: &progress, stop: &interrupt::asked };
+    let end = run_tests(game, plan, &finished, &mut |verdict: LevelVerdict| folder.keep(&verdict), &watch);
+    bar.finish_and_clear();
+    Ok(end?)
+}

@@ -1,0 +1,54 @@
+//! Who acts where nothing is known yet.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    policy::{ActionDraw, ActivePolicy},
+    skill_prior::SkillPrior,
+};
+use playbot_learner::Policy;
+
+/// Who explores from a cell.
+#[derive(Clone, Default)]
+#[allow(clippy::large_enum_variant, reason = "one per exploration")]
+pub enum Explorer {
+    /// Uniformly random actions, each repeated with the plan's probability: no training, and no knowledge of the game.
+    #[default]
+    Random,
+    /// A policy, with skills if it has any.
+    Policy {
+        /// The policy.
+        policy: Policy,
+        /// Where its skills come from.
+        prior: Option<SkillPrior>,
+        /// How actions are drawn.
+        draw: ActionDraw,
+    },
+}
+
+impl Explorer {
+    /// Skills drawn from a prior, which a decoder acts out.
+    pub fn skills(prior: SkillPrior, decoder: Policy) -> Self {
+        Self::Policy { policy: decoder, prior: Some(prior), draw: ActionDraw::Sample }
+    }
+
+    /// What it does, in words.
+    pub fn describe(&self) -> &'static str {
+        match self {
+            Self::Random => "random actions",
+            Self::Policy { prior: Some(_), .. } => "skills",
+            Self::Policy { prior: None, .. } => "a policy",
+        }
+    }
+
+    /// Whether a policy decides.
+    pub(super) fn is_policy(&self) -> bool {
+        matches!(self, Self::Policy { .. })
+    }
+
+    /// Gives a World what the explorer needs once.
+    pub(super) fn install(&self, world: &mut World) {
+        if let Self::Policy { policy, prior, draw } = self {
+            ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());
+        }
+    }
+}

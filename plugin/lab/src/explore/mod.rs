@@ -1,0 +1,58 @@
+//! Exploring a level without training and without knowledge of the game: Go-Explore (Ecoffet et al. 2021, "First return, then
+//! explore") over exact replay.
+//!
+//! What has been reached is kept as an archive of [`Cell`]s, each with the shortest way that was found to it. Again and
+//! again a cell that was seldom seen is chosen, an agent goes back to it by the same actions, and explores from there. A game
+//! is not asked to store its state: since it is deterministic, the level and the actions bring it back, as they do for
+//! checkpoints. A game for which that does not hold is told so at the first tick that differs.
+//!
+//! Agents that see places ([`Game::whereabouts`](crate::game::Game::whereabouts)) have a grid of cells over the level;
+//! others have what the game says ([`Game::explore_cell`](crate::game::Game::explore_cell)), or else their observations,
+//! downscaled.
+//!
+//! ```no_run
+//! use std::ops::ControlFlow;
+//!
+//! use playbot_lab::{explore::{ExplorePlan, explore}, prelude::*};
+//! # fn example(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
+//! let plan = ExplorePlan { steps: 100_000, ..ExplorePlan::new("easy", 7) };
+//! let found = explore(game, &plan, |_| {}, |_| ControlFlow::Continue(()))?;
+//! println!("{}", found.summary(game));
+//! if let Some(solution) = found.solution() {
+//!     println!("solved in {} ticks", solution.len());
+//! }
+//! # Ok(())
+//! # }
+//! ```
+
+mod archive;
+mod cell;
+mod error;
+mod exploration;
+mod explorer;
+mod grid;
+mod job;
+mod lookout;
+mod open_cells;
+mod plan;
+mod play_route;
+mod round;
+mod summary;
+mod until;
+mod visit;
+mod ways;
+mod world;
+
+pub use archive::ReachedCell;
+pub use cell::{Cell, NoCell};
+pub use error::ExploreError;
+pub use exploration::{EndCounts, Exploration, Stop};
+pub use explorer::Explorer;
+pub use grid::CellGrid;
+pub use open_cells::open_cells;
+pub use plan::ExplorePlan;
+pub use play_route::{follow_route, record_route};
+pub use round::{Round, explore};
+pub use summary::ExplorationSummary;
+pub use until::Until;
+pub use ways::Route;

@@ -1,0 +1,123 @@
+//! An exploration in a few numbers.
+
+use std::{collections::BTreeSet, fmt};
+
+use serde::Serialize;
+
+use super::exploration::{EndCounts, Exploration, Stop};
+use crate::game::Game;
+
+/// What an exploration came to, for people and as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExplorationSummary {
+    /// Name of the game.
+    pub game: &'static str,
+    /// Mode of the game.
+    pub mode: String,
+    /// Number of the level.
+    pub level: u64,
+    /// Who explored.
+    pub explorer: &'static str,
+    /// Seed of what was drawn.
+    pub seed: u64,
+    /// Environment steps, ways back included.
+    pub steps: u64,
+    /// Visits.
+    pub visits: u64,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Cells that were reached.
+    pub cells: usize,
+    /// Cells that no wall cuts off from the start, if the floor plan says it.
+    pub open_cells: Option<usize>,
+    /// The share of these that were reached.
+    pub coverage: Option<f64>,
+    /// Whether the level is known to have a goal.
+    pub has_goal: bool,
+    /// Ticks of the shortest solution.
+    pub solution_ticks: Option<u32>,
+    /// How episodes ended.
+    pub ends: EndCounts,
+    /// Steps and cells after each round.
+    pub curve: Vec<(u64, u64)>,
+}
+
+impl Exploration {
+    /// It in a few numbers.
+    pub fn summary(&self, game: &dyn Game) -> ExplorationSummary {
+        ExplorationSummary {
+            game: game.name(),
+            mode: self.mode.clone(),
+            level: self.level,
+            explorer: self.explorer,
+            seed: self.seed,
+            steps: self.steps,
+            visits: self.visits,
+            stop: self.stop,
+            cells: self.cells().len(),
+            open_cells: self.open.as_ref().map(BTreeSet::len),
+            coverage: self.coverage(),
+            has_goal: self.has_goal,
+            solution_ticks: self.solution_ticks(),
+            ends: self.ends,
+            curve: self.curve.clone(),
+        }
+    }
+}
+
+impl fmt::Display for ExplorationSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { game, mode, level, explorer, steps, visits, cells, ends, .. } = self;
+        writeln!(f, "{game} {mode}:{level}, explored by {explorer} in {steps} steps and {visits} visits")?;
+        match (self.open_cells, self.coverage) {
+            (Some(open), Some(coverage)) => {
+                let percent = 100.0 * coverage;
+                writeln!(f, "cells     {cells}, {percent:.1} % of the {open} that no wall cuts off from the start")?;
+            }
+            _ => writeln!(f, "cells     {cells}")?,
+        }
+        match (self.solution_ticks, self.has_goal) {
+            (Some(ticks), _) => writeln!(f, "solution  {ticks} ticks")?,
+            (None, true) => writeln!(f, "solution  none was found")?,
+            (None, false) => writeln!(f, "solution  none was found, and no goal is known")?,
+        }
+        write!(f, "episodes  {} won, {} lost, {} out of time", ends.won, ends.lost, ends.out_of_time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary() -> ExplorationSummary {
+        ExplorationSummary {
+            game: "walk",
+            mode: "easy".to_owned(),
+            level: 7,
+            explorer: "random actions",
+            seed: 1,
+            steps: 3000,
+            visits: 32,
+            stop: Stop::Spent,
+            cells: 30,
+            open_cells: Some(40),
+            coverage: Some(0.75),
+            has_goal: true,
+            solution_ticks: None,
+            ends: EndCounts { won: 0, lost: 2, out_of_time: 1 },
+            curve: vec![(3000, 30)],
+        }
+    }
+
+    #[test]
+    fn people_read_coverage_and_solution() {
+        let text = summary().to_string();
+        for words in ["walk easy:7", "30, 75.0 % of the 40", "none was found\n", "0 won, 2 lost, 1 out of time"] {
+            assert!(text.contains(words), "`{words}` is missing in: {text}");
+        }
+        let solved = ExplorationSummary { solution_ticks: Some(12), ..summary() }.to_string();
+        assert!(solved.contains("solution  12 ticks"), "{solved}");
+        let bare = ExplorationSummary { open_cells: None, coverage: None, has_goal: false, ..summary() }.to_string();
+        assert!(bare.contains("cells     30\n") && bare.contains("no goal is known"), "{bare}");
+    }
+}

@@ -1,0 +1,167 @@
+//! The drawn levels of a World.
+
+use std::{any::Any, sync::Arc};
+
+use bevy::prelude::*;
+use bevy_playbot::level_files::{LevelFile, LevelFiles};
+
+use super::{
+    design::{DrawnLevel, LevelDesign},
+    error::LevelFileError,
+    mode::level_file_pattern,
+    read::{self, DrawnLevels},
+    text_error::LevelTextError,
+};
+
+/// Levels that somebody drew, by their numbers.
+///
+/// Worlds whose mode names files have them as a resource before the game is built. A game asks it first when an episode
+/// starts, and makes levels itself where it is missing.
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug)]
+pub struct LevelDesigns(DrawnLevels);
+
+impl LevelDesigns {
+    /// The files of a mode, as they are on disk now. From here on [`of`](Self::of) gives out these.
+    ///
+    /// # Errors
+    ///
+    /// The mode names no files, or one of them cannot be read or is no level of this game.
+    pub fn read(
+        game: &str,
+        mode: &str,
+        parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
+    ) -> Result<Self, LevelFileError> {
+        read::read_now(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
+    }
+
+    /// The files of a mode, as they were when they were read last. They are read if they never were.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read).
+    pub fn of(
+        game: &str,
+        mode: &str,
+        parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
+    ) -> Result<Self, LevelFileError> {
+        read::as_read(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
+    }
+
+    /// The level of one file, as level 0.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read, or is no level of this game.
+    pub fn of_file(
+        path: &str,
+        parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
+    ) -> Result<Self, LevelFileError> {
+        Ok(Self(Arc::new(vec![read::read_one(path, parse)?])))
+    }
+
+    /// A single level, as level 0, under a name instead of a path.
+    pub fn one(name: impl Into<String>, design: LevelDesign) -> Self {
+        Self(Arc::new(vec![DrawnLevel { path: name.into(), design }]))
+    }
+
+    /// Number of levels, at least 1.
+    pub fn count(&self) -> u64 {
+        self.0.len() as u64
+    }
+
+    fn drawn(&self, level: u64) -> Option<&DrawnLevel> {
+        self.0.get(usize::try_from(level).ok()?)
+    }
+
+    /// A level in the game's own type.
+    ///
+    /// # Errors
+    ///
+    /// There is no such level, or it is of another type, in words.
+    pub fn get<T: Any + Send + Sync>(&self, level: u64) -> Result<Arc<T>, String> {
+        let Some(DrawnLevel { path, design }) = self.drawn(level) else {
+            let count = self.count();
+            return Err(format!("level {level} does not exist: there are {count} level files, counted from 0"));
+        };
+        design.level().ok_or_else(|| format!("{path} was read by another game"))
+    }
+
+    /// Path of the file of a level.
+    pub fn path(&self, level: u64) -> Option<&str> {
+        self.drawn(level).map(|drawn| drawn.path.as_str())
+    }
+
+    /// Hash of what is played in a level.
+    pub fn hash(&self, level: u64) -> Option<u64> {
+        self.drawn(level).map(|drawn| drawn.design.hash())
+    }
+
+    /// What recordings keep of the levels.
+    pub fn files(&self) -> LevelFiles {
+        let file = |drawn: &DrawnLevel| LevelFile { path: drawn.path.clone(), hash: drawn.design.hash() };
+        LevelFiles::new(self.0.iter().map(file).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use super::*;
+    use crate::level_files::level_files_mode;
+
+    /// A game whose levels are numbers.
+    fn number(text: &str) -> Result<LevelDesign, LevelTextError> {
+        let number: u32 =
+            text.trim().parse().map_err(|_| LevelTextError { line: Some(1), what: "no number".into() })?;
+        Ok(LevelDesign::new(number, &number.to_string()))
+    }
+
+    fn mode(folder: &Path) -> String {
+        format!("{}/*", level_files_mode(&folder.to_string_lossy()))
+    }
+
+    #[test]
+    fn levels_are_read_when_the_mode_is_checked_and_stay_the_same_until_then() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("writable");
+        write("b", "2");
+        write("a", " 1\n");
+        let mode = mode(folder.path());
+        let numbers = |designs: &LevelDesigns| -> Vec<u32> {
+            (0..designs.count()).map(|level| *designs.get(level).expect("a number")).collect()
+        };
+        assert_eq!(numbers(&LevelDesigns::of("numbers", &mode, &number).expect("read")), [1, 2]);
+        write("b", "7");
+        assert_eq!(numbers(&LevelDesigns::of("numbers", &mode, &number).expect("known")), [1, 2]);
+        let again = LevelDesigns::read("numbers", &mode, &number).expect("read");
+        assert_eq!(numbers(&again), [1, 7]);
+        assert_eq!(numbers(&LevelDesigns::of("others", &mode, &number).expect("known")), [1, 7]);
+        assert!(again.path(1).expect("a path").ends_with("/b") && again.path(2).is_none());
+        assert_eq!(again.hash(0), Some(LevelDesign::new((), "1").hash()), "blanks are not played");
+        assert_eq!(again.files().of(1).map(|file| file.hash), again.hash(1));
+    }
+
+    #[test]
+    fn what_cannot_be_had_is_said() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("a"), "1").expect("writable");
+        fs::write(folder.path().join("b"), "one").expect("writable");
+        let error = LevelDesigns::read("numbers", &mode(folder.path()), &number).expect_err("no number").to_string();
+        assert!(error.ends_with("/b, line 1: no number"), "{error}");
+        let path = folder.path().join("a").to_string_lossy().into_owned();
+        let designs = LevelDesigns::of_file(&path, &number).expect("a number");
+        assert!(
+            designs.get::<u32>(1).expect_err("one file").contains("level 1 does not exist: there are 1 level files")
+        );
+        assert!(designs.get::<String>(0).expect_err("a number").contains("another game"));
+        fs::write(folder.path().join("c"), [0xff, 0xfe]).expect("writable");
+        let path = folder.path().join("c").to_string_lossy().into_owned();
+        let error = LevelDesigns::of_file(&path, &number).expect_err("no text").to_string();
+        assert!(error.starts_with("cannot read ") && error.contains("/c: "), "{error}");
+        let missing = LevelDesigns::of_file("no/such/file", &number).expect_err("missing");
+        assert!(matches!(missing, LevelFileError::Unreadable { .. }));
+    }
+}

@@ -1,0 +1,101 @@
+//! What can be wrong with a level file, and with a pattern of files.
+
+use thiserror::Error;
+
+use super::text_error::LevelTextError;
+
+/// Levels cannot be read from files.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum LevelFileError {
+    /// The pattern is none.
+    #[error(
+        "`files:{pattern}` is no pattern of files: {why} (character {at}); write * for any name, ** for any folders, as in \
+         files:levels/**/*.json"
+    )]
+    Pattern {
+        /// The pattern.
+        pattern: String,
+        /// Which character of it, from 1.
+        at: usize,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// There is no such file.
+    #[error(
+        "files:{pattern} matches no file (seen from {folder}): name level files, as in files:levels/**/*.json, in quotes so \
+         that the shell leaves it alone"
+    )]
+    NoFiles {
+        /// The pattern.
+        pattern: String,
+        /// The folder from which it is read.
+        folder: String,
+    },
+    /// It names a folder.
+    #[error("{path} is a folder: name the files in it, as in files:{path}/**/*.json")]
+    Folder {
+        /// The folder.
+        path: String,
+    },
+    /// There are too many.
+    #[error("files:{pattern} matches more than 16,777,216 files: name fewer")]
+    TooMany {
+        /// The pattern.
+        pattern: String,
+    },
+    /// There are fewer files than levels were asked for.
+    #[error("there is no level {level} in {mode}: it has {count} files, so levels 0 to {}; leave out the numbers for all", count - 1)]
+    NoLevel {
+        /// The mode.
+        mode: String,
+        /// The level.
+        level: u64,
+        /// Number of files, at least 1.
+        count: u64,
+    },
+    /// The operating system refused.
+    #[error("cannot read {path}: {why}")]
+    Unreadable {
+        /// File or folder.
+        path: String,
+        /// The answer of the operating system.
+        why: String,
+    },
+    /// No level takes so much room.
+    #[error("{path} has {bytes} bytes, but no level file has more than {most}: is it another file?")]
+    TooLarge {
+        /// The file.
+        path: String,
+        /// Its length.
+        bytes: u64,
+        /// Most bytes of a level file.
+        most: u64,
+    },
+    /// It is no level of the game.
+    #[error("{path}{}: {}", line(error), error.what)]
+    Text {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        error: LevelTextError,
+    },
+}
+
+fn line(error: &LevelTextError) -> String {
+    error.line.map_or_else(String::new, |line| format!(", line {line}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::level_files::json_lines::JsonStep;
+
+    #[test]
+    fn what_is_wrong_with_a_file_is_told_with_its_line() {
+        let told = |error| LevelFileError::Text { path: "a.json".to_owned(), error }.to_string();
+        let text = "{\n  \"rows\": [\n    \"##\",\n    \"#?\"\n  ]\n}";
+        let row = LevelTextError::at(text, &[JsonStep::Key("rows"), JsonStep::Index(1)], "unknown letter `?`");
+        assert_eq!(told(row), "a.json, line 4: unknown letter `?`");
+        assert_eq!(told(LevelTextError::whole("no levels here")), "a.json: no levels here");
+    }
+}

@@ -1,0 +1,93 @@
+//! Reading level files, once for all Worlds of a verb.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::Read,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use super::{
+    design::{DrawnLevel, LevelDesign},
+    error::LevelFileError,
+    find::find_level_files,
+    text_error::LevelTextError,
+};
+
+/// Most bytes of a level file: the largest levels there are, with some room between their letters.
+const MOST_BYTES: u64 = 32 << 20;
+
+/// All levels of a pattern, in their order.
+pub(super) type DrawnLevels = Arc<Vec<DrawnLevel>>;
+
+/// How a game reads a level.
+pub(super) type Parse<'a> = &'a dyn Fn(&str) -> Result<LevelDesign, LevelTextError>;
+
+/// The files of a pattern as they were when it was last checked.
+struct Snapshot {
+    /// Path and text of each.
+    texts: Vec<(String, String)>,
+    /// What the games made of them, by their names.
+    designs: Mutex<BTreeMap<String, DrawnLevels>>,
+}
+
+/// What has been read, by pattern. All Worlds of a verb play the same levels, even if somebody saves a file meanwhile, and a
+/// file is read and understood once for all of them.
+static READ: Mutex<BTreeMap<String, Arc<Snapshot>>> = Mutex::new(BTreeMap::new());
+
+/// The files as they are on disk now.
+pub(super) fn read_now(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
+    let texts: Result<Vec<_>, _> =
+        find_level_files(pattern)?.into_iter().map(|path| read_text(&path).map(|text| (path, text))).collect();
+    let snapshot = Arc::new(Snapshot { texts: texts?, designs: Mutex::default() });
+    let designs = snapshot.designs(game, parse)?;
+    READ.lock().unwrap_or_else(PoisonError::into_inner).insert(pattern.to_owned(), snapshot);
+    Ok(designs)
+}
+
+/// The files as they were read last; read now if they never were.
+pub(super) fn as_read(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
+    let known = READ.lock().unwrap_or_else(PoisonError::into_inner).get(pattern).cloned();
+    match known {
+        Some(snapshot) => snapshot.designs(game, parse),
+        None => read_now(game, pattern, parse),
+    }
+}
+
+impl Snapshot {
+    fn designs(&self, game: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
+        let mut known = self.designs.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(designs) = known.get(game) {
+            return Ok(designs.clone());
+        }
+        let drawn: Result<Vec<_>, _> = self.texts.iter().map(|(path, text)| understand(path, text, parse)).collect();
+        let designs = Arc::new(drawn?);
+        known.insert(game.to_owned(), designs.clone());
+        Ok(designs)
+    }
+}
+
+/// The level in a file.
+pub(super) fn read_one(path: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
+    understand(path, &read_text(path)?, parse)
+}
+
+fn understand(path: &str, text: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
+    match parse(text) {
+        Ok(design) => Ok(DrawnLevel { path: path.to_owned(), design }),
+        Err(error) => Err(LevelFileError::Text { path: path.to_owned(), error }),
+    }
+}
+
+fn read_text(path: &str) -> Result<String, LevelFileError> {
+    let unreadable =
+        |error: std::io::Error| LevelFileError::Unreadable { path: path.to_owned(), why: error.to_string() };
+    let file = File::open(path).map_err(unreadable)?;
+    let bytes = file.metadata().map_err(unreadable)?.len();
+    if bytes > MOST_BYTES {
+        return Err(LevelFileError::TooLarge { path: path.to_owned(), bytes, most: MOST_BYTES });
+    }
+    let mut text = String::new();
+    file.take(MOST_BYTES).read_to_string(&mut text).map_err(unreadable)?;
+    Ok(text)
+}

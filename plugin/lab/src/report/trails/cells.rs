@@ -1,0 +1,166 @@
+//! Which cells of a floor were reached, and how often.
+
+use bevy::math::{Rect, Vec2};
+
+use super::{
+    colours::{HAZARD, INK, LINES, PLATFORM, SOFT, WALL, heat},
+    frame::Frame,
+    panel::{goal_mark, start_mark},
+};
+use crate::{
+    drawing::{Drawing, Rgb, Shape},
+    floor_plan::FloorPlan,
+    report::text_width::text_width,
+};
+
+/// Space around everything, pixels.
+const GAP: f32 = 20.0;
+const TITLE: f32 = 16.0;
+const TEXT: f32 = 13.0;
+/// Distance of lines, pixels.
+const LINE: f32 = 19.0;
+/// Letters of pictures made of pixels are wider than those of drawings by this.
+const WIDEST: f64 = 1.4;
+/// Pixels of the longer side of a floor.
+const LENGTH: f32 = 640.0;
+/// Space between two cells, pixels.
+const SEAM: f32 = 0.5;
+
+/// Cells of one floor, coloured by how often something was there, and a way through them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CellChart {
+    /// What it shows.
+    pub title: String,
+    /// Lines below the title.
+    pub captions: Vec<String>,
+    /// The bounds and the walls.
+    pub plan: FloorPlan,
+    /// What each cell covers, and how often it was visited. Darker is more, on a logarithmic scale.
+    pub reached: Vec<(Rect, u64)>,
+    /// Cells that nobody reached: they are crossed.
+    pub missed: Vec<Rect>,
+    /// A way, from the start on; may be empty.
+    pub way: Vec<Vec2>,
+}
+
+impl CellChart {
+    /// The chart.
+    pub fn draw(&self) -> Drawing {
+        let mut shapes = Vec::new();
+        let mut right = write(0.0, TITLE, INK, &self.title, &mut shapes);
+        let mut y = LINE;
+        for caption in &self.captions {
+            right = right.max(write(y, TEXT, SOFT, caption, &mut shapes));
+            y += LINE;
+        }
+        let extent = self.extent();
+        let share = extent.width() / extent.size().max_element().max(f32::MIN_POSITIVE);
+        let frame = Frame::new(extent, Vec2::new(GAP, GAP + y + GAP / 2.0), LENGTH * share);
+        self.floor(&frame, &mut shapes);
+        let corner = frame.whole().max;
+        Drawing { label: self.title.clone(), size: Vec2::new(right.max(corner.x), corner.y) + GAP, shapes }
+    }
+
+    /// The bounds of the plan, and around them whatever else was reached.
+    fn extent(&self) -> Rect {
+        self.reached.iter().fold(self.plan.bounds, |extent, (area, _)| extent.union(*area))
+    }
+
+    fn floor(&self, frame: &Frame, out: &mut Vec<Shape>) {
+        let most = self.reached.iter().map(|(_, visits)| *visits).max().unwrap_or(0);
+        let most = (most as f64).ln_1p().max(f64::MIN_POSITIVE);
+        for (area, visits) in &self.reached {
+            let area = frame.area(*area).inflate(-SEAM);
+            out.push(Shape::Block { area, fill: heat((*visits as f64).ln_1p() / most) });
+        }
+        let FloorPlan { walls, hazards, platforms, start, goal, .. } = &self.plan;
+        for (areas, fill) in [(walls, WALL), (platforms, PLATFORM), (hazards, HAZARD)] {
+            let seen = areas.iter().map(|area| frame.area(*area)).filter(|area| !area.is_empty());
+            out.extend(seen.map(|area| Shape::Block { area, fill }));
+        }
+        for area in &self.missed {
+            let Rect { min, max } = frame.area(*area).inflate(-2.0 * SEAM);
+            let corners = [[min, max], [Vec2::new(min.x, max.y), Vec2::new(max.x, min.y)]];
+            out.extend(corners.map(|points| line(points.to_vec(), 1.5, LINES[1])));
+        }
+        let places: Vec<Vec2> = self.way.iter().filter(|place| place.is_finite()).map(|at| frame.place(*at)).collect();
+        if places.len() > 1 {
+            out.push(line(places, 2.0, LINES[0]));
+        }
+        let Rect { min, max } = frame.whole();
+        let border = vec![min, Vec2::new(max.x, min.y), max, Vec2::new(min.x, max.y), min];
+        out.push(line(border, 1.0, INK));
+        out.push(start_mark(frame.place(*start), 6.0));
+        out.push(goal_mark(frame.place(*goal), 6.0));
+    }
+}
+
+/// Writes a line of text and returns where it ends.
+fn write(y: f32, size: f32, colour: Rgb, words: &str, out: &mut Vec<Shape>) -> f32 {
+    let at = Vec2::new(GAP, GAP + y + TEXT);
+    out.push(Shape::Text { at, size, colour, words: words.to_owned() });
+    GAP + (text_width(words, f64::from(size)) * WIDEST) as f32
+}
+
+fn line(points: Vec<Vec2>, width: f32, colour: Rgb) -> Shape {
+    Shape::Line { points, width, colour, opacity: 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart() -> CellChart {
+        let plan = FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 4.0, 2.0),
+            walls: vec![Rect::new(3.0, 0.0, 4.0, 2.0)],
+            start: Vec2::splat(0.5),
+            goal: Vec2::new(2.5, 1.5),
+            ..FloorPlan::default()
+        };
+        CellChart {
+            title: "walk".to_owned(),
+            captions: vec!["3 of 4 cells".to_owned()],
+            plan,
+            reached: vec![(Rect::new(0.0, 0.0, 1.0, 1.0), 100), (Rect::new(1.0, 0.0, 2.0, 1.0), 1)],
+            missed: vec![Rect::new(2.0, 0.0, 3.0, 1.0)],
+            way: vec![Vec2::splat(0.5), Vec2::new(1.5, 0.5)],
+        }
+    }
+
+    #[test]
+    fn cells_lie_on_the_floor_and_those_that_were_visited_more_are_darker() {
+        let drawing = chart().draw();
+        let block = |shape: &Shape| match shape {
+            Shape::Block { area, fill } => Some((*area, *fill)),
+            _ => None,
+        };
+        let blocks: Vec<(Rect, Rgb)> = drawing.shapes.iter().filter_map(block).collect();
+        assert_eq!(blocks.len(), 3, "two cells and a wall");
+        assert_eq!((blocks[0].1, blocks[2].1), (heat(1.0), WALL));
+        assert_ne!(blocks[0].1, blocks[1].1);
+        assert!(blocks[0].0.max.x < blocks[1].0.min.x && blocks[0].0.min.y == blocks[1].0.min.y);
+        assert!((blocks[2].0.width() - LENGTH / 4.0).abs() < 0.01);
+        let lines = drawing.shapes.iter().filter(|shape| matches!(shape, Shape::Line { .. })).count();
+        assert_eq!(lines, 2 + 1 + 1, "a cross, the way and the border");
+    }
+
+    #[test]
+    fn everything_is_on_the_paper_even_beyond_the_plan() {
+        let mut chart = chart();
+        chart.reached.push((Rect::new(4.0, 2.0, 5.0, 3.0), 7));
+        chart.way.push(Vec2::NAN);
+        let drawing = chart.draw();
+        for shape in &drawing.shapes {
+            let points = match shape {
+                Shape::Block { area, .. } => vec![area.min, area.max],
+                Shape::Line { points, .. } => points.clone(),
+                Shape::Mark { centre, .. } => vec![*centre],
+                Shape::Text { at, .. } => vec![*at],
+            };
+            let is_on_paper = |point: &Vec2| point.min_element() >= 0.0 && point.cmple(drawing.size).all();
+            assert!(points.iter().all(is_on_paper), "{shape:?} on {}", drawing.size);
+        }
+        assert_eq!(chart.draw().to_svg(), drawing.to_svg());
+    }
+}

@@ -1,0 +1,246 @@
+//! What has changed since earlier results, and what is noise.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
+
+use serde::Serialize;
+
+use super::{
+    change::{Change, FindingChange},
+    error::TestError,
+    false_discovery::benjamini_hochberg,
+    fisher::{Trials, fisher_exact},
+    level_verdict::{LevelVerdict, TesterVerdict},
+    plan::TestRecord,
+    results::ResultLines,
+};
+
+/// Expected share of false alarms among the levels that are said to be easier or harder.
+pub const FALSE_DISCOVERY_RATE: f64 = 0.05;
+
+/// Earlier results and these, level by level.
+///
+/// A tester that drew no random number on a level, before and now, would do the same again: that it solves what it did not
+/// solve, or the other way round, is a change of the level, however few episodes there are. What other testers solved is
+/// taken together and compared by Fisher's exact test; over all levels, at most one alarm in twenty is false on average
+/// (Benjamini and Hochberg). A proof that a level cannot be solved is always told if it is new.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Levels in both.
+    pub levels: u64,
+    /// Levels that were not tested before.
+    pub only_now: u64,
+    /// Levels that are not tested any more.
+    pub only_before: u64,
+    /// Testers that are left out, and why.
+    pub left_out: Vec<String>,
+    /// Levels that cannot be solved any more, or of which that is known now.
+    pub unsolvable: Vec<Change>,
+    /// Levels that are solved less often.
+    pub harder: Vec<Change>,
+    /// Levels that are solved more often.
+    pub easier: Vec<Change>,
+    /// What was not found before.
+    pub new_findings: Vec<FindingChange>,
+    /// What is found no longer.
+    pub gone_findings: Vec<FindingChange>,
+}
+
+/// What is kept in memory of an earlier level.
+struct Known {
+    testers: Vec<TesterVerdict>,
+    total: Trials,
+    is_unsolvable: bool,
+    findings: BTreeSet<(String, Option<String>)>,
+}
+
+/// A level whose difference may be chance.
+struct Doubtful {
+    change: Change,
+    probability: f64,
+}
+
+impl Comparison {
+    /// Compares the results in a folder with earlier ones.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::Incomparable`] for those of another game or version, or without a level or a tester in common; or they
+    /// cannot be read.
+    pub fn read(before: &Path, now: &Path) -> Result<Self, TestError> {
+        let mut lines = ResultLines::open(now)?;
+        let Comparable { mut earlier, common, left_out } = comparable(before, lines.record())?;
+        let mut known = BTreeMap::new();
+        while let Some(level) = earlier.next_level()? {
+            known.insert(level.level.clone(), Known::of(level, &common));
+        }
+        let (mut comparison, mut doubtful) = (Self { left_out, ..Self::default() }, Vec::new());
+        while let Some(level) = lines.next_level()? {
+            match known.remove(&level.level) {
+                Some(known) => {
+                    comparison.compare(&known, &level.level.clone(), &Known::of(level, &common), &mut doubtful)
+                }
+                None => comparison.only_now += 1,
+            }
+        }
+        if comparison.levels == 0 {
+            let (one, other) = (&earlier.record().range, &lines.record().range);
+            let differences = vec![format!("no level is in {one} and in {other}")];
+            return Err(TestError::Incomparable { folder: before.into(), differences });
+        }
+        comparison.only_before = known.len() as u64;
+        comparison.judge(doubtful);
+        Ok(comparison)
+    }
+
+    /// Checks that results of such a test can be compared with those in a folder, before it is run.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read), as far as it is known beforehand.
+    pub fn check(before: &Path, record: &TestRecord) -> Result<(), TestError> {
+        comparable(before, record).map(drop)
+    }
+
+    /// Whether something has become worse.
+    pub fn has_alarms(&self) -> bool {
+        !(self.unsolvable.is_empty() && self.harder.is_empty() && self.new_findings.is_empty())
+    }
+
+    fn compare(&mut self, known: &Known, level: &str, now: &Known, doubtful: &mut Vec<Doubtful>) {
+        self.levels += 1;
+        let changes = |these: &Known, those: &Known| {
+            let added = these.findings.difference(&those.findings);
+            let change = |(detector, tester): &(String, Option<String>)| FindingChange {
+                level: level.to_owned(),
+                detector: detector.clone(),
+                tester: tester.clone(),
+            };
+            added.map(change).collect::<Vec<_>>()
+        };
+        self.new_findings.extend(changes(now, known));
+        self.gone_findings.extend(changes(known, now));
+        let change = |before: Trials, now: Trials| Change {
+            level: level.to_owned(),
+            tester: None,
+            before,
+            now,
+            probability: None,
+            proof: None,
+        };
+        if known.is_unsolvable != now.is_unsolvable {
+            let words = if now.is_unsolvable { "proved unsolvable" } else { "no longer proved unsolvable" };
+            let change = Change { proof: Some(words.to_owned()), ..change(known.total, now.total) };
+            if now.is_unsolvable {
+                self.unsolvable.push(change)
+            } else {
+                self.easier.push(change)
+            }
+            return;
+        }
+        let (mut pooled_before, mut pooled_now) = (Trials::default(), Trials::default());
+        for (before, now) in known.testers.iter().zip(&now.testers) {
+            let (was, is) = (before.score.trials(), now.score.trials());
+            if !(before.exact && now.exact) {
+                add(&mut pooled_before, was);
+                add(&mut pooled_now, is);
+                continue;
+            }
+            // All its episodes are the same one.
+            let (solved, solves) = (was.successes > 0, is.successes > 0);
+            if solved != solves {
+                let change = Change { tester: Some(before.tester.clone()), ..change(was, is) };
+                if solves {
+                    self.easier.push(change)
+                } else {
+                    self.harder.push(change)
+                }
+                return;
+            }
+        }
+        if pooled_before.trials > 0 && pooled_now.trials > 0 {
+            let probability = fisher_exact(pooled_before, pooled_now);
+            let change = Change { probability: Some(probability), ..change(pooled_before, pooled_now) };
+            doubtful.push(Doubtful { change, probability });
+        }
+    }
+
+    /// Tells of those levels that differ by more than chance.
+    fn judge(&mut self, doubtful: Vec<Doubtful>) {
+        let probabilities: Vec<f64> = doubtful.iter().map(|level| level.probability).collect();
+        let alarms = benjamini_hochberg(&probabilities, FALSE_DISCOVERY_RATE);
+        for (Doubtful { change, .. }, _) in doubtful.into_iter().zip(alarms).filter(|(_, is_alarm)| *is_alarm) {
+            let Change { before, now, .. } = &change;
+            let (was, is) = (before.successes * now.trials, now.successes * before.trials);
+            match is.cmp(&was) {
+                std::cmp::Ordering::Greater => self.easier.push(change),
+                std::cmp::Ordering::Less => self.harder.push(change),
+                // Equal shares have probability 1.
+                std::cmp::Ordering::Equal => {}
+            }
+        }
+    }
+}
+
+impl Known {
+    /// What the testers with these names say.
+    fn of(level: LevelVerdict, testers: &[String]) -> Self {
+        let is_unsolvable = level.proof.why_unsolvable().is_some();
+        let is_common = |name: &Option<String>| name.as_ref().is_none_or(|name| testers.contains(name));
+        let findings = level.findings.into_iter().filter(|finding| is_common(&finding.tester));
+        let findings = findings.map(|finding| (finding.detector, finding.tester)).collect();
+        let mut verdicts = level.testers;
+        let own: Vec<TesterVerdict> = testers
+            .iter()
+            .filter_map(|name| {
+                let place = verdicts.iter().position(|verdict| verdict.tester == *name)?;
+                Some(verdicts.swap_remove(place))
+            })
+            .collect();
+        let mut total = Trials::default();
+        own.iter().for_each(|tester| add(&mut total, tester.score.trials()));
+        Self { testers: own, total, is_unsolvable, findings }
+    }
+}
+
+fn add(sum: &mut Trials, more: Trials) {
+    sum.successes += more.successes;
+    sum.trials += more.trials;
+}
+
+/// Earlier results, and what they have in common with others.
+struct Comparable {
+    earlier: ResultLines,
+    common: Vec<String>,
+    left_out: Vec<String>,
+}
+
+fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestError> {
+    let earlier = ResultLines::open(before)?;
+    let differences = earlier.record().differences_of_game(record);
+    let (common, left_out) = common_testers(earlier.record(), record);
+    let differences = match (differences.is_empty(), common.is_empty()) {
+        (true, false) => return Ok(Comparable { earlier, common, left_out }),
+        (true, true) => left_out,
+        (false, _) => differences,
+    };
+    Err(TestError::Incomparable { folder: before.into(), differences })
+}
+
+/// Names of the testers that are the same in both, and why others are left out.
+fn common_testers(before: &TestRecord, now: &TestRecord) -> (Vec<String>, Vec<String>) {
+    let (mut common, mut left_out) = (Vec::new(), Vec::new());
+    for tester in &now.testers {
+        match before.testers.iter().find(|known| known.name == tester.name) {
+            Some(known) if known == tester => common.push(tester.name.clone()),
+            Some(known) => left_out.push(format!("another tester `{}` and `{}`", known.describe(), tester.describe())),
+            None => left_out.push(format!("the tester `{}` was not there before", tester.name)),
+        }
+    }
+    (common, left_out)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! What can go wrong with tests and their results.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use super::shard::Shard;
+use crate::eval::EvalError;
+
+/// Levels cannot be tested, or results cannot be used.
+#[derive(Debug, Error)]
+pub enum TestError {
+    /// The game cannot be played at all, or not be seen as a policy needs it.
+    #[error(transparent)]
+    Eval(#[from] EvalError),
+    /// Nobody would play.
+    #[error("nobody tests: name a bot or a policy")]
+    NoTester,
+    /// Results could not tell two testers apart.
+    #[error("two testers are called `{0}`: give each file or folder a name of its own, and name each bot once")]
+    SameName(String),
+    /// A shard without any level tests nothing.
+    #[error("shard {shard} has no level, since {range} has only {length}: use at most {length} shards")]
+    EmptyShard {
+        /// The shard.
+        shard: Shard,
+        /// The levels.
+        range: String,
+        /// How many there are.
+        length: u64,
+    },
+    /// The folder has results already.
+    #[error(
+        "{} has results already: go on with --resume, choose another --out, or replace them with --force", .0.display()
+    )]
+    Exists(PathBuf),
+    /// Another process tests into the folder.
+    #[error("{} is in use by another test: wait for it or stop it, or choose another --out", .0.display())]
+    Busy(PathBuf),
+    /// What is in the folder was tested in another way.
+    #[error("{} holds another test: {}; call with the same, or choose another --out", folder.display(), differences.join(", "))]
+    OtherPlan {
+        /// The folder.
+        folder: PathBuf,
+        /// What differs, each in words.
+        differences: Vec<String>,
+    },
+    /// There are no results.
+    #[error("{} has no results.json: {}", .0.display(), no_results(.0))]
+    NoResults(PathBuf),
+    /// A file is not what it should be.
+    #[error("{}, line {line}: {message}; make it again with `playbot test`", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// Results that cannot be joined.
+    #[error("{} and {} cannot be joined: {}", first.display(), second.display(), differences.join(", "))]
+    Unlike {
+        /// One folder.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+        /// What differs, each in words.
+        differences: Vec<String>,
+    },
+    /// Results of a whole range cannot be joined with anything.
+    #[error("{} is no shard, but the results of a whole range: name folders of `playbot test --shard`", .0.display())]
+    NotAShard(PathBuf),
+    /// Two folders hold the same levels.
+    #[error("{} and {} overlap: both are shard {shard}; name each shard once", first.display(), second.display())]
+    Overlap {
+        /// One folder.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+        /// Both.
+        shard: Shard,
+    },
+    /// Not all folders are there.
+    #[error("missing {}: name their folders too, or test them with `playbot test --shard`", shards(.0))]
+    Missing(Vec<Shard>),
+    /// Results that say nothing about each other.
+    #[error("{} cannot be compared with: {}", folder.display(), differences.join(", "))]
+    Incomparable {
+        /// The folder of the earlier results.
+        folder: PathBuf,
+        /// What differs, each in words.
+        differences: Vec<String>,
+    },
+    /// The results as JUnit XML cannot be made.
+    #[error("the results cannot be written as JUnit XML: {0}")]
+    Junit(String),
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A level could not be written down.
+    #[error(
+        "cannot write {}: {source}; the {finished} levels that are finished are whole in it: make room or rights there \
+         and go on with --resume", path.display()
+    )]
+    NotKept {
+        /// The journal.
+        path: PathBuf,
+        /// Levels in it.
+        finished: u64,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+impl TestError {
+    /// Whether calling differently helps; otherwise the game or the system failed.
+    pub fn is_usage(&self) -> bool {
+        !matches!(self, Self::Eval(EvalError::Fault(_)) | Self::Io { .. } | Self::NotKept { .. } | Self::Junit(_))
+    }
+}
+
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> TestError {
+    move |source| TestError::Io { action, path: path.into(), source }
+}
+
+fn no_results(folder: &Path) -> &'static str {
+    if folder.join(super::journal::JOURNAL).exists() {
+        "its test is not done, finish it with `playbot test --resume`"
+    } else {
+        "name the --out of a `playbot test`"
+    }
+}
+
+fn shards(missing: &[Shard]) -> String {
+    const SHOWN: usize = 8;
+    let names: Vec<String> = missing.iter().take(SHOWN).map(Shard::to_string).collect();
+    let more = missing.len().saturating_sub(SHOWN);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{} {}{more}", if missing.len() == 1 { "shard" } else { "shards" }, names.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_shards_are_named_up_to_a_few() {
+        let shard = |index| Shard { index, count: 20 };
+        assert_eq!(shards(&[shard(3)]), "shard 3/20");
+        let words = TestError::Missing((0..10).map(shard).collect()).to_string();
+        assert!(words.starts_with("missing shards 0/20, 1/20,") && words.contains("7/20 and 2 more: "), "{words}");
+    }
+
+    #[test]
+    fn an_unfinished_test_is_told_from_a_folder_without_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let words = || TestError::NoResults(folder.path().into()).to_string();
+        assert!(words().contains("name the --out"), "{}", words());
+        std::fs::write(folder.path().join(super::super::journal::JOURNAL), "").expect("writable");
+        assert!(words().contains("--resume"), "{}", words());
+    }
+}

@@ -1,0 +1,179 @@
+//! `levels.jsonl`: finished levels as they come in.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs::{File, OpenOptions, TryLockError},
+    io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::Deserialize;
+
+use super::{
+    error::{TestError, io_error},
+    level_verdict::LevelVerdict,
+};
+
+/// Name of the file in the folder of a test.
+pub(super) const JOURNAL: &str = "levels.jsonl";
+
+/// A file with a line of JSON for each finished level, in the order in which they were finished. It is locked while
+/// somebody writes.
+pub(super) struct Journal {
+    path: PathBuf,
+    file: File,
+    /// Where the line of each level begins and how many bytes it has, without its line feed: by place in the range.
+    lines: BTreeMap<u64, (u64, usize)>,
+    length: u64,
+}
+
+/// What tells a level from others.
+#[derive(Deserialize)]
+struct Place {
+    index: u64,
+}
+
+impl Journal {
+    /// Opens the journal of a folder, with all whole lines; a file that is not there is made. What follows after the first
+    /// damaged line is cut off; the number of bytes that were is returned.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::Busy`], or the operating system refuses.
+    pub fn open(folder: &Path) -> Result<(Self, u64), TestError> {
+        let path = folder.join(JOURNAL);
+        let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+        let mut file = options.map_err(io_error("open", &path))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(TestError::Busy(folder.into())),
+            // Some network file systems have no locks.
+            Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
+                tracing::warn!("{} cannot be locked: make sure that nothing else tests there", folder.display());
+            }
+            Err(TryLockError::Error(error)) => return Err(io_error("lock", &path)(error)),
+        }
+        let found = whole_lines(&mut file).and_then(|(lines, length)| {
+            let cut = file.metadata()?.len() - length;
+            file.set_len(length)?;
+            file.seek(SeekFrom::Start(length))?;
+            Ok((lines, length, cut))
+        });
+        let (lines, length, cut) = found.map_err(io_error("read", &path))?;
+        Ok((Self { path, file, lines, length }, cut))
+    }
+
+    /// Forgets all levels.
+    ///
+    /// # Errors
+    ///
+    /// The operating system refuses.
+    pub fn clear(&mut self) -> Result<(), TestError> {
+        self.lines.clear();
+        self.length = 0;
+        let emptied = self.file.set_len(0).and_then(|()| self.file.seek(SeekFrom::Start(0)));
+        emptied.map(drop).map_err(io_error("empty", &self.path))
+    }
+
+    /// Places in the range of the levels that are finished.
+    pub fn places(&self) -> BTreeSet<u64> {
+        self.lines.keys().copied().collect()
+    }
+
+    /// Adds a level with one write. If that fails, the levels before stay whole.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::NotKept`].
+    pub fn push(&mut self, verdict: &LevelVerdict) -> Result<(), TestError> {
+        let written = serde_json::to_string(verdict).map_err(io::Error::from).and_then(|line| {
+            self.file.write_all(format!("{line}\n").as_bytes())?;
+            Ok(line.len())
+        });
+        match written {
+            Ok(bytes) => {
+                self.lines.insert(verdict.index, (self.length, bytes));
+                self.length += bytes as u64 + 1;
+                Ok(())
+            }
+            Err(source) => {
+                // Half a line would be dropped anyway when the file is read again.
+                let _ = self.file.set_len(self.length);
+                Err(TestError::NotKept { path: self.path.clone(), finished: self.lines.len() as u64, source })
+            }
+        }
+    }
+
+    /// Hands the lines over in the order of the levels, without their line feeds.
+    ///
+    /// # Errors
+    ///
+    /// What is handed over cannot be taken, or the file cannot be read.
+    pub fn in_order(&mut self, mut take: impl FnMut(&str) -> io::Result<()>) -> io::Result<()> {
+        for &(start, bytes) in self.lines.values() {
+            let mut line = vec![0; bytes];
+            self.file.seek(SeekFrom::Start(start))?;
+            self.file.read_exact(&mut line)?;
+            take(std::str::from_utf8(&line).map_err(io::Error::other)?)?;
+        }
+        self.file.seek(SeekFrom::Start(self.length)).map(drop)
+    }
+}
+
+/// Where the lines are up to the first damaged one, and where that begins. Of two lines of one level the first counts.
+fn whole_lines(file: &mut File) -> io::Result<(BTreeMap<u64, (u64, usize)>, u64)> {
+    let (mut lines, mut length) = (BTreeMap::new(), 0);
+    let mut reader = BufReader::new(file);
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        reader.read_until(b'\n', &mut line)?;
+        let Some(text) = line.strip_suffix(b"\n") else { break };
+        let Ok(place) = serde_json::from_slice::<Place>(text) else { break };
+        lines.entry(place.index).or_insert((length, text.len()));
+        length += line.len() as u64;
+    }
+    Ok((lines, length))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::verdict::testing::verdict;
+
+    fn lines(journal: &mut Journal) -> Vec<String> {
+        let mut lines = Vec::new();
+        let take = |line: &str| {
+            lines.push(line.to_owned());
+            Ok(())
+        };
+        journal.in_order(take).expect("readable");
+        lines
+    }
+
+    #[test]
+    fn levels_come_back_in_their_order_and_a_torn_line_is_cut() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (mut journal, _) = Journal::open(folder.path()).expect("new");
+        for index in [2, 0, 1] {
+            journal.push(&verdict(index, 1, 1)).expect("writable");
+        }
+        let levels: Vec<String> = lines(&mut journal);
+        assert!(levels[0].contains("\"index\":0") && levels[2].contains("\"index\":2"), "{levels:?}");
+        assert!(matches!(Journal::open(folder.path()), Err(TestError::Busy(_))));
+        drop(journal);
+
+        let path = folder.path().join(JOURNAL);
+        let whole = fs::read(&path).expect("readable");
+        fs::write(&path, [whole.as_slice(), b"{\"index\":3,\"lev"].concat()).expect("writable");
+        let (mut journal, cut) = Journal::open(folder.path()).expect("it is there");
+        assert_eq!((cut, journal.places()), (15, BTreeSet::from([0, 1, 2])));
+        journal.push(&verdict(3, 0, 1)).expect("writable");
+        assert_eq!(lines(&mut journal).len(), 4);
+        assert_eq!(fs::read(&path).expect("readable")[..whole.len()], whole);
+        journal.clear().expect("writable");
+        assert_eq!((fs::read(&path).expect("readable").len(), journal.places().len()), (0, 0));
+    }
+}

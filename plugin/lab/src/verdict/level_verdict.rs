@@ -1,0 +1,124 @@
+//! What the testers say of one level.
+
+use serde::{Deserialize, Serialize};
+
+use super::{finish_time::FinishTime, fisher::Trials};
+use crate::proof::LevelProof;
+
+/// What became of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelOutcome {
+    /// The aim cannot be reached, and that is proved.
+    ProvedUnsolvable,
+    /// No tester reached the aim, which proves nothing.
+    BotFailed,
+    /// A tester reached the aim at least once.
+    Solved,
+}
+
+impl LevelOutcome {
+    /// As files and people have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ProvedUnsolvable => "proved-unsolvable",
+            Self::BotFailed => "bot-failed",
+            Self::Solved => "solved",
+        }
+    }
+}
+
+/// How episodes ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// Episodes that reached the aim.
+    pub solved: u64,
+    /// All episodes.
+    pub episodes: u64,
+    /// 95 % Wilson interval of the share of solved episodes.
+    pub interval: [f64; 2],
+    /// Ticks of the solved episodes, if there are any.
+    pub ticks: Option<FinishTime>,
+    /// Episodes that the game ended without the aim.
+    pub lost: u64,
+    /// Episodes that ended since time was up.
+    pub timed_out: u64,
+    /// Episodes in which the game broke, each of which is a finding.
+    pub broken: u64,
+}
+
+impl Score {
+    /// Solved among all.
+    pub fn trials(&self) -> Trials {
+        Trials { successes: self.solved, trials: self.episodes }
+    }
+}
+
+/// Where episodes ended without the aim, rounded to a square of the level's floor plan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EndPlace {
+    /// Middle of the square, in the units of the floor plan.
+    pub x: f32,
+    /// Middle of the square.
+    pub y: f32,
+    /// Episodes that were lost there.
+    pub lost: u64,
+    /// Episodes whose time was up there.
+    pub timed_out: u64,
+}
+
+/// How a tester did on a level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TesterVerdict {
+    /// Name of the tester.
+    pub tester: String,
+    /// Its episodes.
+    #[serde(flatten)]
+    pub score: Score,
+    /// Whether it drew no random number in any of them: it does the same each time, whatever the seed.
+    pub exact: bool,
+}
+
+/// Something that is wrong with a level or with the game in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// What found it: `panic`, `fault`, `endless`, `unreachable-goal`.
+    pub detector: String,
+    /// Who played; `None` if nobody had to.
+    pub tester: Option<String>,
+    /// Episode of that tester on the level, from 0.
+    pub episode: Option<u32>,
+    /// Tick of the episode, from 0.
+    pub tick: Option<u32>,
+    /// What is wrong.
+    pub message: String,
+}
+
+/// Everything about one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LevelVerdict {
+    /// Its name, such as `hard:7`.
+    pub level: String,
+    /// Its place in the range, from 0.
+    pub index: u64,
+    /// What became of it.
+    pub outcome: LevelOutcome,
+    /// What is certain of it. A level that was solved is solvable.
+    pub proof: LevelProof,
+    /// All episodes of all testers.
+    #[serde(flatten)]
+    pub score: Score,
+    /// Where episodes ended without the aim, if the game says.
+    pub ends: Vec<EndPlace>,
+    /// Each tester, in the order of the plan.
+    pub testers: Vec<TesterVerdict>,
+    /// What is wrong, if anything.
+    pub findings: Vec<Finding>,
+}
+
+impl LevelVerdict {
+    /// Whether it was solved and nothing was found.
+    pub fn is_sound(&self) -> bool {
+        self.outcome == LevelOutcome::Solved && self.findings.is_empty()
+    }
+}

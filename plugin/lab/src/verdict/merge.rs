@@ -1,0 +1,173 @@
+//! Joining the results of shards.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    atomic::write_in_pieces,
+    error::{TestError, io_error},
+    plan::TestRecord,
+    results::{RESULTS, ResultLines, ResultWriter},
+    shard::Shard,
+};
+
+/// Joins the results of all shards of a test, given by their folders in any order, into `out`: the same bytes as the results
+/// of the whole test. Levels are not kept in memory.
+///
+/// # Errors
+///
+/// A folder has no results, shards overlap or are missing, or their tests differ; or `out` cannot be written.
+pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
+    let mut shards = Vec::new();
+    for folder in folders {
+        let lines = ResultLines::open(folder)?;
+        let shard = lines.record().shard.ok_or_else(|| TestError::NotAShard(folder.clone()))?;
+        shards.push((folder, shard, lines));
+    }
+    let Some((first, count, record)) = shards
+        .first()
+        .map(|(folder, shard, lines)| (*folder, shard.count, TestRecord { shard: None, ..lines.record().clone() }))
+    else {
+        return Err(TestError::Missing(Vec::new()));
+    };
+    for (index, (folder, shard, lines)) in shards.iter().enumerate() {
+        let mut differences = record.differences(lines.record());
+        if shard.count != count {
+            differences.push(format!("{count} and {} shards", shard.count));
+        }
+        if !differences.is_empty() {
+            return Err(TestError::Unlike { first: first.clone(), second: (*folder).clone(), differences });
+        }
+        if let Some((other, ..)) = shards[..index].iter().find(|(_, other, _)| other == shard) {
+            return Err(TestError::Overlap { first: (*other).clone(), second: (*folder).clone(), shard: *shard });
+        }
+    }
+    // Shards of a range that has fewer levels than shards test nothing, and are not there.
+    let wanted = count.min(record.range.len());
+    let is_there = |index: u64| shards.iter().any(|(_, shard, _)| shard.index == index);
+    let missing: Vec<Shard> =
+        (0..wanted).filter(|index| !is_there(*index)).map(|index| Shard { index, count }).collect();
+    if !missing.is_empty() {
+        return Err(TestError::Missing(missing));
+    }
+    shards.sort_by_key(|(_, shard, _)| shard.index);
+    let mut lines: Vec<ResultLines> = shards.into_iter().map(|(_, _, lines)| lines).collect();
+    write_joined(&record, count, &mut lines, out)
+}
+
+fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out: &Path) -> Result<(), TestError> {
+    std::fs::create_dir_all(out).map_err(io_error("create", out))?;
+    let path = out.join(RESULTS);
+    // The writer knows errors of the system alone.
+    let mut damaged = None;
+    let written = write_in_pieces(&path, |file| {
+        let mut results = ResultWriter::begin(file, record)?;
+        for index in 0..record.range.len() {
+            match shards[(index % count) as usize].line_of(index) {
+                Ok(line) => results.push(&line)?,
+                Err(error) => {
+                    damaged = Some(error);
+                    return Err(io::Error::other("a shard is damaged"));
+                }
+            }
+        }
+        results.end()
+    });
+    match (written, damaged) {
+        (_, Some(error)) => Err(error),
+        (written, None) => written.map_err(io_error("write", &path)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::verdict::{
+        TesterRecord,
+        folder::{Earlier, TestFolder},
+        testing::verdict,
+    };
+
+    fn record(shard: Option<&str>) -> TestRecord {
+        TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: "hard:0..10".parse().expect("a split"),
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 1,
+            shard: shard.map(|shard| shard.parse().expect("a shard")),
+        }
+    }
+
+    /// Results of a test, in the folder of this name.
+    fn tested(parent: &Path, name: &str, record: &TestRecord) -> PathBuf {
+        let path = parent.join(name);
+        let (mut folder, _) = TestFolder::open(&path, record, Earlier::Keep).expect("new");
+        let all = record.range.len();
+        let places: Vec<u64> = record.shard.map_or_else(|| (0..all).collect(), |shard| shard.places(all).collect());
+        for index in places.into_iter().rev() {
+            folder.keep(&verdict(index, index % 2, 1)).expect("writable");
+        }
+        folder.finish().expect("writable");
+        path
+    }
+
+    fn results(folder: &Path) -> Vec<u8> {
+        fs::read(folder.join(RESULTS)).expect("results")
+    }
+
+    #[test]
+    fn joined_shards_are_the_whole_to_the_byte() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let whole = tested(parent.path(), "whole", &record(None));
+        for count in [1, 2, 7, 11] {
+            let mut folders: Vec<PathBuf> = (0..count)
+                .map(|index| {
+                    let shard = format!("{index}/{count}");
+                    tested(parent.path(), &shard.replace('/', "-of-"), &record(Some(&shard)))
+                })
+                .collect();
+            folders.reverse();
+            let out = parent.path().join(format!("joined {count}"));
+            merge(&folders, &out).expect("all are there");
+            assert!(results(&out) == results(&whole), "{count} shards");
+        }
+    }
+
+    #[test]
+    fn what_does_not_belong_together_is_named() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let folder = |name: &str, record: &TestRecord| tested(parent.path(), name, record);
+        let (zero, one) = (folder("zero", &record(Some("0/3"))), folder("one", &record(Some("1/3"))));
+        let (again, whole) = (folder("again", &record(Some("1/3"))), folder("whole", &record(None)));
+        let newer = folder("newer", &TestRecord { game_version: 2, ..record(Some("2/3")) });
+        let half = folder("half", &record(Some("1/2")));
+        let said = |folders: &[&PathBuf]| {
+            let folders: Vec<PathBuf> = folders.iter().map(|folder| (*folder).clone()).collect();
+            merge(&folders, &parent.path().join("out")).expect_err("they do not fit").to_string()
+        };
+        for (words, parts) in [
+            (said(&[&zero, &one]), ["missing shard 2/3", "--shard"]),
+            (said(&[&zero, &one, &again]), ["one and ", "again overlap: both are shard 1/3"]),
+            (said(&[&zero, &whole]), ["whole is no shard", "whole range"]),
+            (said(&[&zero, &one, &newer]), ["newer cannot be joined", "versions 1 and 2 of `garden`"]),
+            (said(&[&zero, &half]), ["half cannot be joined", "3 and 2 shards"]),
+            (said(&[&parent.path().join("none")]), ["none has no results.json", "playbot test"]),
+        ] {
+            assert!(parts.iter().all(|part| words.contains(part)), "{words}");
+        }
+        let path = one.join(RESULTS);
+        let cut = String::from_utf8(results(&one)).expect("text").replace("\"index\":4", "\"index\":5");
+        fs::write(path, cut).expect("writable");
+        let two = folder("two", &record(Some("2/3")));
+        let words = said(&[&zero, &one, &two]);
+        assert!(words.contains("results.json, line 3: this is not the level with index 4"), "{words}");
+        assert!(!parent.path().join("out").join(RESULTS).exists(), "nothing is half there");
+    }
+}

@@ -1,0 +1,59 @@
+//! Verdicts: what bots and policies say of each level of a range.
+//!
+//! - A [`TestPlan`] names levels, [`Tester`]s, episodes and a seed; [`run_tests`] plays them on all cores, and makes a
+//!   [`LevelVerdict`] of each level: solved, bot failed, or proved unsolvable.
+//! - A [`TestFolder`] keeps them while they come in, so that a test that was killed goes on; [`TestFolder::finish`] writes
+//!   `results.json`, which is the same on any number of threads, and what people and other programs read of it.
+//! - [`merge()`] joins the results of shards to those of the whole range, byte for byte.
+//! - [`Comparison`] tells what has changed since earlier results, and what is noise.
+
+mod atomic;
+mod change;
+mod compare;
+mod ends;
+mod error;
+mod false_discovery;
+mod finish_time;
+mod fisher;
+mod folder;
+mod interval;
+mod journal;
+mod judge;
+mod junit;
+mod level_name;
+mod level_verdict;
+mod merge;
+mod overview;
+mod plan;
+mod play;
+mod played;
+mod report_files;
+mod rerun;
+mod results;
+mod run;
+mod shard;
+mod stage;
+mod summary;
+mod tester;
+#[cfg(test)]
+mod testing;
+
+pub use change::{Change, FindingChange};
+pub use compare::Comparison;
+pub use error::TestError;
+pub use false_discovery::benjamini_hochberg;
+pub use finish_time::FinishTime;
+pub use fisher::{Trials, fisher_exact};
+pub use folder::{Earlier, TestFolder};
+pub use interval::wilson;
+pub use level_name::level_name;
+pub use level_verdict::{EndPlace, Finding, LevelOutcome, LevelVerdict, Score, TesterVerdict};
+pub use merge::merge;
+pub use overview::{Overview, TesterTotal};
+pub use plan::{TestPlan, TestRecord};
+pub use report_files::{AGAINST, JUNIT, SUMMARY, write_reports};
+pub use rerun::rerun_commands;
+pub use results::{RESULTS, ResultLines};
+pub use run::{TestEnd, TestWatch, run_tests};
+pub use shard::{Shard, ShardError};
+pub use tester::{Tester, TesterRecord};

@@ -1,0 +1,160 @@
+//! What results come to.
+
+use std::path::Path;
+
+use super::{
+    error::TestError,
+    fisher::Trials,
+    level_verdict::{LevelOutcome, LevelVerdict},
+    plan::TestRecord,
+    results::ResultLines,
+};
+
+/// Most levels that are told as the worst.
+const MOST_WORST: usize = 20;
+
+/// What a tester did on all levels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TesterTotal {
+    /// Its name.
+    pub name: String,
+    /// Levels that it solved at least once, among all.
+    pub levels: Trials,
+    /// Episodes that it solved, among all.
+    pub episodes: Trials,
+}
+
+/// Numbers of all results, and the worst levels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Overview {
+    /// What was tested.
+    pub record: TestRecord,
+    /// Levels.
+    pub levels: u64,
+    /// Those that were solved.
+    pub solved: u64,
+    /// Those that no tester solved, of which nothing is proved.
+    pub bot_failed: u64,
+    /// Those whose aim cannot be reached.
+    pub proved_unsolvable: u64,
+    /// Findings of all levels.
+    pub findings: u64,
+    /// The testers, in the order of the test.
+    pub testers: Vec<TesterTotal>,
+    /// At most 20 levels that were not solved each time, or of which something was found, the worst ones first.
+    pub worst: Vec<LevelVerdict>,
+}
+
+impl Overview {
+    /// Reads the results in a folder.
+    ///
+    /// # Errors
+    ///
+    /// There are none, or they are damaged.
+    pub fn read(folder: &Path) -> Result<Self, TestError> {
+        let mut lines = ResultLines::open(folder)?;
+        let mut overview = Self::empty(lines.record().clone());
+        while let Some(level) = lines.next_level()? {
+            overview.add(level);
+        }
+        Ok(overview)
+    }
+
+    fn empty(record: TestRecord) -> Self {
+        let total =
+            |name: &String| TesterTotal { name: name.clone(), levels: Trials::default(), episodes: Trials::default() };
+        let testers = record.testers.iter().map(|tester| total(&tester.name)).collect();
+        let worst = Vec::new();
+        Self { record, levels: 0, solved: 0, bot_failed: 0, proved_unsolvable: 0, findings: 0, testers, worst }
+    }
+
+    fn add(&mut self, level: LevelVerdict) {
+        self.levels += 1;
+        self.findings += level.findings.len() as u64;
+        *match level.outcome {
+            LevelOutcome::Solved => &mut self.solved,
+            LevelOutcome::BotFailed => &mut self.bot_failed,
+            LevelOutcome::ProvedUnsolvable => &mut self.proved_unsolvable,
+        } += 1;
+        for (total, tester) in self.testers.iter_mut().zip(&level.testers) {
+            total.levels.trials += 1;
+            total.levels.successes += u64::from(tester.score.solved > 0);
+            total.episodes.trials += tester.score.episodes;
+            total.episodes.successes += tester.score.solved;
+        }
+        let is_perfect = level.is_sound() && level.score.solved == level.score.episodes;
+        if !is_perfect {
+            let place = self.worst.partition_point(|other| is_worse(other, &level));
+            if place < MOST_WORST {
+                self.worst.insert(place, level);
+                self.worst.truncate(MOST_WORST);
+            }
+        }
+    }
+
+    /// Whether every level was solved and nothing was found.
+    pub fn is_sound(&self) -> bool {
+        self.findings == 0 && self.solved == self.levels
+    }
+}
+
+/// Whether a level comes before another one that was tested later.
+fn is_worse(level: &LevelVerdict, later: &LevelVerdict) -> bool {
+    let rank = |level: &LevelVerdict| (level.outcome, level.findings.is_empty());
+    let (one, other) = (level.score.trials(), later.score.trials());
+    let shares = (u128::from(one.successes) * u128::from(other.trials))
+        .cmp(&(u128::from(other.successes) * u128::from(one.trials)));
+    rank(level).cmp(&rank(later)).then(shares).is_le()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        proof::LevelProof,
+        verdict::{Finding, TesterRecord, testing::verdict},
+    };
+
+    #[test]
+    fn the_worst_come_first_and_perfect_ones_not_at_all() {
+        let record = TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: "hard:0..99".parse().expect("a split"),
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 4,
+            shard: None,
+        };
+        let mut overview = Overview::empty(record);
+        for (index, solved) in [4, 3, 0, 1, 0].into_iter().enumerate() {
+            overview.add(verdict(index as u64, solved, 4));
+        }
+        let why = "walled in".to_owned();
+        let finding = Finding {
+            detector: "unreachable-goal".to_owned(),
+            tester: None,
+            episode: None,
+            tick: None,
+            message: why.clone(),
+        };
+        let proved = LevelVerdict {
+            outcome: LevelOutcome::ProvedUnsolvable,
+            proof: LevelProof::Unsolvable { why },
+            findings: vec![finding],
+            ..verdict(5, 0, 4)
+        };
+        overview.add(proved);
+        let worst: Vec<u64> = overview.worst.iter().map(|level| level.index).collect();
+        assert_eq!(worst, [5, 2, 4, 3, 1]);
+        assert_eq!((overview.solved, overview.bot_failed, overview.proved_unsolvable), (3, 2, 1));
+        assert_eq!(overview.testers[0].levels, Trials { successes: 3, trials: 6 });
+        assert_eq!(overview.testers[0].episodes, Trials { successes: 8, trials: 24 });
+        assert!(!overview.is_sound());
+        for index in 6..60 {
+            overview.add(verdict(index, 0, 4));
+        }
+        assert_eq!((overview.worst.len(), overview.worst[0].index), (20, 5));
+    }
+}

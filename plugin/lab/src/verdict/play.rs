@@ -1,0 +1,66 @@
+//! Playing a few episodes to their end, whatever the game does in them.
+
+use bevy_playbot::vision::VisionError;
+
+use super::{
+    played::{Interruption, Played, PlayedEnd, Task, Watch},
+    stage::Stage,
+    tester::Tester,
+};
+use crate::game::Game;
+
+/// Plays episodes and returns what came of them, in their order; `None` if somebody asked to stop.
+///
+/// Many are played in one World. If it breaks, the episodes that were being played are played again, each alone in a World
+/// of its own, and the one that breaks that too is the broken one; all others are played as if nothing had been.
+///
+/// # Errors
+///
+/// The game cannot be seen as the tester needs it.
+pub(super) fn play_tasks(
+    game: &dyn Game,
+    mode: &str,
+    tester: &Tester,
+    tasks: &[Task],
+    watch: &Watch,
+) -> Result<Option<Vec<Played>>, VisionError> {
+    let mut played: Vec<Option<Played>> = vec![None; tasks.len()];
+    let mut waiting: Vec<usize> = (0..tasks.len()).collect();
+    while !waiting.is_empty() {
+        let mut stage = Stage::build(game, mode, tester, tasks, &waiting)?;
+        match stage.play_out(game, &mut played, watch) {
+            Ok(()) => {}
+            Err(Interruption::Stopped) => return Ok(None),
+            Err(Interruption::Broken { .. }) => {
+                for suspect in stage.suspects() {
+                    let Some(alone) = play_alone(game, mode, tester, tasks[suspect], watch)? else { return Ok(None) };
+                    played[suspect] = Some(alone);
+                }
+            }
+        }
+        waiting.retain(|&task| played[task].is_none());
+    }
+    Ok(Some(played.into_iter().flatten().collect()))
+}
+
+/// Plays one episode in a World of its own.
+fn play_alone(
+    game: &dyn Game,
+    mode: &str,
+    tester: &Tester,
+    task: Task,
+    watch: &Watch,
+) -> Result<Option<Played>, VisionError> {
+    let mut stage = Stage::build(game, mode, tester, &[task], &[0])?;
+    let mut played = [None];
+    let end = match stage.play_out(game, &mut played, watch) {
+        Ok(()) => return Ok(played[0].take()),
+        Err(Interruption::Stopped) => return Ok(None),
+        Err(Interruption::Broken { detector, message }) => {
+            (watch.progress)(1);
+            let (tick, message) = stage.without_moment(&message);
+            PlayedEnd::Broken { detector, tick, message }
+        }
+    };
+    Ok(Some(Played { end, exact: stage.is_untouched(0, task.seed) }))
+}

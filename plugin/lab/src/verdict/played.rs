@@ -1,0 +1,64 @@
+//! Episodes to be played, and what came of them.
+
+use bevy::prelude::*;
+use bevy_playbot::episode::EpisodeResult;
+
+/// An episode to be played.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Task {
+    /// The level.
+    pub level: u64,
+    /// Seed of the player's streams.
+    pub seed: u64,
+}
+
+/// What came of an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Played {
+    /// How it ended.
+    pub end: PlayedEnd,
+    /// Whether the player drew no random number.
+    pub exact: bool,
+}
+
+/// How an episode ended.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum PlayedEnd {
+    /// As the game says.
+    Ended {
+        /// What came of it.
+        result: EpisodeResult,
+        /// Where the agent was then, if the game says.
+        place: Option<Vec2>,
+    },
+    /// The game broke.
+    Broken {
+        /// `panic`, `fault` or `endless`.
+        detector: &'static str,
+        /// Tick of the episode, if it had begun.
+        tick: Option<u32>,
+        /// What the game said.
+        message: String,
+    },
+}
+
+/// Why the episodes of a World could not all be played.
+pub(super) enum Interruption {
+    /// Somebody asked to stop.
+    Stopped,
+    /// The World cannot go on.
+    Broken {
+        /// What is wrong.
+        detector: &'static str,
+        /// What the game said.
+        message: String,
+    },
+}
+
+/// How it is watched while it is played.
+pub(super) struct Watch<'a> {
+    /// Hears how many episodes have been finished.
+    pub progress: &'a (dyn Fn(u64) + Sync),
+    /// Whether to stop.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}

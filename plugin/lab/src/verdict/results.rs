@@ -1,0 +1,212 @@
+//! `results.json`: what was tested, and a line for each level.
+//!
+//! The file is one JSON object whose levels stand one to a line, so that files of any length are read and joined without
+//! having them in memory.
+
+use std::{
+    fs::File,
+    io::{self, BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+};
+
+use serde_json::Value;
+
+use super::{
+    error::{TestError, io_error},
+    level_verdict::LevelVerdict,
+    plan::TestRecord,
+};
+
+/// Name of the file in the folder of a test.
+pub const RESULTS: &str = "results.json";
+/// Between what was tested and the first level.
+const LEVELS: &str = ",\"levels\":[";
+/// After the last level.
+const END: &str = "]}";
+
+/// Writes results, a level at a time.
+pub(super) struct ResultWriter<W> {
+    out: W,
+    is_first: bool,
+}
+
+impl<W: Write> ResultWriter<W> {
+    /// Begins with what was tested.
+    pub fn begin(mut out: W, record: &TestRecord) -> io::Result<Self> {
+        let head = serde_json::to_string(record)?;
+        // The record is an object that is not empty, and goes on.
+        writeln!(out, "{}{LEVELS}", head.strip_suffix('}').unwrap_or(&head))?;
+        Ok(Self { out, is_first: true })
+    }
+
+    /// Adds a level, as a line of JSON without line feed.
+    pub fn push(&mut self, line: &str) -> io::Result<()> {
+        let separator = if self.is_first { "" } else { ",\n" };
+        self.is_first = false;
+        write!(self.out, "{separator}{line}")
+    }
+
+    /// Ends the file.
+    pub fn end(mut self) -> io::Result<()> {
+        let line_feed = if self.is_first { "" } else { "\n" };
+        writeln!(self.out, "{line_feed}{END}")
+    }
+}
+
+/// The levels of a `results.json`, in their order, as lines of JSON.
+pub struct ResultLines {
+    path: PathBuf,
+    record: TestRecord,
+    lines: io::Lines<BufReader<File>>,
+    /// Lines read so far.
+    number: usize,
+    is_over: bool,
+}
+
+impl ResultLines {
+    /// Opens the results in a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::NoResults`] if there are none; [`TestError::Damaged`] if they are not as [`TestFolder`](super::TestFolder)
+    /// writes them.
+    pub fn open(folder: &Path) -> Result<Self, TestError> {
+        let path = folder.join(RESULTS);
+        let file = File::open(&path).map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => TestError::NoResults(folder.into()),
+            _ => TestError::Io { action: "read", path: path.clone(), source },
+        })?;
+        let mut lines = BufReader::new(file).lines();
+        let head = lines.next().transpose().map_err(io_error("read", &path))?.unwrap_or_default();
+        let record = head.strip_suffix(LEVELS).map(|record| serde_json::from_str(&format!("{record}}}")));
+        let record = match record {
+            Some(Ok(record)) => record,
+            Some(Err(error)) => return Err(TestError::Damaged { path, line: 1, message: error.to_string() }),
+            None => {
+                let message = "this is not the head of results".to_owned();
+                return Err(TestError::Damaged { path, line: 1, message });
+            }
+        };
+        Ok(Self { path, record, lines, number: 1, is_over: false })
+    }
+
+    /// What was tested.
+    pub fn record(&self) -> &TestRecord {
+        &self.record
+    }
+
+    /// The next level as it is written; `None` after the last one.
+    ///
+    /// # Errors
+    ///
+    /// The file ends before its end, or cannot be read.
+    pub fn next_line(&mut self) -> Result<Option<String>, TestError> {
+        if self.is_over {
+            return Ok(None);
+        }
+        let line = self.lines.next().transpose().map_err(io_error("read", &self.path))?;
+        self.number += 1;
+        match line {
+            Some(line) if line == END => {
+                self.is_over = true;
+                Ok(None)
+            }
+            Some(line) => Ok(Some(line.strip_suffix(',').unwrap_or(&line).to_owned())),
+            None => Err(self.damaged("the file ends in the middle")),
+        }
+    }
+
+    /// The next level; `None` after the last one.
+    ///
+    /// # Errors
+    ///
+    /// The file ends before its end, holds something else, or cannot be read.
+    pub fn next_level(&mut self) -> Result<Option<LevelVerdict>, TestError> {
+        let Some(line) = self.next_line()? else { return Ok(None) };
+        serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&error.to_string()))
+    }
+
+    /// The next level as it is written, if it is the one at this place of the range.
+    ///
+    /// # Errors
+    ///
+    /// It is another one, or none.
+    pub(super) fn line_of(&mut self, index: u64) -> Result<String, TestError> {
+        let line = self.next_line()?.ok_or_else(|| self.damaged("levels are missing"))?;
+        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&error.to_string()))?;
+        match found["index"].as_u64() {
+            Some(found) if found == index => Ok(line),
+            _ => Err(self.damaged(&format!("this is not the level with index {index}"))),
+        }
+    }
+
+    fn damaged(&self, message: &str) -> TestError {
+        TestError::Damaged { path: self.path.clone(), line: self.number, message: message.to_owned() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::verdict::TesterRecord;
+
+    fn record() -> TestRecord {
+        TestRecord {
+            game: "garden".to_owned(),
+            game_version: 3,
+            range: "bed:2..3".parse().expect("a split"),
+            files: None,
+            seed: 5,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 2,
+            shard: Some("0/2".parse().expect("a shard")),
+        }
+    }
+
+    fn written(lines: &[&str]) -> String {
+        let mut bytes = Vec::new();
+        let mut writer = ResultWriter::begin(&mut bytes, &record()).expect("writable");
+        lines.iter().for_each(|line| writer.push(line).expect("writable"));
+        writer.end().expect("writable");
+        String::from_utf8(bytes).expect("text")
+    }
+
+    #[test]
+    fn the_file_is_one_object_and_reads_back_line_by_line() {
+        let text = written(&[r#"{"index":0,"a":1}"#, r#"{"index":1}"#]);
+        let value: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!((value["game"].as_str(), value["range"].as_str()), (Some("garden"), Some("bed:2..3")));
+        assert_eq!(value["levels"].as_array().map(Vec::len), Some(2));
+        serde_json::from_str::<Value>(&written(&[])).expect("without levels too");
+
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join(RESULTS), &text).expect("writable");
+        let mut lines = ResultLines::open(folder.path()).expect("whole");
+        assert_eq!(*lines.record(), record());
+        assert_eq!(lines.line_of(0).expect("the first"), r#"{"index":0,"a":1}"#);
+        assert!(lines.line_of(2).is_err(), "the next one has index 1");
+        assert_eq!(lines.next_line().expect("the end"), None);
+        assert_eq!(lines.next_line().expect("still the end"), None);
+    }
+
+    #[test]
+    fn what_is_no_result_is_named_with_its_line() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let open = || ResultLines::open(folder.path());
+        assert!(matches!(open(), Err(TestError::NoResults(path)) if path == folder.path()));
+        let text = written(&[r#"{"index":0}"#]);
+        let head = text.lines().next().expect("a head");
+        let cut = format!("{head}\n{{\"index\":0}}");
+        for (text, line) in [("{}", 1), ("{\"a\":1,\"levels\":[", 1), (head, 2), (cut.as_str(), 3)] {
+            fs::write(folder.path().join(RESULTS), text).expect("writable");
+            let all = open().and_then(|mut lines| {
+                while lines.next_line()?.is_some() {}
+                Ok(())
+            });
+            let found = all.expect_err(text).to_string();
+            assert!(found.contains(&format!("{RESULTS}, line {line}: ")), "{found}");
+        }
+    }
+}

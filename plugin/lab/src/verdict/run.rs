@@ -1,0 +1,179 @@
+//! Testing a range of levels on all cores.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use super::{
+    error::TestError,
+    judge::judge,
+    level_name::level_name,
+    level_verdict::LevelVerdict,
+    plan::TestPlan,
+    play::play_tasks,
+    played::{Played, Task, Watch},
+};
+use crate::{eval::EvalError, game::Game};
+use bevy_playbot::fault::Fault;
+
+/// Levels are handed out in about so many portions, so that no thread waits long for the last one.
+const PORTIONS: usize = 64;
+/// Most episodes of a portion, so that little is in memory and little is lost when somebody stops.
+const MOST_EPISODES: usize = 128;
+
+/// Whether a test came to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TestEnd {
+    /// Every level was tested.
+    Done,
+    /// Somebody asked to stop.
+    Stopped,
+}
+
+/// How a test is watched.
+pub struct TestWatch<'a> {
+    /// Hears how many more episodes have been finished; called from several threads.
+    pub progress: &'a (dyn Fn(u64) + Sync),
+    /// Whether to stop; what is finished is kept.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// What the threads share.
+struct Shared<'a> {
+    next: usize,
+    /// Portions that some testers have played: by portion and tester.
+    open: BTreeMap<usize, Vec<Option<Vec<Played>>>>,
+    keep: &'a mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
+    failure: Option<TestError>,
+    is_stopped: bool,
+}
+
+/// Tests every level of the plan but those at the places in `finished`, and hands each verdict to `keep`, in no particular
+/// order. What is in memory does not grow with the number of levels.
+///
+/// Episodes depend on nothing but the plan's seed, their tester and their level: not on the threads, the shard, or on what
+/// else is tested. A game that keeps something from one episode to the next breaks that, and `playbot doctor` says so.
+///
+/// # Errors
+///
+/// The plan tests nothing, the game cannot be played at all, or `keep` failed.
+pub fn run_tests(
+    game: &dyn Game,
+    plan: &TestPlan,
+    finished: &BTreeSet<u64>,
+    keep: &mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
+    watch: &TestWatch,
+) -> Result<TestEnd, TestError> {
+    plan.check()?;
+    if let Some(problem) = game.problem() {
+        return Err(EvalError::from(Fault(problem)).into());
+    }
+    let places: Vec<u64> = plan.places().into_iter().filter(|place| !finished.contains(place)).collect();
+    let most = (MOST_EPISODES / plan.episodes.max(1) as usize).max(1);
+    let size = places.len().div_ceil(PORTIONS).clamp(1, most);
+    let portions: Vec<&[u64]> = places.chunks(size).collect();
+    let shared = Shared { next: 0, open: BTreeMap::new(), keep, failure: None, is_stopped: false };
+    let shared = Mutex::new(shared);
+    let threads = plan.threads.clamp(1, (portions.len() * plan.testers.len()).max(1));
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(|| work(game, plan, &portions, &shared, watch));
+        }
+        work(game, plan, &portions, &shared, watch);
+    });
+    let Shared { failure, is_stopped, .. } = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match failure {
+        Some(error) => Err(error),
+        None if is_stopped => Ok(TestEnd::Stopped),
+        None => Ok(TestEnd::Done),
+    }
+}
+
+fn lock<'a, 'b>(shared: &'a Mutex<Shared<'b>>) -> MutexGuard<'a, Shared<'b>> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What one thread does: portion after portion, each by one tester after the other.
+fn work(game: &dyn Game, plan: &TestPlan, portions: &[&[u64]], shared: &Mutex<Shared>, watch: &TestWatch) {
+    let testers = plan.testers.len();
+    loop {
+        let job = {
+            let mut shared = lock(shared);
+            if shared.failure.is_some() || shared.is_stopped {
+                return;
+            }
+            shared.next += 1;
+            shared.next - 1
+        };
+        let (portion, tester) = (job / testers, job % testers);
+        let Some(places) = portions.get(portion) else { return };
+        let played = match play_portion(game, plan, tester, places, watch) {
+            Ok(Some(played)) => played,
+            Ok(None) => {
+                lock(shared).is_stopped = true;
+                return;
+            }
+            Err(error) => {
+                lock(shared).failure.get_or_insert(error);
+                return;
+            }
+        };
+        let Some(complete) = add(shared, portion, tester, testers, played) else { continue };
+        let verdicts = judge_portion(game, plan, places, &complete);
+        let mut shared = lock(shared);
+        for verdict in verdicts {
+            if shared.failure.is_none()
+                && let Err(error) = (shared.keep)(verdict)
+            {
+                shared.failure = Some(error);
+            }
+        }
+    }
+}
+
+fn play_portion(
+    game: &dyn Game,
+    plan: &TestPlan,
+    tester: usize,
+    places: &[u64],
+    watch: &TestWatch,
+) -> Result<Option<Vec<Played>>, TestError> {
+    let tester = &plan.testers[tester];
+    let mut tasks = Vec::new();
+    for place in places {
+        let level = plan.split.first + place;
+        let name = level_name(game, &plan.split, level);
+        let seed = |episode| plan.episode_seed(&tester.record, &name, episode);
+        tasks.extend((0..plan.episodes.max(1)).map(|episode| Task { level, seed: seed(episode) }));
+    }
+    let watch = Watch { progress: watch.progress, stop: watch.stop };
+    play_tasks(game, &plan.split.mode, tester, &tasks, &watch).map_err(|error| EvalError::from(error).into())
+}
+
+/// Adds what a tester played of a portion; the episodes of all of them once it is complete.
+fn add(
+    shared: &Mutex<Shared>,
+    portion: usize,
+    tester: usize,
+    testers: usize,
+    played: Vec<Played>,
+) -> Option<Vec<Vec<Played>>> {
+    let mut shared = lock(shared);
+    let open = shared.open.entry(portion).or_insert_with(|| vec![None; testers]);
+    open[tester] = Some(played);
+    if open.iter().any(Option::is_none) {
+        return None;
+    }
+    shared.open.remove(&portion).map(|complete| complete.into_iter().flatten().collect())
+}
+
+fn judge_portion(game: &dyn Game, plan: &TestPlan, places: &[u64], complete: &[Vec<Played>]) -> Vec<LevelVerdict> {
+    let episodes = plan.episodes.max(1) as usize;
+    let verdict = |(number, place): (usize, &u64)| {
+        let own = number * episodes..(number + 1) * episodes;
+        let played: Vec<&[Played]> = complete.iter().map(|episodes| &episodes[own.clone()]).collect();
+        judge(game, plan, *place, &played)
+    };
+    places.iter().enumerate().map(verdict).collect()
+}

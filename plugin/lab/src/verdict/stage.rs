@@ -1,0 +1,188 @@
+//! A World in which testers play their episodes.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    agent::Agent,
+    control::Control,
+    episode::{Episode, EpisodeEnded, EpisodeResult},
+    headless::tick_world,
+    level::LevelQueue,
+    panics::PanicReports,
+    renewal::Renewal,
+    streams::{AgentStreams, EpisodeSeeds},
+    vision::{ObservationConfig, VisionError},
+};
+
+use super::{
+    played::{Interruption, Played, PlayedEnd, Task, Watch},
+    tester::Tester,
+};
+use crate::{arrangement::at_most, eval::Player, game::Game, worlds::build_observing_world};
+
+/// Most arenas of a World. It changes no result.
+const MOST_ARENAS: usize = 16;
+/// Ticks after which an episode counts as one that never ends: more than four hours at 60 a second.
+const MOST_TICKS: u32 = 1_000_000;
+/// How a game's panic is told, behind where it was.
+const PANICKED: &str = "the game panicked: ";
+
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
+struct EndedEpisodes(Vec<(Entity, EpisodeResult)>);
+
+fn note_end(event: On<EpisodeEnded>, mut ended: ResMut<EndedEpisodes>) {
+    ended.0.push((event.entity, event.result));
+}
+
+/// An agent and what it plays, in this order.
+struct Seat {
+    agent: Entity,
+    /// Which tasks, with the seeds of their episodes.
+    tasks: Vec<(usize, u64)>,
+    done: usize,
+}
+
+/// The World and who plays in it.
+pub(super) struct Stage {
+    world: World,
+    seats: Vec<Seat>,
+}
+
+impl Stage {
+    /// A World for the tasks that wait, shared out evenly over its agents.
+    pub fn build(
+        game: &dyn Game,
+        mode: &str,
+        tester: &Tester,
+        tasks: &[Task],
+        waiting: &[usize],
+    ) -> Result<Self, VisionError> {
+        let player = &tester.player;
+        let sees = matches!(player, Player::Policy { .. });
+        let observation_config = if sees { tester.observation_config } else { ObservationConfig::default() };
+        let count = at_most(game, MOST_ARENAS.min(waiting.len()));
+        // Agents have the seeds of their episodes; that of the World is left to the game, and always the same.
+        let (mut world, agents) = build_observing_world(game, mode, &observation_config, 0, 0, count as u32)?;
+        Renewal::set_up(&mut world, |world| {
+            world.init_resource::<EndedEpisodes>();
+            world.add_observer(note_end);
+        });
+        Renewal::carry_resource::<EndedEpisodes>(&mut world);
+        if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
+            // The episode can be played again by its level and its seed.
+            reports.keep_no_files();
+        }
+        let mut seats = Vec::new();
+        for (offset, agent) in agents.into_iter().enumerate() {
+            let own = waiting.iter().skip(offset).step_by(count).map(|&task| (task, tasks[task].seed));
+            let own: Vec<(usize, u64)> = own.collect();
+            let levels: Vec<u64> = own.iter().map(|(task, _)| tasks[*task].level).collect();
+            let seeds: Vec<u64> = own.iter().map(|(_, seed)| *seed).collect();
+            world.entity_mut(agent).insert((LevelQueue::list(levels), EpisodeSeeds::new(seeds)));
+            let control = player.seat(game, &mut world, agent);
+            world.entity_mut(agent).insert(control);
+            seats.push(Seat { agent, tasks: own, done: 0 });
+        }
+        player.install(&mut world);
+        Ok(Self { world, seats })
+    }
+
+    /// Ticks until everybody has played, and notes what came of it.
+    pub fn play_out(
+        &mut self,
+        game: &dyn Game,
+        played: &mut [Option<Played>],
+        watch: &Watch,
+    ) -> Result<(), Interruption> {
+        while self.seats.iter().any(|seat| Control::of(&self.world, seat.agent).is_active()) {
+            if (watch.stop)() {
+                return Err(Interruption::Stopped);
+            }
+            if let Err(fault) = tick_world(&mut self.world) {
+                let message = fault.to_string();
+                let detector = if message.contains(PANICKED) { "panic" } else { "fault" };
+                return Err(Interruption::Broken { detector, message });
+            }
+            self.note_ends(game, played, watch);
+            if self.longest() >= MOST_TICKS {
+                let message = format!("the episode has not ended after {MOST_TICKS} ticks: give the game a time limit");
+                return Err(Interruption::Broken { detector: "endless", message });
+            }
+        }
+        Ok(())
+    }
+
+    fn note_ends(&mut self, game: &dyn Game, played: &mut [Option<Played>], watch: &Watch) {
+        let ended = std::mem::take(&mut self.world.resource_mut::<EndedEpisodes>().0);
+        for (agent, result) in ended {
+            let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
+            let Some(&(task, seed)) = self.seats[seat].tasks.get(self.seats[seat].done) else { continue };
+            let place = game.whereabouts(&self.world, agent);
+            let exact = self.is_untouched(seat, seed);
+            played[task] = Some(Played { end: PlayedEnd::Ended { result, place }, exact });
+            self.seats[seat].done += 1;
+            (watch.progress)(1);
+        }
+    }
+
+    /// Ticks of the longest episode that is being played.
+    fn longest(&self) -> u32 {
+        let ticks = |seat: &Seat| self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick);
+        let playing = self.seats.iter().filter(|seat| is_playing(&self.world, seat.agent));
+        playing.map(ticks).max().unwrap_or(0)
+    }
+
+    /// The tasks one of which may have broken the World: those that were being played or have just ended, or else those
+    /// that would be next.
+    pub fn suspects(&self) -> Vec<usize> {
+        let ended = self.world.get_resource::<EndedEpisodes>().map_or(&[][..], |ended| ended.0.as_slice());
+        let is_begun =
+            |seat: &&Seat| is_playing(&self.world, seat.agent) || ended.iter().any(|(agent, _)| *agent == seat.agent);
+        let task = |seat: &Seat| seat.tasks.get(seat.done).map(|(task, _)| *task);
+        let begun: Vec<usize> = self.seats.iter().filter(is_begun).filter_map(task).collect();
+        if begun.is_empty() { self.seats.iter().filter_map(task).collect() } else { begun }
+    }
+
+    /// Whether nothing was drawn from a player's streams in the episode with this seed.
+    pub fn is_untouched(&self, seat: usize, seed: u64) -> bool {
+        let streams = self.seats.get(seat).and_then(|seat| self.world.get::<AgentStreams>(seat.agent));
+        streams.is_some_and(|streams| *streams == EpisodeSeeds::streams(seed))
+    }
+
+    /// The tick in which the only agent broke the World, and what the game said of it, without the place that the report of
+    /// the level names anyway.
+    pub fn without_moment(&self, message: &str) -> (Option<u32>, String) {
+        let agent = self.seats.first().map(|seat| seat.agent);
+        let parts = agent.and_then(|agent| Some((self.world.get::<Agent>(agent)?, self.world.get::<Episode>(agent)?)));
+        let Some((agent, episode)) = parts else { return (None, message.to_owned()) };
+        let told = told_tick(message, agent.index, episode.level);
+        let is_begun = episode.is_running() || episode.is_loading();
+        let (tick, rest) = told.map_or((is_begun.then_some(episode.tick), message), |(tick, rest)| (Some(tick), rest));
+        (tick, rest.strip_prefix(PANICKED).unwrap_or(rest).to_owned())
+    }
+}
+
+/// The tick that a message begins with, as in `agent 0, level 3, tick 7: words`, and the words.
+fn told_tick(message: &str, agent: u32, level: u64) -> Option<(u32, &str)> {
+    let rest = message.strip_prefix(&format!("agent {agent}, level {level}, tick "))?;
+    let (tick, words) = rest.split_once(": ")?;
+    Some((tick.parse().ok()?, words))
+}
+
+/// Whether an agent has an episode that is not over.
+fn is_playing(world: &World, agent: Entity) -> bool {
+    let is_begun = |episode: &Episode| episode.is_running() || episode.is_loading();
+    Control::of(world, agent).is_active() && world.get::<Episode>(agent).is_some_and(is_begun)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_moment_is_taken_from_the_words() {
+        assert_eq!(told_tick("agent 0, level 3, tick 7: it burns: hot", 0, 3), Some((7, "it burns: hot")));
+        assert_eq!(told_tick("agent 0, level 3, after tick 7: late", 0, 3), None);
+        assert_eq!(told_tick("the policy cannot decide", 0, 3), None);
+    }
+}

@@ -1,0 +1,98 @@
+//! Results in a page of Markdown, short enough for a pull request.
+
+use std::fmt::Display;
+
+use super::{
+    compare::Comparison, fisher::Trials, interval::wilson, junit::message, overview::Overview, rerun::rerun_commands,
+};
+
+/// Most changes of a kind that are listed.
+const MOST_CHANGES: usize = 20;
+
+/// The page.
+pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, program: &str) -> String {
+    let record = &overview.record;
+    let mut lines = vec![format!("# {} {}", record.game, cell(&record.range.to_string())), String::new()];
+    let solved = Trials { successes: overview.solved, trials: overview.levels };
+    lines.push(format!(
+        "**{} levels**: {} solved{}, {} not solved by any tester, {} proved unsolvable; {} findings.",
+        overview.levels,
+        overview.solved,
+        interval(solved),
+        overview.bot_failed,
+        overview.proved_unsolvable,
+        overview.findings
+    ));
+    lines.extend(["", "| tester | levels solved | episodes solved |", "|---|---:|---:|"].map(str::to_owned));
+    for tester in &overview.testers {
+        let share = |of: Trials| format!("{} of {}{}", of.successes, of.trials, interval(of));
+        lines.push(format!("| {} | {} | {} |", cell(&tester.name), share(tester.levels), share(tester.episodes)));
+    }
+    if let Some(comparison) = comparison {
+        lines.extend(compared(comparison));
+    }
+    if !overview.worst.is_empty() {
+        lines
+            .extend(["", "## Levels to look at", "", "| level | outcome | what |", "|---|---|---|"].map(str::to_owned));
+        for level in &overview.worst {
+            let what = cell(&message(level));
+            lines.push(format!("| {} | {} | {what} |", cell(&level.level), level.outcome.name()));
+        }
+        let shown = overview.worst.first().map(|level| rerun_commands(program, record, level)).unwrap_or_default();
+        if !shown.is_empty() {
+            lines.extend(["", "The first one again:", "", "```sh"].map(str::to_owned));
+            lines.extend(shown);
+            lines.push("```".to_owned());
+        }
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+/// The 95 % interval of a share, in percent.
+pub(super) fn interval(of: Trials) -> String {
+    let [low, high] = wilson(of.successes, of.trials).map(|share| 100.0 * share);
+    format!(" ({low:.1} to {high:.1} %)")
+}
+
+fn compared(comparison: &Comparison) -> Vec<String> {
+    let mut lines = vec![String::new(), "## Since the earlier results".to_owned(), String::new()];
+    let Comparison { levels, only_now, only_before, .. } = comparison;
+    lines.push(format!("{levels} levels in both, {only_now} only now, {only_before} only before."));
+    lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", cell(why))));
+    let mut list = |title: &str, changes: Vec<String>| {
+        if changes.is_empty() {
+            return;
+        }
+        lines.extend([String::new(), format!("{title} ({}):", changes.len()), String::new()]);
+        let more = changes.len().saturating_sub(MOST_CHANGES);
+        lines.extend(changes.into_iter().take(MOST_CHANGES).map(|change| format!("- {}", cell(&change))));
+        lines.extend((more > 0).then(|| format!("- and {more} more")));
+    };
+    list("Unsolvable", texts(&comparison.unsolvable));
+    list("Harder", texts(&comparison.harder));
+    list("Easier", texts(&comparison.easier));
+    list("New findings", texts(&comparison.new_findings));
+    list("Gone findings", texts(&comparison.gone_findings));
+    if !comparison.has_alarms() && comparison.easier.is_empty() && comparison.gone_findings.is_empty() {
+        lines.extend([String::new(), "Nothing has changed by more than chance.".to_owned()]);
+    }
+    lines
+}
+
+fn texts(changes: &[impl Display]) -> Vec<String> {
+    changes.iter().map(ToString::to_string).collect()
+}
+
+/// Text that neither ends a cell of a table nor begins anything in Markdown.
+fn cell(text: &str) -> String {
+    let mut out = String::new();
+    for letter in text.chars() {
+        match letter {
+            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
+            letter if letter.is_control() => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out
+}
