@@ -179,12 +179,14 @@ impl Game for AntMaze {
 /// A level of a mode, as it is played.
 fn shown_level(game: &dyn Game, mode: &str, seed: u64) -> Result<ShownMaze, InspectError> {
     game.check_mode(mode)?;
-    shown(&level_of(game, mode, seed).map_err(InspectError::Usage)?)
+    let level = level_of(game, mode, seed).map_err(InspectError::Usage)?;
+    shown(&level)
 }
 
 /// The level of a file.
 fn shown_drawn(designs: &LevelDesigns) -> Result<ShownMaze, InspectError> {
-    shown(&designs.get::<AntMazeLevel>(0).map_err(InspectError::Usage)?)
+    let level = designs.get::<AntMazeLevel>(0).map_err(InspectError::Usage)?;
+    shown(&level)
 }
 
 fn shown(level: &AntMazeLevel) -> Result<ShownMaze, InspectError> {

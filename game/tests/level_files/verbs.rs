@@ -122,7 +122,7 @@ fn training_takes_files_too() {
     )
     .expect("writable");
     let train =
-        |more: &[&str]| [&["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--steps", "128"], more].concat();
+        |more: &[&'static str]| [&["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--steps", "128"], more].concat();
     done(folder, &train(&["--run", "run"]));
     done(folder, &["eval", "--run", "run", "--json"]);
     let (_, words) = ended(folder, &train(&["--run", "leak", "--set", "test=files:train/2.json"]), 3);
