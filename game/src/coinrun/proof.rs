@@ -12,9 +12,10 @@ pub(super) fn prove(level: Arc<Level>) -> LevelProof {
     if !coin_is_unreachable(&Sim::new(level)) {
         return LevelProof::Unknown;
     }
-    let why = "the coin cannot be reached: a search over all cells, in which nothing kills and every place may give support \
+    let why =
+        "the coin cannot be reached: a search over all cells, in which nothing kills and every place may give support \
                for a whole jump, ended without it"
-        .to_owned();
+            .to_owned();
     LevelProof::Unsolvable { why }
 }
 

@@ -121,8 +121,9 @@ fn training_takes_files_too() {
             ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]), eval: (episodes_per_level: 1))"#,
     )
     .expect("writable");
-    let train =
-        |more: &[&'static str]| [&["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--steps", "128"], more].concat();
+    let train = |more: &[&'static str]| {
+        [&["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--steps", "128"], more].concat()
+    };
     done(folder, &train(&["--run", "run"]));
     done(folder, &["eval", "--run", "run", "--json"]);
     let (_, words) = ended(folder, &train(&["--run", "leak", "--set", "test=files:train/2.json"]), 3);

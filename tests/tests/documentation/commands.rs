@@ -5,7 +5,7 @@ use std::fs;
 use super::blocks::{Document, blocks, documents, workspace};
 
 /// Verbs whose first argument is the name of a game.
-const OF_A_GAME: [&str; 8] = ["record", "play", "doctor", "level", "test", "trace", "view", "eyes"];
+const OF_A_GAME: [&str; 9] = ["record", "play", "doctor", "level", "test", "explore", "trace", "view", "eyes"];
 
 /// The commands of a shell's text, in words: lines go on behind a backslash, `#` begins a comment, `&&` another command.
 fn commands(text: &str) -> Vec<Vec<String>> {
