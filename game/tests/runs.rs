@@ -30,6 +30,8 @@ fn runs_are_listed_shown_and_compared() {
 
     let (listed, _) = ended(folder, &["runs", "ls"], 0);
     assert_eq!(listed.lines().filter(|line| line.starts_with("runs/") && line.contains("512")).count(), 3, "{listed}");
+    let (alone, _) = ended(folder, &["runs"], 0);
+    assert_eq!(alone.lines().count(), listed.lines().count(), "without a verb of its own it lists: {alone}");
     let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
     let paths: Vec<_> = rows.iter().filter_map(|row| row["path"].as_str()).collect();
     assert_eq!(paths, ["runs/a/1", "runs/a/2", "runs/b"]);
@@ -88,6 +90,34 @@ fn runs_without_an_episode_are_left_out_and_early_ones_say_so() {
 }
 
 #[test]
+fn a_run_stands_where_it_goes_on_and_is_in_training_while_somebody_has_its_lock() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    // As if it had been killed after another update of a longer training.
+    let (experiment, metrics) = (folder.join("runs/b/experiment.ron"), folder.join("runs/b/metrics.jsonl"));
+    let text = fs::read_to_string(&experiment).expect("written");
+    assert!(text.contains(" steps: 512,"), "{text}");
+    fs::write(&experiment, text.replace(" steps: 512,", " steps: 1024,")).expect("writable");
+    let text = fs::read_to_string(&metrics).expect("written");
+    fs::write(&metrics, text + "{\"step\":640}\n").expect("writable");
+
+    let (table, _) = ended(folder, &["runs", "ls", "runs/b"], 0);
+    assert!(table.contains(" 512 ") && table.contains("can be resumed"), "{table}");
+    let row = &json_lines(&ended(folder, &["runs", "ls", "runs/b", "--json"], 0).0)[0];
+    assert!(row["steps"] == 512 && row["steps_logged"] == 640 && row["training"] == false, "{row}");
+    let (shown, _) = ended(folder, &["runs", "show", "runs/b"], 0);
+    assert!(shown.contains("512 of 1,024 steps (those after it, up to 640, are not saved), not finished"), "{shown}");
+
+    let lock = fs::File::open(folder.join("runs/b/run.lock")).expect("there");
+    lock.lock().expect("nobody has it");
+    let (table, _) = ended(folder, &["runs", "ls", "runs/b"], 0);
+    assert!(table.contains(" 640 ") && table.contains("training") && !table.contains("resumed"), "{table}");
+    let (shown, _) = ended(folder, &["runs", "show", "runs/b"], 0);
+    assert!(shown.contains("640 of 1,024 steps, training"), "{shown}");
+}
+
+#[test]
 fn the_threshold_is_that_of_the_experiments() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
@@ -142,6 +172,7 @@ fn damaged_runs_are_named() {
     fs::write(folder.join("runs/b/run.json"), "{").expect("writable");
     let (listed, _) = ended(folder, &["runs", "ls"], 1);
     assert!(listed.contains("runs/a/1") && listed.contains("damaged: runs/b/run.json"), "{listed}");
+    assert!(listed.contains("bring it back from a copy"), "{listed}");
     assert!(json_lines(&ended(folder, &["runs", "ls", "--json"], 1).0)[2]["error"].is_string());
     ended(folder, &["runs", "compare", "runs"], 3);
     let forget = |run: &str| {

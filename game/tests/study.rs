@@ -112,7 +112,8 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     ok(study(folder, "killed", &["--resume"]));
     assert!(written(folder) == expected);
     assert_eq!(fs::metadata(&metrics).and_then(|data| data.modified()).expect("there"), before, "it ran again");
-    refused(&study(folder, "killed", &["--resume", "--set", "ppo.lr=0.1"]), "other settings");
+    let other = study(folder, "killed", &["--resume", "--set", "ppo.lr=0.1"]);
+    refused(&other, "other settings: `--set ppo.lr=0.1` asks for ppo.lr=0.1, and the run has 0.0005; ");
 }
 
 #[test]

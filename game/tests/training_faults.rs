@@ -125,7 +125,10 @@ fn a_torn_checkpoint_is_passed_over_for_the_one_before() {
     std::fs::write(&last, &bytes[..bytes.len() / 2]).expect("writable");
     let resumed = resume(folder.path(), "whole");
     assert!(resumed.status.success(), "{}", errors(&resumed));
-    assert!(errors(&resumed).contains("cannot be read"), "{}", errors(&resumed));
+    let words = errors(&resumed);
+    assert!(words.contains("warning: the checkpoint of step ") && words.contains("the file is cut off"), "{words}");
+    assert!(words.contains("); going on from step ") && !words.contains("WARN"), "{words}");
+    assert_eq!(words.matches("cannot be read").count(), 1, "{words}");
     assert!(results(&run) == before, "going on from the checkpoint before changed the result");
 }
 
@@ -178,8 +181,13 @@ fn a_killed_skill_training_goes_on_bit_for_bit() {
     let (_, refused) = ended(folder.path(), &learn("killed", &[]), 3);
     assert!(refused.contains("--resume"), "{refused}");
     let (_, other) = ended(folder.path(), &learn("killed", &["--resume", "--set", "skills.lr=0.5"]), 3);
-    assert!(other.contains("other settings"), "{other}");
+    let words = "other settings: `--set skills.lr=0.5` asks for skills.lr=0.5, and the training has ";
+    assert!(other.contains(words) && other.contains("start anew with --force"), "{other}");
     done(folder.path(), &learn("killed", &["--resume"]));
+    let (_, finished) = ended(folder.path(), &learn("killed", &["--resume"]), 0);
+    assert!(finished.contains("killed is finished") && finished.contains("train --skills killed"), "{finished}");
+    let (_, nothing) = ended(folder.path(), &learn("none", &["--resume"]), 3);
+    assert!(nothing.contains("nothing to resume") && nothing.contains("leave --resume out"), "{nothing}");
     let read = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
     assert!(read("whole") == read("killed"), "killing it changed the result");
     assert!(!checkpoint.exists(), "nothing is left over");

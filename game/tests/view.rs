@@ -194,7 +194,7 @@ fn bad_wishes_are_refused_in_words() {
         (&["--image", "stack=99"], 3, "stack is 99"),
         (&["--image", "widht=64"], 3, "did you mean `width`?"),
         (&["--image", "height=tall"], 3, "must be a whole number, not tall"),
-        (&["--scale", "0"], 3, "0 is not in 1..=32"),
+        (&["--scale", "0"], 3, "it must be a whole number from 1 to 32"),
         (&[&large[..], &["--scale", "32"]].concat(), 3, "524768 x 32768 pixels"),
         (&[&large[..], &["--scale", "1", "--episode"]].concat(), 3, "more than 1024 MiB of memory"),
         (&["--tick", "5000"], 3, "there is no tick 5000: the episode has"),

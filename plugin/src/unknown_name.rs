@@ -13,7 +13,7 @@ use thiserror::Error;
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[error("unknown {what} `{name}`{}; {}", hint(.near), choice(.valid))]
 pub struct UnknownName {
-    /// What was named: `game`, `mode`, `method`.
+    /// What was named: `game`, `mode`, `bot`.
     pub what: &'static str,
     /// The name that was given.
     pub name: String,

@@ -1,6 +1,10 @@
 //! A maze for people, for programs, and as a drawing.
 
-use std::{fs::File, io::Read, path::Path};
+use std::{
+    fs::File,
+    io::{self, Read},
+    path::Path,
+};
 
 use bevy::math::{Rect, Vec2};
 use playbot_lab::{
@@ -108,10 +112,18 @@ fn no_seed(map: &str) -> InspectError {
     InspectError::Usage(format!("`{map}` has no seed: leave --seed out, or take --map random"))
 }
 
+/// Why what was named is no file either.
+fn no_file(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "and there is no file of that name".to_owned(),
+        _ => format!("and no file of that name can be read: {error}"),
+    }
+}
+
 /// The maze in a file of rows; `unknown` says that the text names no map either.
 fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze, InspectError> {
     let shown = path.display();
-    let file = File::open(path).map_err(|error| InspectError::Usage(format!("{unknown}; and no file: {error}")))?;
+    let file = File::open(path).map_err(|error| InspectError::Usage(format!("{unknown}; {}", no_file(&error))))?;
     if request.seed.is_some() {
         return Err(no_seed(&shown.to_string()));
     }

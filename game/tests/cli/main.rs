@@ -2,6 +2,7 @@
 
 mod eval;
 mod explore;
+mod paths;
 #[path = "../shared/program.rs"]
 mod program;
 mod switches;

@@ -68,7 +68,8 @@ fn the_waypoint_bot_solves_sound_mazes_and_no_sealed_one() {
     let shown = done(folder, &["level", "maze2d", "--file", "sealed.json"]).0;
     assert!(shown.contains("no way from the start to the goal"), "{shown}");
     assert!(level(folder, &["maze2d", "--file", "sealed.json"]).get("shortest_path_length").is_none());
-    done(folder, &["level", "antmaze", "--file", "sealed.json", "--png", "sealed.svg"]);
+    write(folder, "plain.json", &json!({ "rows": sealed }));
+    done(folder, &["level", "antmaze", "--file", "plain.json", "--png", "sealed.svg"]);
 }
 
 #[test]
@@ -117,7 +118,7 @@ fn training_takes_files_too() {
     }
     fs::write(
         folder.join("tiny.ron"),
-        r#"(game: "coinrun", train: "files:train/*.json", test: "files:test/*.json", arenas: 4, worlds: 1,
+        r#"(game: "coinrun", train: "files:train/*.json", test: "files:test/*.json", arenas: 4, worlds: 1, steps: 128,
             ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]), eval: (episodes_per_level: 1))"#,
     )
     .expect("writable");

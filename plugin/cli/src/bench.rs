@@ -79,12 +79,12 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             print_line(measured.to_json(name, &args))?;
         } else {
             print_line(format!(
-                "{name}: {:.0} steps/s with {} arenas on {} threads; peak memory {:.0} MiB; {}",
+                "{name}: {:.0} steps/s with {} arenas on {} threads; peak memory {:.0} MiB; in a step {}",
                 measured.steps_per_s,
                 args.arenas,
                 args.threads,
                 peak_rss_mib(),
-                measured.parts
+                measured.parts_in_words()
             ))?;
         }
     }
@@ -122,6 +122,12 @@ impl Measure {
             "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
             "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts,
         })
+    }
+
+    /// The parts in the order in which they happen.
+    fn parts_in_words(&self) -> String {
+        let part = |name: &&str| Some(format!("{name} {} µs", self.parts.get(*name)?.as_f64()?));
+        ["simulate", "observe", "infer", "record", "learn"].iter().filter_map(part).collect::<Vec<_>>().join(", ")
     }
 }
 

@@ -29,13 +29,11 @@ pub fn check_skills(
         return Ok(observation_config);
     }
     let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
-    let whose = if others.is_empty() { "no game".to_owned() } else { others.join(" or ") };
-    let advice = match from.names_game() {
-        true => "name another one".to_owned(),
-        false => {
-            let game = others.first().copied().unwrap_or("NAME");
-            format!("name its experiment with --experiment, or its game and levels with --set game={game}")
-        }
+    let whose = if others.is_empty() { "no game here".to_owned() } else { others.join(" or ") };
+    let advice = match others.first() {
+        None => "use the program that has the game they were learned for".to_owned(),
+        Some(_) if from.names_game() => "name another one".to_owned(),
+        Some(game) => format!("name its experiment with --experiment, or its game and levels with --set game={game}"),
     };
     Err(CliError::Usage(format!(
         "{} holds skills for {} and {}, which are those of {whose}, not of `{}`: {advice}",

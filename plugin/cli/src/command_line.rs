@@ -9,7 +9,7 @@ use crate::{
     bench, config, demo, doctor,
     error::{CliError, Outcome},
     eval, explore, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, report,
-    runs, study, test, trace, train, view,
+    runs, study, test, trace, train, usage_error, view,
 };
 
 /// Playtesting bots that learn from demonstrations.
@@ -106,7 +106,12 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Err(error) => {
             // Asking for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
-            let _ = error.print();
+            match usage_error::in_plain_words(&error) {
+                Some(words) => begin_to_tell!("{words}"),
+                None => {
+                    let _ = error.print();
+                }
+            }
             return ExitCode::from(code);
         }
     };
@@ -155,7 +160,7 @@ fn is_help(error: &clap::Error) -> bool {
 
 /// The command line under the name of this program.
 fn with_own_name(command: Command) -> Command {
-    let command = command.name(program::name());
+    let command = usage_error::with_negative_numbers(command).name(program::name());
     if program::name() == program::USUAL {
         return command;
     }

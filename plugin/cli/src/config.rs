@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
-    experiment::{ExperimentArgs, resolve},
+    experiment::ExperimentArgs,
     open,
 };
 
@@ -46,7 +46,7 @@ enum Verb {
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     experiment.check_levels(open::game(games, from, experiment)?)?;
     let demos = experiment.demos.as_deref().filter(|_| experiment.algorithm.needs_skills());
-    if let Some(path) = demos.filter(|path| !resolve(path).exists()) {
+    if let Some(path) = demos.filter(|path| !from.find_recordings(path, games).exists()) {
         tell!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
     }
     Ok(())

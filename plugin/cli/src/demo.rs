@@ -11,7 +11,6 @@ use super::{
     demo_merge::merge,
     demo_show::show,
     error::{CliError, Outcome, print_line},
-    experiment::resolve,
     number::counted,
     open, program, progress,
 };
@@ -90,7 +89,7 @@ enum Verb {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
-        Verb::Ls { path, json } => ls(&resolve(&path), json),
+        Verb::Ls { path, json } => ls(&path, json),
         Verb::Show { file, episode, json } => show(&file, episode, json),
         Verb::Verify { paths, json } => verify(&paths, json, games),
         Verb::Repair { file, out, json } => mend(&file, out.as_deref().unwrap_or(&file), json),
@@ -113,14 +112,14 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
             print_line(json!(summary))?;
         } else {
             print_line(format!(
-                "{}: {} {}, {} episodes, {} steps, {}, {} levels, {} KiB, by {}, decided by {}",
+                "{}: {} {}, {}, {}, {}, {}, {} KiB, by {}, decided by {}",
                 file.display(),
                 summary.header.game,
                 summary.header.mode,
-                summary.episodes,
-                summary.steps,
+                counted(summary.episodes as u64, "episode"),
+                counted(summary.steps as u64, "step"),
                 success(&summary),
-                summary.levels,
+                counted(summary.levels as u64, "level"),
                 summary.bytes / 1024,
                 summary.header.demonstrator,
                 deciders(&summary.steps_by_decider),
@@ -136,7 +135,7 @@ fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
 fn success(summary: &DemoSummary) -> String {
     let share = match summary.success_share {
         None => "no episode ended".to_owned(),
-        Some(_) if summary.successes == 0 => "no episode ended with a win".to_owned(),
+        Some(_) if summary.successes == 0 => "no wins reported".to_owned(),
         Some(share) => format!("{:.1} % success", 100.0 * share),
     };
     let notes: Vec<String> = [(summary.truncated, "until time was up"), (summary.aborted, "cut off")]
@@ -150,7 +149,7 @@ fn success(summary: &DemoSummary) -> String {
 fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, CliError> {
     let mut files = Vec::new();
     for path in paths {
-        files.extend(find_demos(resolve(path)).map_err(open::missing_recording)?);
+        files.extend(find_demos(path).map_err(open::missing_recording)?);
     }
     let mut outcome = Outcome::Pass;
     for file in &files {
@@ -197,8 +196,8 @@ fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<
         0 => "all as recorded".to_owned(),
         n => format!("{n} diverge"),
     };
-    let (episodes, ticks) = (report.episodes, report.ticks);
-    print_line(format!("{}: {episodes} episodes, {ticks} ticks replayed, {verdict}", file.display()))
+    let replayed = format!("{}, {} replayed", counted(report.episodes, "episode"), counted(report.ticks, "tick"));
+    print_line(format!("{}: {replayed}, {verdict}", file.display()))
 }
 
 /// Repairs a file. One in which no episode is whole is a finding.

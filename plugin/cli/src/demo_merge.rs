@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_playbot::demo::file::merge_demos;
+use bevy_playbot::demo::file::{DemoFault, DemoFileError, merge_demos};
 use serde_json::json;
 
 use super::{
     error::{CliError, Outcome, print_line},
     number::counted,
     open,
-    output::make_folder_of,
+    output::prepare,
 };
 
 /// Writes the episodes of all files into a new one, and says what went into it. A recording without a single episode is a
@@ -19,8 +19,8 @@ use super::{
 ///
 /// They are of different games or rules, one is damaged, or there is a file at `out` already. Nothing is left at `out` then.
 pub fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, CliError> {
-    make_folder_of(out)?;
-    let report = merge_demos(files, out).map_err(open::missing_recording)?;
+    prepare(out)?;
+    let report = merge_demos(files, out).map_err(explain)?;
     if as_json {
         let parts: Vec<_> =
             report.files.iter().map(|(file, episodes)| json!({ "file": file, "episodes": episodes })).collect();
@@ -43,4 +43,12 @@ pub fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, Cl
         ))?;
     }
     Ok(if report.episodes() == 0 { Outcome::Findings } else { Outcome::Pass })
+}
+
+/// The error of a merge, with what to do about a file that is in the way.
+fn explain(error: DemoFileError) -> CliError {
+    match error.fault {
+        DemoFault::Exists => CliError::Usage(format!("{error}: name another --out, or remove that file first")),
+        _ => open::missing_recording(error),
+    }
 }

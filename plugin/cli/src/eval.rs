@@ -19,7 +19,6 @@ use playbot_lab::{
         run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::SkillModel;
 
 use super::{
     cloning::{check_skills, cloning},
@@ -182,7 +181,7 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
-        let model = SkillModel::load(path, args.compute.device())?;
+        let model = open::skills(path, args.compute.device(), &args.from)?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
         let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
         players.push(named(chosen, path, args.skills.len()));

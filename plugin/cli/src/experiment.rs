@@ -11,7 +11,8 @@ use playbot_lab::{
     games::Games,
     train::{
         Experiment,
-        config_file::{ConfigError, parse_experiment_with, read_experiment_with},
+        config::ExperimentError,
+        config_file::{ConfigError, parse_experiment, parse_experiment_with, read_experiment_with},
         default_experiment::default_experiment,
     },
 };
@@ -53,6 +54,29 @@ impl ExperimentArgs {
         self.experiment.is_some() || self.set.iter().any(|set| sets_key(set, "game"))
     }
 
+    /// Where the recordings of an experiment are, see [`find_recordings`](Self::find_recordings). Says so if it is not where
+    /// the experiment says.
+    ///
+    /// # Errors
+    ///
+    /// The experiment names none.
+    pub fn recordings(&self, experiment: &Experiment, games: &Games) -> Result<PathBuf, ExperimentError> {
+        let path = experiment.recordings()?;
+        let found = self.find_recordings(path, games);
+        if found != path {
+            tell!("recordings are taken from {}, since there are none at {} here", found.display(), path.display());
+        }
+        Ok(found)
+    }
+
+    /// Where recordings are that an experiment names: as it says, below this folder. Only those of the experiment that
+    /// comes with the program are looked for beside it, too, if they are not here, so that `cargo run` works from any folder.
+    pub fn find_recordings(&self, path: &Path, games: &Games) -> PathBuf {
+        let beside = sources().join(path);
+        let is_usual = self.experiment.is_none() && !self.set.iter().any(|set| sets_key(set, "demos"));
+        if is_usual && !path.exists() && beside.exists() && is_shipped(path, games) { beside } else { path.into() }
+    }
+
     /// These as they are written behind a verb, with a blank in front of each.
     pub fn words(&self) -> String {
         let experiment =
@@ -72,6 +96,14 @@ impl ExperimentArgs {
     }
 }
 
+/// Whether these are the recordings of an experiment that lies in the sources, as nobody has changed it.
+fn is_shipped(recordings: &Path, games: &Games) -> bool {
+    let ExperimentText { origin, text } = default_experiment(games);
+    let is_there = std::fs::read_to_string(sources().join(&*origin)).is_ok_and(|found| found == *text);
+    is_there
+        && parse_experiment(&text, Path::new(&*origin)).is_ok_and(|usual| usual.demos.as_deref() == Some(recordings))
+}
+
 /// Whether a `key=value` sets exactly this key.
 pub fn sets_key(set: &str, key: &str) -> bool {
     set.split_once('=').is_some_and(|(name, _)| name.trim() == key)
@@ -88,12 +120,9 @@ pub fn option<T: Display>(key: &str, value: &Option<T>) -> Option<String> {
     value.as_ref().map(|value| format!("{key}={value}"))
 }
 
-/// A path of the repository: as given if it exists, otherwise below the sources the program was built from, so that
-/// `cargo run` works from any folder.
-pub fn resolve(path: &Path) -> PathBuf {
-    if path.exists() || path.is_absolute() {
-        return path.into();
-    }
-    let below_sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
-    if below_sources.exists() { below_sources } else { path.into() }
+/// Where this library's sources were when the program was built. Those of the program lie there only if it was built with
+/// them: a game elsewhere has other sources.
+fn sources() -> &'static Path {
+    let this = Path::new(env!("CARGO_MANIFEST_DIR"));
+    this.ancestors().nth(2).unwrap_or(this)
 }

@@ -99,7 +99,9 @@ impl Footprints {
     pub fn write(self, game: &dyn Game) -> Result<(), CliError> {
         let floors = self.grounds.into_iter().map(Ground::named).collect();
         let chart = TrailChart { title: format!("Where players went in {}", game.name()), floors };
-        self.file.write(&chart.draw())
+        self.file.write(&chart.draw())?;
+        tell!("plot: {}", self.file.path().display());
+        Ok(())
     }
 }
 

@@ -11,18 +11,19 @@ use playbot_lab::{
     game::Game,
     train::Experiment,
 };
-use playbot_learner::{Dataset, DeviceKind, SkillMetrics, SkillModel, SkillTrainer};
+use playbot_learner::{Dataset, DeviceKind, FileError, SkillMetrics, SkillModel, SkillTrainer};
 use serde_json::json;
 
 use super::{
     compute::Compute,
+    differences::{Options, in_words},
     error::{CliError, Outcome, print_line},
-    experiment::{self, ExperimentArgs, option},
+    experiment::{ExperimentArgs, option, quoted},
     interrupt, missing_demos,
     number::counted,
     open,
     output::{beside, prepare},
-    progress,
+    program, progress,
 };
 
 /// Learn the skill model (encoder, decoder, prior) from recordings.
@@ -65,11 +66,11 @@ pub struct Args {
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let experiment =
         args.from.load(games, [option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
-    let checkpoint = checkpoint(&args)?;
+    let Some(checkpoint) = checkpoint(&args)? else { return finished(&args) };
     let game = open::game(games, &args.from, &experiment)?;
     let demos = match &args.demos {
         Some(demos) => demos.clone(),
-        None => experiment::resolve(experiment.recordings()?),
+        None => args.from.recordings(&experiment, games)?,
     };
     prepare(&args.out)?;
     let dataset = read_demos(game, &experiment, &demos, args.compute.threads())?;
@@ -81,9 +82,13 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let report = |epoch, metrics: &SkillMetrics| {
         if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
     };
-    match learn(&experiment, dataset, args.compute.device(), Some(&checkpoint), report)? {
+    let go_on = if args.force { "--resume instead of --force" } else { "--resume" };
+    interrupt::go_on_with(format!("the same command and {go_on}"));
+    let own = own_options(&args);
+    let unfinished = SkillCheckpoint { path: &checkpoint, options: Options { from: &args.from, own: &own } };
+    match learn(&experiment, dataset, args.compute.device(), Some(&unfinished), report)? {
         None => {
-            tell!("stopped and saved; no skill model is written yet: go on with the same command and --resume");
+            tell!("stopped and saved; no skill model is written yet: go on with the same command and {go_on}");
             return Ok(Outcome::Stopped);
         }
         Some(model) => {
@@ -114,21 +119,55 @@ pub fn remove(checkpoint: &Path) -> Result<(), CliError> {
     }
 }
 
-/// The checkpoint's path, if what lies there fits what was asked for.
-fn checkpoint(args: &Args) -> Result<PathBuf, CliError> {
+/// The checkpoint's path, if what lies there fits what was asked for; `None` if there is nothing left to go on with.
+fn checkpoint(args: &Args) -> Result<Option<PathBuf>, CliError> {
     let checkpoint = checkpoint_of(&args.out);
-    if args.out.exists() && !args.force {
-        return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
-    }
-    match (args.resume, checkpoint.exists()) {
-        _ if args.force => Ok(checkpoint),
-        (true, false) => Err(CliError::Usage(format!("nothing to resume: there is no {}", checkpoint.display()))),
-        (false, true) => Err(CliError::Usage(format!(
+    // What to do about a folder is said where it is tried to write there.
+    let is_there = args.out.exists() && !args.out.is_dir();
+    match (args.resume, is_there, checkpoint.exists()) {
+        _ if args.force => Ok(Some(checkpoint)),
+        // Somebody began anew with --force, and the old model is still there.
+        (true, _, true) | (false, false, false) => Ok(Some(checkpoint)),
+        (true, true, false) => Ok(None),
+        (true, false, false) => Err(CliError::Usage(format!(
+            "nothing to resume: there is no {}; leave --resume out to begin",
+            checkpoint.display()
+        ))),
+        (false, _, true) => Err(CliError::Usage(format!(
             "{} holds an unfinished training: go on with --resume, or start anew with --force",
             checkpoint.display()
         ))),
-        _ => Ok(checkpoint),
+        (false, true, false) => Err(CliError::Usage(format!(
+            "{} exists already: overwrite it with --force, or name another file with --out",
+            args.out.display()
+        ))),
     }
+}
+
+/// Says that there is nothing to go on with. A file that is no skill model is not called one.
+fn finished(args: &Args) -> Result<Outcome, CliError> {
+    SkillModel::load(&args.out, args.compute.device())?;
+    let (out, program) = (quoted(&args.out.display().to_string()), program::name());
+    tell!(
+        "{out} is finished: train with it, `{program} train --skills {out} --run runs/first`, or learn it anew with --force"
+    );
+    Ok(Outcome::Pass)
+}
+
+/// The options that have names of their own, by the keys that they set.
+fn own_options(args: &Args) -> [(&'static str, Option<String>); 2] {
+    [
+        ("skills.epochs", args.epochs.map(|epochs| format!("--epochs {epochs}"))),
+        ("demo_steps", args.max_steps.map(|steps| format!("--max-steps {steps}"))),
+    ]
+}
+
+/// The state of a training that may have been begun already.
+pub struct SkillCheckpoint<'a> {
+    /// Its file.
+    pub path: &'a Path,
+    /// What the command line asks for, to say what differs.
+    pub options: Options<'a>,
 }
 
 fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
@@ -179,7 +218,7 @@ pub fn learn(
     experiment: &Experiment,
     dataset: Dataset,
     device: DeviceKind,
-    checkpoint: Option<&Path>,
+    checkpoint: Option<&SkillCheckpoint>,
     mut after_epoch: impl FnMut(u64, &SkillMetrics) -> Result<(), CliError>,
 ) -> Result<Option<SkillModel>, CliError> {
     let epochs = experiment.skills.epochs as u64;
@@ -192,8 +231,10 @@ pub fn learn(
             bar.inc(1);
             if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        if let Some(checkpoint) = checkpoint {
-            trainer.save(checkpoint)?;
+        if let Some(SkillCheckpoint { path, .. }) = checkpoint {
+            trainer.save(path)?;
+            let epochs = counted(trainer.epochs_done(), "whole epoch");
+            interrupt::leave(format!("{} is kept, after {epochs}", path.display()));
         }
         let Some(metrics) = metrics else {
             bar.finish_and_clear();
@@ -211,16 +252,23 @@ fn begin(
     experiment: &Experiment,
     dataset: Dataset,
     device: DeviceKind,
-    checkpoint: Option<&Path>,
+    checkpoint: Option<&SkillCheckpoint>,
 ) -> Result<SkillTrainer, CliError> {
-    let Some(path) = checkpoint.filter(|path| path.exists()) else {
+    let Some(SkillCheckpoint { path, options }) = checkpoint.filter(|checkpoint| checkpoint.path.exists()) else {
         return Ok(SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?);
     };
-    let trainer = SkillTrainer::load(path, dataset, device)?;
-    if (trainer.config(), trainer.seed()) != (&experiment.skills, experiment.seed) {
+    let trainer = SkillTrainer::load(path, dataset, device).map_err(|error| match error {
+        FileError::Io { .. } => CliError::from(error),
+        _ => CliError::Usage(format!(
+            "{error}; go on with the recordings that it began with, or start anew with --force"
+        )),
+    })?;
+    let begun = Experiment { skills: trainer.config().clone(), seed: trainer.seed(), ..experiment.clone() };
+    if begun != *experiment {
         return Err(CliError::Usage(format!(
-            "{} was made with other settings or another seed: take the same experiment, or start anew with --force",
-            path.display()
+            "{} was begun with other settings: {}; ask for the same, or start anew with --force",
+            path.display(),
+            in_words(options.differences(experiment, &begun, "the training", &[]))
         )));
     }
     tell!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);

@@ -61,6 +61,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let level = show(game, &args, file.is_some()).map_err(|error| explain(game, error))?;
     if let (Some((path, file)), Some(picture)) = (file, &level.picture) {
         write(path, &file, picture, game.tick_hz())?;
+        tell!("picture: {}", path.display());
     }
     print_line(if args.json { level.json } else { level.text })?;
     Ok(Outcome::Pass)

@@ -13,8 +13,12 @@ use tracing::{
 };
 use tracing_subscriber::{
     EnvFilter, Layer,
-    fmt::MakeWriter,
+    fmt::{
+        FmtContext, FormatEvent, FormatFields, MakeWriter,
+        format::{Format, Full, Writer},
+    },
     layer::{Context, SubscriberExt},
+    registry::LookupSpan,
     util::SubscriberInitExt,
 };
 
@@ -22,26 +26,52 @@ use tracing_subscriber::{
 /// to warn of.
 const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
 
-/// Logs what `RUST_LOG` asks for, or else warnings, and more with each `-v`.
+/// Logs what `RUST_LOG` asks for, or else warnings, and more with each `-v`. Who asks for more is told where it is from.
 pub fn init(verbose: u8) {
     let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let asked = EnvFilter::try_from_default_env().ok();
+    let is_plain = verbose == 0 && asked.is_none();
+    let filter = asked.unwrap_or_else(|| EnvFilter::new(level));
     // Colours are for people.
     let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    subscriber(filter, colours, std::io::stderr).init();
+    subscriber(filter, is_plain, colours, std::io::stderr).init();
 }
 
-fn subscriber<W>(filter: EnvFilter, colours: bool, writer: W) -> impl Subscriber + Send + Sync
+fn subscriber<W>(filter: EnvFilter, is_plain: bool, colours: bool, writer: W) -> impl Subscriber + Send + Sync
 where
     W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
 {
     // An error of writing the log could only be reported to the same place.
-    let format = tracing_subscriber::fmt().with_env_filter(filter).without_time().log_internal_errors(false);
-    format.with_ansi(colours).with_writer(writer).finish().with(FilesOnce::default())
+    let lines = Lines { is_plain, full: tracing_subscriber::fmt::format().without_time() };
+    let format = tracing_subscriber::fmt().with_env_filter(filter).log_internal_errors(false).with_ansi(colours);
+    format.event_format(lines).with_writer(writer).finish().with(FilesOnce::default())
 }
 
-/// Lets each error about an asset through once. Every World loads the files of its game, and each would say the same of
-/// one that is not there.
+/// How a line of the log looks.
+struct Lines {
+    /// What this workspace says to people is written as the verbs write it, without the place in its sources.
+    is_plain: bool,
+    full: Format<Full, ()>,
+}
+
+impl<S, N> FormatEvent<S, N> for Lines
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(&self, context: &FmtContext<'_, S, N>, mut writer: Writer<'_>, event: &Event<'_>) -> fmt::Result {
+        let is_ours = ["playbot_", "bevy_playbot"].iter().any(|name| event.metadata().target().starts_with(name));
+        if !(self.is_plain && is_ours) {
+            return self.full.format_event(context, writer, event);
+        }
+        writer.write_str(if *event.metadata().level() == Level::ERROR { "error: " } else { "warning: " })?;
+        context.field_format().format_fields(writer.by_ref(), event)?;
+        writeln!(writer)
+    }
+}
+
+/// Lets each error about an asset and each warning of a training through once. Every World loads the files of its game, and
+/// each would say the same of one that is not there; and a damaged checkpoint is found again whenever one is looked for.
 #[derive(Default)]
 struct FilesOnce {
     said: Mutex<BTreeSet<String>>,
@@ -50,7 +80,12 @@ struct FilesOnce {
 impl<S: Subscriber> Layer<S> for FilesOnce {
     fn event_enabled(&self, event: &Event<'_>, _: Context<'_, S>) -> bool {
         let metadata = event.metadata();
-        if *metadata.level() != Level::ERROR || !metadata.target().starts_with("bevy_asset") {
+        let is_repeated = match *metadata.level() {
+            Level::ERROR => metadata.target().starts_with("bevy_asset"),
+            Level::WARN => metadata.target().starts_with("playbot_lab::train"),
+            _ => false,
+        };
+        if !is_repeated {
             return true;
         }
         let mut message = Message::default();
@@ -94,7 +129,8 @@ mod tests {
     fn logged(say: impl FnOnce()) -> String {
         let page = Page::default();
         let writer = page.clone();
-        tracing::subscriber::with_default(subscriber(EnvFilter::new(QUIET), false, move || writer.clone()), say);
+        let subscriber = subscriber(EnvFilter::new(QUIET), true, false, move || writer.clone());
+        tracing::subscriber::with_default(subscriber, say);
         String::from_utf8(page.0.lock().expect("nobody panics").clone()).expect("Unicode")
     }
 
@@ -109,6 +145,19 @@ mod tests {
         });
         assert_eq!(text.lines().count(), 2, "{text}");
         assert!(text.contains("cake.glb") && text.contains("alien.glb"), "{text}");
+    }
+
+    #[test]
+    fn a_warning_of_a_training_is_one_plain_line() {
+        let text = logged(|| {
+            for _list in 0..3 {
+                tracing::warn!(target: "playbot_lab::train::checkpoint", "a checkpoint is passed over: {}", "x: damaged");
+            }
+            tracing::warn!(target: "bevy_ecs", "something of the engine");
+        });
+        assert!(text.starts_with("warning: a checkpoint is passed over: x: damaged\n"), "{text}");
+        assert_eq!(text.lines().count(), 2, "{text}");
+        assert!(text.contains("bevy_ecs: something of the engine"), "{text}");
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
     let bots = game.blind_bots();
     match bots.iter().find(|(bot, _)| *bot == name) {
         Some((_, bot)) => Ok(Player::Blind(bot.clone())),
-        None => Err(UnknownName::new("method", name, &bot_names(game))),
+        None => Err(UnknownName::new("bot", name, &bot_names(game))),
     }
 }
 

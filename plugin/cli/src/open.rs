@@ -9,9 +9,14 @@ use bevy_playbot::demo::file::{DemoFault, DemoFileError};
 use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
-    train::Experiment,
+    report::whole,
+    train::{
+        Experiment,
+        checkpoint::{Checkpoint, CheckpointChoice},
+        run_dir::RunDir,
+    },
 };
-use playbot_learner::{DeviceKind, FileError, PolicyFile};
+use playbot_learner::{DeviceKind, FileError, PolicyFile, SkillModel};
 
 use super::{
     error::CliError,
@@ -25,13 +30,31 @@ use super::{
 /// It cannot be read; if there is none, with the command that writes one.
 pub fn policy(path: &Path, device: DeviceKind) -> Result<PolicyFile, CliError> {
     PolicyFile::load(path, device).map_err(|error| {
-        let is_missing = matches!(&error, FileError::Io { source, .. } if source.kind() == ErrorKind::NotFound);
-        if !is_missing {
+        if !is_missing(&error) {
             return error.into();
         }
         let command = format!("`playbot policy export --run RUN --out {}`", shown(path));
         CliError::Usage(format!("{error}: name a policy file that exists, or write this one with {command}"))
     })
+}
+
+/// A skill model.
+///
+/// # Errors
+///
+/// It cannot be read; if there is none, with the command that learns one from the experiment `from`.
+pub fn skills(path: &Path, device: DeviceKind, from: &ExperimentArgs) -> Result<SkillModel, CliError> {
+    SkillModel::load(path, device).map_err(|error| {
+        if !is_missing(&error) {
+            return error.into();
+        }
+        let command = format!("`playbot learn-skills{} --out {}`", from.words(), shown(path));
+        CliError::Usage(format!("{error}: name a skill model that exists, or learn this one with {command}"))
+    })
+}
+
+fn is_missing(error: &FileError) -> bool {
+    matches!(error, FileError::Io { source, .. } if source.kind() == ErrorKind::NotFound)
 }
 
 /// The game of an experiment that the command line describes.
@@ -47,6 +70,32 @@ pub fn game<'a>(games: &Games<'a>, from: &ExperimentArgs, experiment: &Experimen
     }
 }
 
+/// A checkpoint of a run. Says which one is the best, and on what grounds.
+///
+/// # Errors
+///
+/// There is none.
+pub fn checkpoint(run: &RunDir, choice: CheckpointChoice) -> Result<Checkpoint, CliError> {
+    let checkpoint = run.checkpoint(choice)?;
+    if choice == CheckpointChoice::Best {
+        tell!("{}", best(run.path(), &checkpoint));
+    }
+    Ok(checkpoint)
+}
+
+fn best(run: &Path, checkpoint: &Checkpoint) -> String {
+    let (run, step) = (run.display(), whole(checkpoint.summary.step as f64));
+    match checkpoint.summary.episodic_return {
+        Some(value) => {
+            format!("the best checkpoint of {run} is that of step {step}, with a return of {value:.2} in training")
+        }
+        None => format!(
+            "warning: no checkpoint of {run} has a return, since each is of fewer than 100 episodes: taking the last, of \
+             step {step}"
+        ),
+    }
+}
+
 /// The error of a recording that could not be read; where there is none, with the command that makes one.
 pub fn missing_recording(error: DemoFileError) -> CliError {
     let is_missing = match &error.fault {
@@ -57,8 +106,14 @@ pub fn missing_recording(error: DemoFileError) -> CliError {
     if !is_missing {
         return error.into();
     }
-    let is_file = error.path.extension().is_some_and(|ending| ending == "demo");
-    let file: PathBuf = if is_file { error.path.clone() } else { error.path.join("my.demo") };
+    let file: PathBuf = match error.path.extension().and_then(|ending| ending.to_str()) {
+        Some("demo") => error.path.clone(),
+        // A file, and none that is recorded into.
+        Some(_) if !error.path.is_dir() => {
+            return CliError::Usage(format!("{error}; name recordings that exist, which end in .demo"));
+        }
+        _ => error.path.join("my.demo"),
+    };
     let command = format!("`playbot record GAME --out {}`", shown(&file));
     CliError::Usage(format!("{error}; name recordings that exist, or make one with {command}"))
 }
@@ -70,6 +125,7 @@ fn shown(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use bevy_playbot::demo::file::{DemoReader, find_demos};
+    use playbot_lab::train::checkpoint::CheckpointSummary;
 
     use super::*;
 
@@ -90,11 +146,35 @@ mod tests {
             &path,
             "`playbot policy export --run ",
         );
+        let from = ExperimentArgs { experiment: None, set: vec!["game=runner".to_owned()] };
+        let error = skills(&path, DeviceKind::default(), &from).map(|_| ()).expect_err("none");
+        names(&error, &path, "`playbot learn-skills --set game=runner --out ");
         let file = folder.path().join("none.demo");
         let error = missing_recording(DemoReader::open(&file).map(|_| ()).expect_err("none"));
         names(&error, &file, "none.demo`");
         let error = missing_recording(find_demos(folder.path()).expect_err("none"));
         names(&error, folder.path(), "my.demo`");
+        let file = folder.path().join("README.md");
+        let words = missing_recording(DemoReader::open(&file).map(|_| ()).expect_err("none")).to_string();
+        assert!(
+            words.contains("README.md: ") && words.contains("end in .demo") && !words.contains("record GAME"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn it_is_said_which_checkpoint_is_the_best() {
+        let checkpoint = |episodic_return| {
+            let summary = CheckpointSummary { step: 81_920, episodic_return, success_rate: None };
+            Checkpoint { path: "runs/a/checkpoints/step-000000081920".into(), summary }
+        };
+        let words = "the best checkpoint of runs/a is that of step 81,920, with a return of 5.25 in training";
+        assert_eq!(best(Path::new("runs/a"), &checkpoint(Some(5.25))), words);
+        let words = best(Path::new("runs/a"), &checkpoint(None));
+        assert!(
+            words.starts_with("warning: no checkpoint of runs/a has a return") && words.ends_with("step 81,920"),
+            "{words}"
+        );
     }
 
     #[test]

@@ -39,6 +39,23 @@ pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}; {ELSEWHERE}", folder.display())))
 }
 
+/// Makes a folder to write into.
+///
+/// # Errors
+///
+/// The path is a file's, or the system refuses.
+pub fn make_folder(folder: &Path) -> Result<(), CliError> {
+    if folder.is_file() {
+        return Err(CliError::Usage(format!("{} is a file: name a folder to write into", folder.display())));
+    }
+    fs::create_dir_all(folder).map_err(|error| {
+        CliError::Io(format!(
+            "cannot create {}: {error}; make room or rights there, or name another folder",
+            folder.display()
+        ))
+    })
+}
+
 /// Writes a file, and makes the folder it lies in.
 ///
 /// # Errors
@@ -80,5 +97,34 @@ fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
         Ok(path)
     } else {
         Err(format!("this picture is written as .{kind}: choose a name that ends so"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_kind_of_place_is_the_callers_and_a_closed_one_the_systems() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let folder = temporary.path();
+        let file = folder.join("file");
+        fs::write(&file, "in the way").expect("writable");
+        let said = |result: Result<(), CliError>| {
+            let error = result.expect_err("refused");
+            (error.exit_code(), error.to_string())
+        };
+        for (result, code, words) in [
+            (prepare(folder), 3, "is a folder: name a file to write"),
+            (prepare(&file.join("below")), 2, "make room or rights there, or name a file in another folder"),
+            (make_folder(&file), 3, "is a file: name a folder to write into"),
+            (make_folder(&file.join("below")), 2, "make room or rights there, or name another folder"),
+        ] {
+            let (exit, text) = said(result);
+            assert!(exit == code && text.contains(words), "{exit}: {text}");
+        }
+        prepare(&folder.join("new/a")).expect("the folder is made");
+        make_folder(&folder.join("new/b")).expect("the folder is made");
+        assert_eq!(fs::read_dir(folder.join("new")).expect("there").count(), 1, "no probe is left");
     }
 }

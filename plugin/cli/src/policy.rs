@@ -4,17 +4,19 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::policy_file::check_policy;
 use bevy_playbot::policy_file::policy_observation;
+use clap::ArgGroup;
 use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
     policy_export::{Provenance, export_policy, policy_file},
+    report::whole,
     train::{
         Experiment, TrainedLearner,
         checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::{DeviceKind, PolicyFile, SkillModel};
+use playbot_learner::{DeviceKind, PolicyFile};
 use serde_json::json;
 
 use super::{
@@ -56,9 +58,10 @@ enum Verb {
 }
 
 #[derive(clap::Args)]
+#[command(group(ArgGroup::new("source").args(["run", "skills"]).required(true)))]
 struct Export {
     /// Folder of a run.
-    #[arg(long, conflicts_with_all = ["skills", "experiment", "set"], required_unless_present = "skills")]
+    #[arg(long, conflicts_with_all = ["experiment", "set"])]
     run: Option<PathBuf>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
     #[arg(long, default_value = "last", conflicts_with = "skills")]
@@ -84,7 +87,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 }
 
 fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
-    if args.out.exists() && !args.force {
+    if args.out.exists() && !args.out.is_dir() && !args.force {
         return Err(CliError::Usage(format!("{} exists already; overwrite it with --force", args.out.display())));
     }
     prepare(&args.out)?;
@@ -114,11 +117,14 @@ struct PolicySource<'a> {
 fn from_run<'a>(path: &Path, choice: CheckpointChoice, games: &'a Games) -> Result<PolicySource<'a>, CliError> {
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
     let game = games.of_file(Artifact::Run, path, &experiment.game)?;
-    let checkpoint = run.checkpoint(choice)?;
+    let checkpoint = open::checkpoint(&run, choice)?;
     let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
     let training = format!(
         "{} of {} steps on {}, seed {}",
-        checkpoint.summary.step, experiment.steps, experiment.train, info.seed
+        whole(checkpoint.summary.step as f64),
+        whole(experiment.whole_steps() as f64),
+        experiment.train,
+        info.seed
     );
     let algorithm = info.algorithm.name().to_owned();
     let about = Provenance { algorithm, training, code: code(&info.version, &info.revision) };
@@ -131,7 +137,7 @@ fn from_run<'a>(path: &Path, choice: CheckpointChoice, games: &'a Games) -> Resu
 fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Result<PolicySource<'a>, CliError> {
     let experiment = from.load(games, [])?;
     let game = open::game(games, from, &experiment)?;
-    let model = SkillModel::load(path, DeviceKind::default())?;
+    let model = open::skills(path, DeviceKind::default(), from)?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let training = match &experiment.demos {
         Some(demos) => format!("demonstrations in {}", demos.display()),

@@ -28,7 +28,7 @@ use super::{
     cloning::cloning,
     compute::Threads,
     error::{CliError, Outcome, print_line},
-    experiment::{self, ExperimentArgs, option},
+    experiment::{ExperimentArgs, option},
     interrupt, learn_skills, methods, open, program,
     train::{create_run, drive, tell_length},
 };
@@ -107,7 +107,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     trained.check_memory(game)?;
     check_folder(&args.run)?;
     // Not later: where there is nothing to learn from, no folder is made.
-    let demos = experiment::resolve(experiment.recordings()?);
+    let demos = args.from.recordings(&experiment, games)?;
     let dataset = learn_skills::read_demos(game, &experiment, &demos, args.threads.threads)?;
     let _lock = take_folder(&args.run)?;
     tell_length(&trained);
@@ -192,6 +192,7 @@ fn take_folder(path: &Path) -> Result<RunLock, CliError> {
 /// Learns the skill model and saves it; `None` after Ctrl-C.
 fn skills(experiment: &Experiment, dataset: Dataset, args: &Args) -> Result<Option<SkillModel>, CliError> {
     interrupt::listen();
+    interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", program::name()));
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });
@@ -217,6 +218,11 @@ fn train_one(
     let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.threads)?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
     let run = create_run(&folder, game, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
+    interrupt::go_on_with(format!(
+        "this training alone, `{} train --run {} --resume`",
+        program::name(),
+        folder.display()
+    ));
     let (start, mut curve) = (Instant::now(), Vec::new());
     let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
         if let Some(kl) = report.initial_kl {

@@ -10,7 +10,9 @@ use playbot_lab::{demo::demonstration::DemonstrationPlan, game::Game, held_out::
 use super::{
     defaults::{first_levels, usual_held_out},
     error::{CliError, Outcome},
-    interrupt, progress,
+    interrupt,
+    number::counted,
+    progress,
     recording::OverwriteArgs,
 };
 
@@ -95,10 +97,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let wins = match ended.successes {
         // Not every game has a goal.
-        0 => "no episode ended with a win".to_owned(),
-        n => format!("{:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
+        0 => String::new(),
+        n => format!(", {:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
     };
-    tell!("{}: {episodes} episodes, {steps} steps, {wins}", args.out.display());
+    let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
+    tell!("{}: {counts}{wins}", args.out.display());
     if finished {
         return Ok(Outcome::Pass);
     }

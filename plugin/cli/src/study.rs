@@ -23,7 +23,7 @@ use super::{
     compute::Compute,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
-    interrupt, open, program, progress,
+    interrupt, open, output, program, progress,
     study_run::Runner,
     train::rounded,
 };
@@ -75,14 +75,14 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let folder = runs_folder(&args);
     check_folder(&folder, &args)?;
     for path in [&folder, &args.out] {
-        std::fs::create_dir_all(path)
-            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+        output::make_folder(path)?;
     }
     let trained = runs.iter().filter(|run| run.experiment.algorithm.is_trained());
     let lengths: BTreeSet<String> = trained.filter_map(|run| rounded(&run.experiment)).collect();
     lengths.iter().for_each(|words| tell!("{words}"));
     interrupt::listen();
-    let mut runner = Runner::new(games, &folder, args.force, args.compute.device(), args.compute.threads());
+    interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
+    let mut runner = Runner::new(games, &args.from, &folder, args.force, args.compute.device(), args.compute.threads());
     runner.check_folders(&runs)?;
     if args.force {
         runner.check_demos(&runs)?;

@@ -6,14 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bevy_playbot::{policy::ActionDraw, vision::ObservationConfig};
+use bevy_playbot::policy::ActionDraw;
 use playbot_lab::games::Games;
 use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
     report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
     runs::RunCurves,
-    split::LevelSplit,
     train::{
         Experiment, Trainer,
         checkpoint::CheckpointChoice,
@@ -23,13 +22,17 @@ use playbot_lab::{
         study::StudyRun,
     },
 };
-use playbot_learner::{Dataset, DeviceKind, SkillModel};
+use playbot_learner::{DeviceKind, SkillModel};
 use serde_json::json;
 
 use super::{
     cloning::cloning,
+    differences::{Options, in_words},
     error::CliError,
-    experiment, learn_skills, methods,
+    experiment::ExperimentArgs,
+    learn_skills::{self, SkillCheckpoint},
+    methods,
+    study_demos::StudyDemos,
     train::{drive, run_info},
 };
 
@@ -38,6 +41,8 @@ const RESULT: &str = "result.json";
 /// Where the runs of a study live, and how they are computed.
 pub struct Runner<'a> {
     games: &'a Games<'a>,
+    /// What the command line says of the experiment.
+    from: &'a ExperimentArgs,
     /// Folder of all runs.
     folder: PathBuf,
     /// Replace what is there instead of going on with it.
@@ -48,20 +53,8 @@ pub struct Runner<'a> {
     threads: usize,
     /// Skill models that this process has learned already.
     learned: BTreeSet<PathBuf>,
-    /// The recordings that were read last, and what they are.
-    demos: Option<(RecordingsKey, Dataset)>,
-}
-
-/// What the contents of a dataset depend on.
-#[derive(PartialEq)]
-struct RecordingsKey {
-    game: String,
-    path: PathBuf,
-    /// Levels that must not be among them.
-    held_out: LevelSplit,
-    observation_config: ObservationConfig,
-    /// How many steps at most.
-    steps: Option<u64>,
+    /// The recordings that skills are learned from.
+    demos: StudyDemos<'a>,
 }
 
 /// The folder of a run, locked.
@@ -84,8 +77,16 @@ struct TrainedRun {
 pub type Ended = Option<(StudyResult, SuccessCurve)>;
 
 impl<'a> Runner<'a> {
-    pub fn new(games: &'a Games<'a>, folder: &Path, force: bool, device: DeviceKind, threads: usize) -> Self {
-        Self { games, folder: folder.into(), force, device, threads, learned: BTreeSet::new(), demos: None }
+    pub fn new(
+        games: &'a Games<'a>,
+        from: &'a ExperimentArgs,
+        folder: &Path,
+        force: bool,
+        device: DeviceKind,
+        threads: usize,
+    ) -> Self {
+        let (learned, demos) = (BTreeSet::new(), StudyDemos::new(games, from, threads));
+        Self { games, from, folder: folder.into(), force, device, threads, learned, demos }
     }
 
     /// Brings a run to its end. `on_step` hears the steps of its training as it goes on.
@@ -129,7 +130,7 @@ impl<'a> Runner<'a> {
     /// Recordings cannot be read, belong to another game, or show held-out levels.
     pub fn check_demos(&mut self, runs: &[StudyRun]) -> Result<(), CliError> {
         for StudyRun { experiment, .. } in runs.iter().filter(|run| run.experiment.algorithm.needs_skills()) {
-            self.demos(self.games.get(&experiment.game)?, experiment)?;
+            self.demos.read(self.games.get(&experiment.game)?, experiment)?;
         }
         Ok(())
     }
@@ -162,9 +163,12 @@ impl<'a> Runner<'a> {
             self.warn_of_others(folder, &info);
             return Ok(true);
         }
+        let differences = Options { from: self.from, own: &[] }.differences(&run.experiment, &saved, "the run", &[]);
         Err(CliError::Usage(format!(
-            "{} holds a run with other settings: choose another folder with --runs, or replace all with --force",
-            folder.display()
+            "{} holds a run with other settings: {}; ask for the same, choose another folder with --runs, or replace all \
+             with --force",
+            folder.display(),
+            in_words(differences)
         )))
     }
 
@@ -234,12 +238,14 @@ impl<'a> Runner<'a> {
         let file = self.skill_file(run)?;
         let is_new = self.force && !self.learned.contains(&file);
         if is_new || !file.exists() {
-            let demos = self.demos(game, &run.experiment)?;
+            let demos = self.demos.read(game, &run.experiment)?;
             let checkpoint = learn_skills::checkpoint_of(&file);
             if is_new {
                 learn_skills::remove(&checkpoint)?;
             }
-            let learned = learn_skills::learn(&run.experiment, demos, self.device, Some(&checkpoint), |_, _| Ok(()))?;
+            let options = Options { from: self.from, own: &[] };
+            let unfinished = SkillCheckpoint { path: &checkpoint, options };
+            let learned = learn_skills::learn(&run.experiment, demos, self.device, Some(&unfinished), |_, _| Ok(()))?;
             let Some(model) = learned else { return Ok(None) };
             model.save(&file)?;
             learn_skills::remove(&checkpoint)?;
@@ -251,26 +257,6 @@ impl<'a> Runner<'a> {
     fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, CliError> {
         let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
         Ok(self.folder.join(name))
-    }
-
-    fn demos(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
-        let Experiment { game: name, test, demo_steps, .. } = experiment;
-        let path = experiment::resolve(experiment.recordings()?);
-        let key = RecordingsKey {
-            game: name.clone(),
-            path,
-            held_out: test.clone(),
-            observation_config: experiment.observation_config(),
-            steps: *demo_steps,
-        };
-        match &self.demos {
-            Some((known, dataset)) if *known == key => Ok(dataset.clone()),
-            _ => {
-                let dataset = learn_skills::read_demos(game, experiment, &key.path, self.threads)?;
-                self.demos = Some((key, dataset.clone()));
-                Ok(dataset)
-            }
-        }
     }
 }
 

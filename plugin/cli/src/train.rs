@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
+    report::whole,
     train::{
         Algorithm, Experiment, LearnerKind, TrainError, Trainer, UpdateReport,
         checkpoint::CheckpointChoice,
@@ -15,12 +16,12 @@ use playbot_lab::{
         run_dir::{OpenedRun, RunDir, RunError, RunInfo},
     },
 };
-use playbot_learner::{DeviceKind, SkillModel};
+use playbot_learner::DeviceKind;
 
 use super::{
     compute::Compute,
     error::{CliError, Outcome},
-    experiment::ExperimentArgs,
+    experiment::{ExperimentArgs, sets_key},
     interrupt, open, program, progress,
 };
 use bevy_playbot::unknown_name::UnknownName;
@@ -92,7 +93,12 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         );
         return Ok(Outcome::Pass);
     }
-    tell_length(trainer.experiment());
+    // A training that goes on has said so when it began.
+    let is_new_length = args.steps.is_some() || args.from.set.iter().any(|set| sets_key(set, "steps"));
+    if !args.resume || is_new_length {
+        tell_length(trainer.experiment());
+    }
+    interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
     let finished = drive(&run, &mut trainer, "train", |_| {})?;
     if finished {
         tell!("done: test it with `{program} eval --run {path}`");
@@ -118,7 +124,7 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = args.from.load(games, args.settings())?;
     let game = open::game(games, &args.from, &experiment)?;
     let skills = match &args.skills {
-        Some(path) => Some(SkillModel::load(path, args.compute.device())?),
+        Some(path) => Some(open::skills(path, args.compute.device(), &args.from)?),
         None => None,
     };
     let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.compute.device(), args.compute.threads())
@@ -218,9 +224,10 @@ pub fn drive(
     let (per_update, every) = (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
     let bar = progress::bar(title, trainer.experiment().whole_steps(), "steps");
     let mut saved = trainer.updates();
-    if run.checkpoint(CheckpointChoice::Last).is_err() {
+    match run.checkpoint(CheckpointChoice::Last) {
+        Ok(checkpoint) => note_saved(run, checkpoint.summary.step),
         // Whatever goes wrong later, there is something good to go back to.
-        save(run, trainer)?;
+        Err(_) => save(run, trainer)?,
     }
     while !trainer.is_done() && !interrupt::asked() {
         bar.set_position(trainer.steps());
@@ -246,7 +253,15 @@ fn save(run: &RunDir, trainer: &mut Trainer) -> Result<(), CliError> {
         let is_first = run.checkpoint(CheckpointChoice::Last).is_err();
         let (error, run) = (error.into(), run.path().into());
         if is_first { CliError::NeverSaved { error, run } } else { CliError::NotSaved { error, run } }
-    })
+    })?;
+    note_saved(run, trainer.steps());
+    Ok(())
+}
+
+/// For whoever stops the training at once.
+fn note_saved(run: &RunDir, step: u64) {
+    let step = whole(step as f64);
+    interrupt::leave(format!("the last checkpoint of {} is that of step {step}", run.path().display()));
 }
 
 /// The error of a training, with the checkpoint that is left if its numbers ran away.

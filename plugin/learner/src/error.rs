@@ -128,6 +128,14 @@ pub enum FileError {
         /// What is wrong with it.
         detail: String,
     },
+    /// The file ends before its end, or goes on behind it.
+    #[error("{path}: the file is cut off{advice}")]
+    CutOff {
+        /// The file.
+        path: PathBuf,
+        /// How it can be had again, if that is known, behind a colon.
+        advice: &'static str,
+    },
     /// The file was written by a newer version of this program.
     #[error(
         "{path}: was written by a newer version of playbot ({kind} format {found}, this one reads {readable}): update \
@@ -196,6 +204,16 @@ pub enum FileError {
         /// The cause.
         source: LearnError,
     },
+}
+
+impl FileError {
+    /// This error, with how the file can be had again if it is cut off.
+    pub(crate) fn or_again(self, advice: &'static str) -> Self {
+        match self {
+            Self::CutOff { path, .. } => Self::CutOff { path, advice },
+            other => other,
+        }
+    }
 }
 
 #[cfg(test)]

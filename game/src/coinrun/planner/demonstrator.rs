@@ -1,6 +1,6 @@
 //! A player that follows plans and makes a new one whenever something else happened.
 
-use super::{config::PlannerConfig, plan::plan_or_progress, search::Found};
+use super::{config::PlannerConfig, plan::plan_or_progress, reach::coin_is_unreachable, search::Found};
 use crate::coinrun::sim::Sim;
 
 /// An actor in a closed loop: ask it for an action, play that action or another one, ask again.
@@ -11,6 +11,8 @@ pub struct Demonstrator {
     actions: Vec<u8>,
     /// The state in which the next planned action is right.
     expected: Option<u64>,
+    /// Whether it is proved that nothing leads to the coin from the state of the last plan.
+    is_hopeless: bool,
     replans: u64,
 }
 
@@ -23,13 +25,14 @@ impl Default for Demonstrator {
 impl Demonstrator {
     /// A demonstrator that plans with these settings.
     pub fn new(config: PlannerConfig) -> Self {
-        Self { config, actions: Vec::new(), expected: None, replans: 0 }
+        Self { config, actions: Vec::new(), expected: None, is_hopeless: false, replans: 0 }
     }
 
     /// The action (0 to 14) for the state of `sim`. A state that does not follow from the last
     /// action that was given, or belongs to another episode, leads to a new plan.
     pub fn act(&mut self, sim: &Sim) -> u8 {
-        if self.actions.is_empty() || self.expected != Some(sim.state_hash()) {
+        let has_plan = !self.actions.is_empty() || self.is_hopeless;
+        if !has_plan || self.expected != Some(sim.state_hash()) {
             self.replan(sim);
         }
         // Without any way forward, waiting is as good as anything.
@@ -47,7 +50,10 @@ impl Demonstrator {
 
     fn replan(&mut self, sim: &Sim) {
         self.replans += 1;
-        let (Found::Coin(mut actions) | Found::Progress(mut actions), _) = plan_or_progress(sim, &self.config);
+        let (found, _) = plan_or_progress(sim, &self.config);
+        // Otherwise every tick would be searched again to the end.
+        self.is_hopeless = matches!(found, Found::Progress(_)) && coin_is_unreachable(sim);
+        let (Found::Coin(mut actions) | Found::Progress(mut actions)) = found;
         actions.reverse();
         self.actions = actions;
     }
@@ -59,7 +65,7 @@ mod tests {
     use std::sync::Arc;
 
     use crate::coinrun::generator::generate;
-    use crate::coinrun::level::Mode;
+    use crate::coinrun::level::{Level, Mode};
 
     #[test]
     fn an_undisturbed_plan_is_made_once() {
@@ -69,6 +75,19 @@ mod tests {
             sim.step(demonstrator.act(&sim));
         }
         assert!(sim.end().is_some_and(|end| end.is_success()));
+        assert_eq!(demonstrator.replans(), 1);
+    }
+
+    #[test]
+    fn a_level_that_is_proved_unsolvable_is_planned_once() {
+        let tower = "#...#.....#\n".repeat(29);
+        let text = format!("#.........#\n{tower}#A..#....C#\n#=========#\n");
+        let mut sim = Sim::new(Arc::new(Level::from_text(&text).expect("a valid picture")));
+        let mut demonstrator = Demonstrator::default();
+        while sim.end().is_none() {
+            sim.step(demonstrator.act(&sim));
+        }
+        assert!(sim.end().is_some_and(|end| !end.is_success()));
         assert_eq!(demonstrator.replans(), 1);
     }
 

@@ -16,6 +16,7 @@ use crate::{
     demo::deciders,
     error::{CliError, Outcome},
     interrupt,
+    number::counted,
     player::Chosen,
     program,
     window::{Autopilot, GameWindow, Playlist, WindowSetup},
@@ -97,9 +98,9 @@ fn conclude(path: &Path) -> Result<Outcome, CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();
     tell!(
-        "{file}: {} episodes, {} steps, decided by {}",
-        summary.episodes,
-        summary.steps,
+        "{file}: {}, {}, decided by {}",
+        counted(summary.episodes as u64, "episode"),
+        counted(summary.steps as u64, "step"),
         deciders(&summary.steps_by_decider)
     );
     let program = program::name();

@@ -15,12 +15,12 @@ pub struct PlotFile {
 }
 
 impl PlotFile {
-    /// A file by its path; its ending says its kind. The folder it lies in is made, so that nothing is computed for a file
-    /// that cannot be written.
+    /// A file by its path; its ending says its kind. The folder it lies in is made, and it is tried whether a file can be
+    /// written there, so that nothing is computed for one that cannot.
     ///
     /// # Errors
     ///
-    /// The ending is neither `.png` nor `.svg`, the path is that of a folder, or its folder cannot be made.
+    /// The ending is neither `.png` nor `.svg`, the path is that of a folder, or nothing can be written there.
     pub fn new(path: &Path) -> Result<Self, CliError> {
         let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
         let is_svg = match ending.as_deref() {
@@ -33,14 +33,13 @@ impl PlotFile {
                 )));
             }
         };
-        if path.is_dir() {
-            return Err(CliError::Usage(format!("{} is a folder: name a file for the picture", path.display())));
-        }
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)
-                .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
-        }
+        output::prepare(path)?;
         Ok(Self { path: path.to_owned(), is_svg })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Writes a drawing.

@@ -3,13 +3,16 @@
 use std::{path::PathBuf, time::SystemTime};
 
 use playbot_lab::{
-    report::{PlainTable, readable, whole},
+    report::{PlainTable, percent, readable, whole},
     runs::{RunRecord, RunsError, find_runs},
     train::metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use serde_json::{Value, json};
 
 use super::super::error::{CliError, Outcome, print_line};
+
+/// The folder of runs where none is named.
+const RUNS: &str = "runs";
 
 /// Stands where there is no number.
 pub const UNKNOWN: &str = "–";
@@ -21,11 +24,17 @@ pub const UNKNOWN: &str = "–";
   playbot runs ls runs/study --json")]
 pub struct Args {
     /// The folder.
-    #[arg(default_value = "runs")]
+    #[arg(default_value = RUNS)]
     root: PathBuf,
     /// One line of JSON per run.
     #[arg(long)]
     json: bool,
+}
+
+impl Default for Args {
+    fn default() -> Self {
+        Self { root: RUNS.into(), json: false }
+    }
 }
 
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -64,9 +73,10 @@ fn table() -> PlainTable {
 }
 
 fn row(run: &RunRecord) -> Vec<String> {
-    let number = |value: Option<f64>| value.map_or(UNKNOWN.to_owned(), readable);
+    let known = |value: Option<f64>, words: fn(f64) -> String| value.map_or(UNKNOWN.to_owned(), words);
     let state = match (run.is_finished(), run.checkpoints.is_empty()) {
         _ if !run.info.algorithm.is_trained() => "nothing to train",
+        (false, _) if run.is_training => "training",
         (true, false) => "finished",
         (true, true) => "finished, no checkpoint",
         (false, false) => "can be resumed",
@@ -77,10 +87,10 @@ fn row(run: &RunRecord) -> Vec<String> {
         run.experiment.game.clone(),
         run.info.algorithm.name().to_owned(),
         run.info.seed.to_string(),
-        whole(run.curves.last_step() as f64),
+        whole(run.steps() as f64),
         whole(run.experiment.whole_steps() as f64),
-        number(run.curves.last(EPISODIC_RETURN)),
-        number(run.curves.last(SUCCESS_RATE)),
+        known(run.curves.last(EPISODIC_RETURN), readable),
+        known(run.curves.last(SUCCESS_RATE), percent),
         run.curves.steps_per_s().map_or(UNKNOWN.to_owned(), whole),
         age_s(run).map_or(UNKNOWN.to_owned(), |seconds| format!("{} ago", duration(seconds))),
         state.to_owned(),
@@ -94,9 +104,11 @@ pub fn to_json(run: &RunRecord) -> Value {
         "game": run.experiment.game,
         "algorithm": run.info.algorithm.name(),
         "seed": run.info.seed,
-        "steps": run.curves.last_step(),
+        "steps": run.steps(),
+        "steps_logged": run.curves.last_step(),
         "steps_planned": run.experiment.steps,
         "finished": run.is_finished(),
+        "training": run.is_training,
         "episodic_return": run.curves.last(EPISODIC_RETURN),
         "success_rate": run.curves.last(SUCCESS_RATE),
         "steps_per_s": run.curves.steps_per_s(),

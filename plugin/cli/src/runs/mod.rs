@@ -19,8 +19,9 @@ use super::error::{CliError, Outcome};
   playbot runs compare runs/ppo-1 runs/ppo-2 runs/score-1 runs/score-2 --metric charts/episodic_return
   tensorboard --logdir runs                        the same curves in TensorBoard (pip install tensorboard)")]
 pub struct Args {
+    /// What to do; `ls` if nothing is given.
     #[command(subcommand)]
-    verb: Verb,
+    verb: Option<Verb>,
 }
 
 #[derive(clap::Subcommand)]
@@ -34,7 +35,7 @@ enum Verb {
 }
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
-    match args.verb {
+    match args.verb.unwrap_or_else(|| Verb::Ls(ls::Args::default())) {
         Verb::Ls(args) => ls::run(&args),
         Verb::Show(args) => show::run(&args, games),
         Verb::Compare(args) => compare::run(&args),

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use playbot_lab::{
     games::Games,
     report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whole},
-    runs::{RunRecord, changed_settings, with_defaults},
+    runs::{RunCurves, RunRecord, changed_settings, with_defaults},
     train::{
         Experiment,
-        checkpoint::Checkpoint,
+        checkpoint::{Checkpoint, CheckpointSummary},
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     },
 };
@@ -96,21 +96,41 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
         info.device,
         info.skills.as_ref().map_or(String::new(), |skills| format!(", skill model {skills}"))
     ))?;
-    let state = if run.is_finished() { "finished" } else { "not finished" };
+    let state = match (run.is_finished(), run.is_training) {
+        (true, _) => "finished",
+        (false, true) => "training",
+        (false, false) => "not finished",
+    };
     let speed = run.curves.steps_per_s().map_or(String::new(), |speed| format!(", {} steps/s", whole(speed)));
     let age = age_s(run).map_or(String::new(), |age| format!(", updated {} ago", duration(age)));
-    let (done, planned) = (whole(run.curves.last_step() as f64), whole(experiment.whole_steps() as f64));
-    print_line(format!("{done} of {planned} steps, {state}{speed}{age}"))?;
+    let (done, planned) = (whole(run.steps() as f64), whole(experiment.whole_steps() as f64));
+    let logged = match run.curves.last_step() {
+        logged if logged > run.steps() => format!(" (those after it, up to {}, are not saved)", whole(logged as f64)),
+        _ => String::new(),
+    };
+    print_line(format!("{done} of {planned} steps{logged}, {state}{speed}{age}"))?;
     print_line(format!(
         "trained on {}, held out {}, {} arenas in {} Worlds",
         experiment.train, experiment.test, experiment.arenas, experiment.worlds
     ))?;
     print_line(describe_settings(experiment, games))?;
     for Checkpoint { path, summary } in &run.checkpoints {
-        let value = summary.episodic_return.map_or("no episode yet".to_owned(), |value| format!("return {value:.2}"));
+        let value = rating(summary, &run.curves);
         print_line(format!("checkpoint: {} ({value})", path.display()))?;
     }
     print_line("")
+}
+
+/// How good a checkpoint was in training. Before the 100th episode has ended only the log says it.
+fn rating(summary: &CheckpointSummary, curves: &RunCurves) -> String {
+    if let Some(value) = summary.episodic_return {
+        return format!("return {value:.2}");
+    }
+    let logged = curves.curve(EPISODIC_RETURN).iter().find(|(step, value)| *step == summary.step && !value.is_nan());
+    match logged {
+        Some((_, value)) => format!("return {value:.2}, of fewer than 100 episodes"),
+        None => "no episode yet".to_owned(),
+    }
 }
 
 /// What sets an experiment apart from one that nobody changed: that of the program, that of the game, or the defaults of all
@@ -202,6 +222,19 @@ mod tests {
 
     use super::*;
     use crate::experiment::ExperimentArgs;
+
+    #[test]
+    fn a_checkpoint_of_few_episodes_has_the_return_that_was_logged() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let lines = "{\"step\":8,\"charts/episodic_return\":null}\n{\"step\":16,\"charts/episodic_return\":5.302}\n";
+        std::fs::write(folder.path().join("metrics.jsonl"), lines).expect("writable");
+        let curves = RunCurves::read(folder.path()).expect("readable");
+        let rated =
+            |step, episodic_return| rating(&CheckpointSummary { step, episodic_return, success_rate: None }, &curves);
+        let found = [rated(0, None), rated(8, None), rated(16, None), rated(16, Some(7.0))];
+        let few = "return 5.30, of fewer than 100 episodes";
+        assert_eq!(found, ["no episode yet", "no episode yet", few, "return 7.00"]);
+    }
 
     #[test]
     fn only_what_somebody_set_is_named() {

@@ -9,8 +9,8 @@ pub fn rounded(experiment: &Experiment) -> Option<String> {
     let (asked, trained) = (experiment.steps, experiment.whole_steps());
     (asked != trained).then(|| {
         format!(
-            "{} steps are rounded up to {} of {}: training for {}",
-            whole(asked as f64),
+            "{} rounded up to {} of {}: training for {}",
+            if asked == 1 { "1 step is".to_owned() } else { format!("{} steps are", whole(asked as f64)) },
             counted(experiment.updates(), "update"),
             whole(experiment.steps_per_update() as f64),
             whole(trained as f64)
@@ -36,6 +36,7 @@ mod tests {
             rounded(&parse_experiment(&text, Path::new("x.ron")).expect("valid"))
         };
         assert_eq!(said(500).as_deref(), Some("500 steps are rounded up to 1 update of 4,096: training for 4,096"));
+        assert_eq!(said(1).as_deref(), Some("1 step is rounded up to 1 update of 4,096: training for 4,096"));
         assert_eq!(said(4097).as_deref(), Some("4,097 steps are rounded up to 2 updates of 4,096: training for 8,192"));
         assert_eq!(said(8192), None);
     }

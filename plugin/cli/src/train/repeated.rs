@@ -1,24 +1,21 @@
 //! Options that are given again when a training goes on.
 
-use std::{collections::BTreeSet, path::Path};
+use std::path::Path;
 
 use playbot_lab::{
     games::Games,
-    runs::settings,
     train::{Experiment, checksum::file_checksum, run_dir::RunInfo},
 };
 
 use super::Args;
 use crate::{
+    differences::{Options, in_words, reaches},
     error::CliError,
-    experiment::{option, sets_key},
+    experiment::option,
 };
 
 /// Settings of a run that may change when it goes on: how long it is, and when it is saved.
 const FREE: [&str; 2] = ["steps", "checkpoints.every"];
-
-/// Most differences that are named.
-const NAMED: usize = 4;
 
 /// The experiment of a run that goes on: as it was saved, with what may change as the options say. Whatever else they say
 /// must be what the run has, so that a whole command can be repeated with `--resume`.
@@ -45,14 +42,11 @@ pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &G
         wanted.check()?;
         return Ok(wanted);
     }
-    let more = differences.len().saturating_sub(NAMED);
-    differences.truncate(NAMED);
-    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
     Err(CliError::Usage(format!(
-        "{} goes on as it was begun, and this differs: {}{more}; drop the option, or start a new run with another --run and \
+        "{} goes on as it was begun, and this differs: {}; drop the option, or start a new run with another --run and \
          without --resume (--steps and --checkpoint-every may change)",
         args.run.display(),
-        differences.join("; ")
+        in_words(differences)
     )))
 }
 
@@ -61,40 +55,13 @@ fn is_set(sets: &[String], key: &str) -> bool {
     sets.iter().any(|set| reaches(set, key))
 }
 
-/// Whether a `key=value` sets this key, alone or with its whole section.
-fn reaches(set: &str, key: &str) -> bool {
-    let sections = key.match_indices('.').map(|(at, _)| &key[..at]);
-    sections.chain([key]).any(|name| sets_key(set, name))
-}
-
 /// What the options say otherwise than the run, but for what may change.
 fn differences(args: &Args, saved: &Experiment, wanted: &Experiment) -> Vec<String> {
-    let (saved, wanted) = (settings(saved), settings(wanted));
-    let keys: BTreeSet<&String> = saved.keys().chain(wanted.keys()).collect();
-    let value = |value: Option<&String>| value.cloned().unwrap_or_else(|| "nothing".to_owned());
-    keys.into_iter()
-        .filter(|key| !FREE.contains(&key.as_str()) && saved.get(*key) != wanted.get(*key))
-        .map(|key| {
-            let (given, kept) = (value(wanted.get(key)), value(saved.get(key)));
-            format!("`{}` asks for {key}={given}, and the run has {kept}", option_of(args, key))
-        })
-        .collect()
-}
-
-/// The option that says what a setting is, as it was written: those with names of their own count last.
-fn option_of(args: &Args, key: &str) -> String {
     let own = [
-        ("algorithm", "algorithm", args.algorithm.map(|algorithm| algorithm.to_string())),
-        ("seed", "seed", args.seed.map(|seed| seed.to_string())),
+        ("algorithm", args.algorithm.map(|algorithm| format!("--algorithm {algorithm}"))),
+        ("seed", args.seed.map(|seed| format!("--seed {seed}"))),
     ];
-    if let Some((_, name, Some(value))) = own.into_iter().find(|(of, _, value)| *of == key && value.is_some()) {
-        return format!("--{name} {value}");
-    }
-    match (args.from.set.iter().rev().find(|set| reaches(set, key)), &args.from.experiment) {
-        (Some(set), _) => format!("--set {set}"),
-        (None, Some(path)) => format!("--experiment {}", path.display()),
-        (None, None) => "--set".to_owned(),
-    }
+    Options { from: &args.from, own: &own }.differences(wanted, saved, "the run", &FREE)
 }
 
 /// What is to be said of a skill model that is not the one the run has; nothing if the run has none, or does not say which.

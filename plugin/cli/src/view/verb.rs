@@ -94,6 +94,7 @@ const MOST_BYTES: usize = 1 << 30;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
+    output::prepare(&args.out)?;
     let Opened { mut episode_world, observation_config, mode, player } = open_episode(game, &args, games)?;
     let pictures = observation_config
         .is_image()

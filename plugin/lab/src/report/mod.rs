@@ -33,7 +33,7 @@ mod trails;
 
 pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
-pub use number::{readable, readable_with_spread, whole};
+pub use number::{percent, readable, readable_with_spread, whole};
 pub use result::{ResultRow, ResultTable};
 pub use sparkline::sparkline;
 pub use study::{StudyReport, StudyResult, SuccessCurve, TestResult, TrainingResult};

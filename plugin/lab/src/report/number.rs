@@ -58,9 +58,9 @@ fn decimals_of(size: f64) -> usize {
     (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize
 }
 
-/// A share (0 to 1) in percent with one decimal.
-pub(super) fn percent(share: f64) -> String {
-    if share.is_nan() { UNKNOWN.to_owned() } else { format!("{}%", fixed(share * 100.0, 1)) }
+/// A share (0 to 1) in percent with one decimal, as `40.0 %`.
+pub fn percent(share: f64) -> String {
+    if share.is_nan() { UNKNOWN.to_owned() } else { format!("{} %", fixed(share * 100.0, 1)) }
 }
 
 /// Decimals that show at least one digit of every standard error above 0; 2 when there is none.
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(fixed(-1234567.891, 1), "−1,234,567.9");
         assert_eq!(fixed(-0.001, 1), "0.0");
         assert_eq!(fixed(f64::NAN, 1), "–");
-        assert_eq!(percent(0.9744), "97.4%");
+        assert_eq!(percent(0.9744), "97.4 %");
         let shown = [0.0, 8.53125, -0.00312, 0.00002, 81920.4, 1.0, f64::NAN, f64::INFINITY].map(readable);
         assert_eq!(shown, ["0", "8.531", "−0.003120", "2e−5", "81,920", "1.000", "–", "inf"]);
         assert_eq!(readable_with_spread(8.53125, 0.04041), "8.531 ± 0.040");

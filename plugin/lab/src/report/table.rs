@@ -219,7 +219,7 @@ mod tests {
         let mut rows = sample_rows();
         rows.iter_mut().for_each(|row| row.success = 0.0);
         let html = Table::from(ResultTable { rows, ..Default::default() }).to_html();
-        assert!(!html.contains("Success") && !html.contains("0.0%") && html.contains(NO_SUCCESS), "{html}");
+        assert!(!html.contains("Success") && !html.contains("0.0 %") && html.contains(NO_SUCCESS), "{html}");
     }
 
     #[test]

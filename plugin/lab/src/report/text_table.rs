@@ -104,11 +104,11 @@ mod tests {
         let expected = [
             "  method     split     episodes        return  success  length  steps/s",
             "  ---------  --------  --------  ------------  -------  ------  -------",
-            "* SCORE-PPO  train          500   9.61 ± 0.08    96.1%    83.2   12,346",
-            "~ PPO        train          500   9.52 ± 0.09    95.2%    83.2   15,001",
-            "* SCORE-PPO  held-out       500   9.14 ± 0.11    91.4%    83.2        –",
-            "  PPO        held-out       500   7.40 ± 0.19    74.0%    83.2        –",
-            "  random     held-out       500  −0.31 ± 0.14     2.0%    83.2        –",
+            "* SCORE-PPO  train          500   9.61 ± 0.08   96.1 %    83.2   12,346",
+            "~ PPO        train          500   9.52 ± 0.09   95.2 %    83.2   15,001",
+            "* SCORE-PPO  held-out       500   9.14 ± 0.11   91.4 %    83.2        –",
+            "  PPO        held-out       500   7.40 ± 0.19   74.0 %    83.2        –",
+            "  random     held-out       500  −0.31 ± 0.14    2.0 %    83.2        –",
             "* highest mean return of its split; ~ within two standard errors of the difference to it",
             "",
         ]
@@ -122,7 +122,7 @@ mod tests {
         rows.iter_mut().for_each(|row| row.success = 0.0);
         let text = to_text_table(&rows);
         let head = text.lines().next().unwrap_or_default();
-        assert!(!head.contains("success") && !text.contains("0.0%"), "{text}");
+        assert!(!head.contains("success") && !text.contains("0.0 %"), "{text}");
         assert!(text.ends_with("; no episode was reported as a success\n"), "{text}");
         rows[0].success = 0.5;
         assert!(to_text_table(&rows).contains("success"));

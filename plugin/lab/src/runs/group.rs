@@ -141,7 +141,15 @@ pub(super) mod tests {
         let info =
             RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, device: DeviceKind::Flex };
         let path = format!("{algorithm}-{seed}").into();
-        RunRecord { path, experiment, info, curves: RunCurves::default(), checkpoints: Vec::new(), updated: None }
+        RunRecord {
+            path,
+            experiment,
+            info,
+            curves: RunCurves::default(),
+            checkpoints: Vec::new(),
+            is_training: false,
+            updated: None,
+        }
     }
 
     fn grouped(runs: &[RunRecord]) -> Vec<(String, Vec<u64>)> {

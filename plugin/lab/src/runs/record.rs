@@ -14,6 +14,7 @@ use crate::train::{
     Experiment,
     checkpoint::{self, Checkpoint},
     run_dir::{OpenedRun, RunDir, RunInfo},
+    run_lock::RunLock,
 };
 
 /// What a run is and what it has reached.
@@ -29,6 +30,8 @@ pub struct RunRecord {
     pub curves: RunCurves,
     /// Its checkpoints, the oldest first.
     pub checkpoints: Vec<Checkpoint>,
+    /// Whether it is trained at this moment.
+    pub is_training: bool,
     /// When it was last logged to, where the system says so.
     pub updated: Option<SystemTime>,
 }
@@ -49,6 +52,7 @@ impl RunRecord {
             info,
             curves: RunCurves::read(path)?,
             checkpoints: checkpoint::list(path)?,
+            is_training: RunLock::is_taken(path),
             updated: modified(log.metrics_file()).or_else(|| modified(&path.join("run.json"))),
         })
     }
@@ -56,6 +60,15 @@ impl RunRecord {
     /// Whether all steps of the experiment are done and saved.
     pub fn is_finished(&self) -> bool {
         self.checkpoints.last().is_some_and(|last| last.summary.step >= self.experiment.steps)
+    }
+
+    /// Environment steps that are done: while it is trained those that are logged, and otherwise those of the last
+    /// checkpoint, from which it goes on. What is logged after that is lost.
+    pub fn steps(&self) -> u64 {
+        match self.checkpoints.last() {
+            Some(last) if !self.is_training => last.summary.step,
+            _ => self.curves.last_step(),
+        }
     }
 
     /// The curve of a metric.

@@ -1,6 +1,9 @@
 //! What is wrong with an experiment, in words that say where and what to do.
 
-use std::path::PathBuf;
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 use thiserror::Error;
 
@@ -11,12 +14,12 @@ use bevy_playbot::unknown_name::nearest;
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}{}", path.display(), way_out(path, source))]
     Read {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// The text is not an experiment.
     #[error("{}:{line}:{column}: {message}", path.display())]
@@ -39,7 +42,7 @@ pub enum ConfigError {
         message: String,
     },
     /// What `key=value` changes does not go with the rest, which was sound before.
-    #[error("`{}`: {source}", sets.join("`, `"))]
+    #[error("{}", of_sets(sets, source))]
     Sets {
         /// The texts, those that are to blame if it can be told.
         sets: Vec<String>,
@@ -54,6 +57,25 @@ pub enum ConfigError {
         /// Why.
         source: ExperimentError,
     },
+}
+
+/// What to do about a file that is not there.
+fn way_out(path: &Path, error: &io::Error) -> String {
+    if error.kind() != io::ErrorKind::NotFound {
+        return String::new();
+    }
+    format!("; name an experiment file that exists, or begin one with `playbot config show > {}`", path.display())
+}
+
+/// The texts `key=value` and what is wrong with them; a key that is set and refused is named once.
+fn of_sets(sets: &[String], error: &ExperimentError) -> String {
+    let shown = sets.join("`, `");
+    match (sets, error) {
+        ([set], ExperimentError::Value { key, value, why }) if *set == format!("{key}={value}") => {
+            format!("`{shown}`: {why}")
+        }
+        _ => format!("`{shown}`: {error}"),
+    }
 }
 
 /// What to say about a key that does not exist: the nearest one, in its own section or anywhere; otherwise all keys of
@@ -124,14 +146,52 @@ pub(super) fn type_message(
         ron::Error::NoSuchEnumVariant { expected, found, .. } => one_of(key, found, expected),
         other => match valid_names() {
             Some(names) if !names.contains(&word(text)) => one_of(key, text, names),
-            _ => format!("`{key}` must be {}, not {text} ({other})", kind(Keys::all().text(key))),
+            _ => {
+                let why = if matches!(other, ron::Error::IntegerOutOfBounds) { ": it is out of range" } else { "" };
+                format!("`{key}` must be {}, not {text}{why}", kind(Keys::all().text(key)))
+            }
         },
     }
 }
 
 /// What to say about a text that is no value at all.
 pub(super) fn no_value(key: &str, text: &str, error: &ron::Error) -> String {
-    format!("`{key}` must be {}; `{text}` is not a value ({error})", kind(Keys::all().text(key)))
+    let wanted = kind(Keys::all().text(key));
+    if text.is_empty() {
+        return format!("`{key}` must be {wanted}; there is nothing behind the =");
+    }
+    format!("`{key}` must be {wanted}; `{text}` is not a value: {}", syntax_message(error))
+}
+
+/// What to say about a text that is not RON.
+pub(super) fn syntax_message(error: &ron::Error) -> String {
+    use ron::Error as Fault;
+    let words = match error {
+        Fault::Eof => "the text ends too early: a value or a closing bracket is missing",
+        Fault::ExpectedStringEnd => "a text in quotes has no end: a \" is missing",
+        Fault::ExpectedArrayEnd
+        | Fault::ExpectedComma
+        | Fault::ExpectedMapEnd
+        | Fault::ExpectedOptionEnd
+        | Fault::ExpectedStructLikeEnd => "a comma or a closing bracket is missing",
+        Fault::ExpectedMapColon => "a colon is missing between a key and its value",
+        Fault::TrailingCharacters => "the text goes on behind its end: a bracket or a comma is wrong",
+        Fault::UnclosedBlockComment => "a comment has no end: a */ is missing",
+        other => return other.to_string(),
+    };
+    words.to_owned()
+}
+
+/// What to say about a key that every experiment needs.
+pub(super) fn missing_key(key: &str) -> String {
+    let example = match key {
+        "game" => "the name of the game",
+        "train" => "levels to train on, such as train: \"MODE:0..63\"",
+        "test" => "held-out levels, such as test: \"MODE:64..127\"",
+        "steps" => "how long to train, such as steps: 1000000",
+        _ => return format!("`{key}` is missing"),
+    };
+    format!("`{key}` is missing: {example}")
 }
 
 fn one_of(key: &str, found: &str, names: &[&str]) -> String {

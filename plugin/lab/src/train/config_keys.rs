@@ -13,7 +13,7 @@ use serde::de::IgnoredAny;
 
 use super::{
     config::Experiment,
-    config_error::{ConfigError, type_message, unknown_key},
+    config_error::{ConfigError, missing_key, syntax_message, type_message, unknown_key},
     ron_keys::{fields, position},
 };
 
@@ -103,9 +103,12 @@ impl Keys {
     /// The text is not RON, no struct, or has a key twice.
     pub(super) fn of_text(text: &str, path: &Path) -> Result<Self, ConfigError> {
         let start = Origin::start_of(path);
+        if text.trim().is_empty() {
+            return Err(start.key_error("the file is empty: write an experiment into it, (key: value, ...)".to_owned()));
+        }
         check_syntax(text).map_err(|error| {
             let at = (error.span.end.line, error.span.end.col);
-            start.error(at, error.code.to_string())
+            start.error(at, syntax_message(&error.code))
         })?;
         let mut keys = Self::default();
         let origin =
@@ -120,7 +123,7 @@ impl Keys {
     ///
     /// The text is not RON or has a key twice.
     pub(super) fn of_set(section: &str, text: &str, origin: &Origin) -> Result<Self, ConfigError> {
-        check_syntax(text).map_err(|error| origin.error((1, 1), error.code.to_string()))?;
+        check_syntax(text).map_err(|error| origin.error((1, 1), syntax_message(&error.code)))?;
         let mut keys = Self::default();
         keys.collect(text, 0, &format!("{section}."), &|_, _| origin.clone(), &|key, _| ALL.is_section(key))?;
         Ok(keys)
@@ -243,7 +246,7 @@ impl Keys {
         if let ron::Error::MissingStructField { field, outer: Some(outer) } = &error.code
             && outer == "Experiment"
         {
-            return whole.error((1, 1), format!("`{field}` is missing"));
+            return whole.error((1, 1), missing_key(field));
         }
         let of = |at: ron::error::Position| lines.iter().rposition(|(line, _)| *line <= at.line);
         // The reader says from where to where it was; of what it refused at once only the end lies in the value.

@@ -21,28 +21,28 @@ impl Experiment {
             return Err(ExperimentError::Overlap { train: self.train.clone(), test: self.test.clone() });
         }
         if self.arenas == 0 {
-            return refuse("arenas", 0, "somebody has to play");
+            return refuse("arenas", 0, "must be at least 1: somebody has to play");
         }
         if self.worlds == 0 {
-            return refuse("worlds", 0, "the arenas must be somewhere");
+            return refuse("worlds", 0, "must be at least 1: the arenas must be somewhere");
         }
         if self.steps == 0 {
-            return refuse("steps", 0, "train for at least one step");
+            return refuse("steps", 0, "must be at least 1");
         }
         if self.demo_steps == Some(0) {
-            return refuse("demo_steps", 0, "skills are learned from at least one step; `None` takes all");
+            return refuse("demo_steps", 0, "must be at least 1; `None` takes all");
         }
         if self.eval.episodes_per_level == 0 {
-            return refuse("eval.episodes_per_level", 0, "a verdict needs at least one episode");
+            return refuse("eval.episodes_per_level", 0, "must be at least 1");
         }
         if self.checkpoints.every == 0 {
-            return refuse("checkpoints.every", 0, "is a number of updates, at least one");
+            return refuse("checkpoints.every", 0, "must be at least 1, a number of updates");
         }
         if self.checkpoints.keep == 0 {
-            return refuse("checkpoints.keep", 0, "at least the latest checkpoint must stay");
+            return refuse("checkpoints.keep", 0, "must be at least 1: the latest checkpoint stays");
         }
         if !(0.0..=1.0).contains(&self.study.threshold) {
-            return refuse("study.threshold", self.study.threshold, "a success rate lies in 0..1");
+            return refuse("study.threshold", self.study.threshold, "a success rate lies between 0 and 1");
         }
         self.image.check().map_err(|error| ExperimentError::Settings(format!("image: {error}")))?;
         self.skills.validate().map_err(settings)?;
@@ -225,7 +225,7 @@ mod tests {
     fn nobody_plays_nowhere() {
         // Not with the learning rate that cannot fall over no updates.
         let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("nobody");
-        assert!(text.starts_with("`arenas` is 0"), "{text}");
+        assert_eq!(text, "`arenas` is 0: must be at least 1: somebody has to play");
         let text = check(r#"algorithm: "ppo", worlds: 0"#).expect_err("nowhere");
         assert!(text.starts_with("`worlds` is 0"), "{text}");
     }

@@ -7,7 +7,7 @@ use std::{
 
 use bevy_playbot::unknown_name::nearest;
 
-use super::run_error::RunError;
+use super::{replaced_run::is_free, run_error::RunError};
 
 /// Files and folders of a run. One of them is enough: a run that lost the others is a damaged one.
 const SIGNS: [&str; 4] = ["run.json", "experiment.ron", "metrics.jsonl", "checkpoints"];
@@ -38,6 +38,12 @@ fn of_folder(path: &Path) -> String {
     let shown: Vec<_> = inside.iter().take(NAMED).map(|run| run.display().to_string()).collect();
     let more = if inside.len() > NAMED { ", …" } else { "" };
     match inside.is_empty() {
+        true if is_free(path) => {
+            format!(
+                "the folder is there, but no training began in it; `playbot train --run {}` starts one",
+                path.display()
+            )
+        }
         true => "the folder is there, but no training began in it; `playbot runs ls` lists runs".to_owned(),
         false => format!("it is a folder of runs: name one of them, such as {}{more}", shown.join(", ")),
     }
@@ -45,7 +51,10 @@ fn of_folder(path: &Path) -> String {
 
 /// What to say where there is no folder.
 fn of_nothing(path: &Path) -> String {
-    let what = if path.exists() { "it is a file, and a run is a folder" } else { "there is no such folder" };
+    let (what, begin) = match path.exists() {
+        true => ("it is a file, and a run is a folder", "FOLDER".into()),
+        false => ("there is no such folder", path.to_owned()),
+    };
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let beside = runs_in(parent);
     let name_of = |run: &PathBuf| run.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -59,7 +68,7 @@ fn of_nothing(path: &Path) -> String {
         (false, true) => "`playbot runs ls` lists those there are, and ".to_owned(),
         (false, false) => format!("`playbot runs ls {}` lists those there are, and ", parent.display()),
     };
-    format!("{what}{near}; {ls}`playbot train --run {}` starts one", path.display())
+    format!("{what}{near}; {ls}`playbot train --run {}` starts one", begin.display())
 }
 
 /// The runs directly in a folder, by name. A folder that cannot be listed has none to name.
@@ -91,8 +100,9 @@ mod tests {
         for (path, words) in [
             (root.join("frist"), "first?"),
             (root.join("none"), "lists those there are"),
-            (root.join("empty"), "no training began"),
+            (root.join("empty"), "no training began in it; `playbot train --run "),
             (root.join("file"), "it is a file"),
+            (root.join("file"), "`playbot train --run FOLDER` starts one"),
             (root.clone(), "name one of them"),
         ] {
             let text = error(&path);

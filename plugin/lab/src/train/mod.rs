@@ -20,6 +20,7 @@ pub mod learner;
 mod memory;
 pub mod metrics_log;
 mod missing_run;
+mod passed_over;
 pub mod presets;
 pub(crate) mod progress;
 mod replaced_run;

@@ -88,3 +88,8 @@ pub fn is_unstarted(path: &Path) -> bool {
     };
     names_in(path).is_ok_and(|names| names.iter().all(|name| name.to_str().is_some_and(first)))
 }
+
+/// Whether a run can be begun in a folder without replacing anything: it is empty, or a run ended there before it began.
+pub(super) fn is_free(path: &Path) -> bool {
+    is_unstarted(path) && (RunLock::is_known(path) || names_in(path).is_ok_and(|names| names.is_empty()))
+}

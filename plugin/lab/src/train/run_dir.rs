@@ -27,8 +27,10 @@ use super::{
     learner::TrainedLearner,
     metrics_log::MetricsLog,
     missing_run::check_is_run,
+    passed_over::passed_over,
     progress::Progress,
-    replaced_run::ReplacedRun,
+    replaced_run::{ReplacedRun, is_free},
+    run_error::FOLDER,
     run_lock::RunLock,
     train_error::TrainError,
     trainer::{self, Trainer},
@@ -36,7 +38,7 @@ use super::{
 };
 use crate::game::Game;
 
-pub(super) use super::run_error::{damaged, io_error};
+pub(super) use super::run_error::{damaged, io_error, unreadable};
 pub use super::{
     replaced_run::{check_replaceable, is_unstarted},
     run_error::RunError,
@@ -98,20 +100,21 @@ pub struct OpenedRun {
 }
 
 impl RunDir {
-    /// Makes the folder, locks it, and writes what the run is.
+    /// Makes the folder if it is not there, locks it, and writes what the run is.
     ///
     /// # Errors
     ///
-    /// [`RunError::Exists`] unless `force`, which replaces a run; what is no run is left alone with
+    /// [`RunError::Exists`] for a run unless `force`, which replaces it; what is no run is left alone with
     /// [`RunError::NotARun`], and what is in use with [`RunError::Busy`]. [`RunError::Io`] if it cannot be written.
     pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
         if path.exists() {
-            if !force {
-                return Err(RunError::Exists(path.into()));
-            }
             check_replaceable(path)?;
+            if !force && !is_free(path) {
+                let is_run = !is_unstarted(path);
+                return Err(if is_run { RunError::Exists(path.into()) } else { RunError::NotARun(path.into()) });
+            }
         }
-        fs::create_dir_all(path).map_err(io_error("create", path))?;
+        fs::create_dir_all(path).map_err(io_error(FOLDER, path))?;
         Self::begin(RunLock::take(path)?, experiment, info)
     }
 
@@ -150,7 +153,7 @@ impl RunDir {
         let experiment = read_experiment(&path.join("experiment.ron"))?;
         let info_path = path.join("run.json");
         let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;
-        let info = serde_json::from_str(&text).map_err(|error| damaged(&info_path, &error))?;
+        let info = serde_json::from_str(&text).map_err(|error| unreadable(&info_path, &error))?;
         Ok(OpenedRun { run: Self { path: path.into(), _lock: None }, experiment, info })
     }
 
@@ -262,17 +265,20 @@ impl RunDir {
         algorithm: Algorithm,
         device: DeviceKind,
     ) -> Result<(TrainedLearner, TrainState), RunError> {
-        let mut first_error = None;
+        let mut bad = Vec::new();
         for checkpoint in checkpoint::list(&self.path)?.iter().rev() {
             match read_checkpoint(checkpoint, algorithm, device) {
-                Ok(read) => return Ok(read),
-                Err(error) => {
-                    tracing::warn!("checkpoint of step {} cannot be read: {error}", checkpoint.summary.step);
-                    first_error.get_or_insert(error);
+                Ok(read) => {
+                    if let Some(words) = passed_over(&bad, checkpoint.summary.step) {
+                        tracing::warn!("{words}");
+                    }
+                    return Ok(read);
                 }
+                Err(error) => bad.push((checkpoint.summary.step, error)),
             }
         }
-        Err(first_error.unwrap_or(RunError::NoCheckpoint { path: self.path.clone(), steps: Vec::new() }))
+        let none = RunError::NoCheckpoint { path: self.path.clone(), steps: Vec::new() };
+        Err(bad.into_iter().next().map_or(none, |(_, error)| error))
     }
 }
 

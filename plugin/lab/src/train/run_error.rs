@@ -33,7 +33,7 @@ pub enum RunError {
     )]
     Busy(PathBuf),
     /// There is no such checkpoint.
-    #[error("{} has no such checkpoint; it has {}", path.display(), list_steps(steps))]
+    #[error("{} has {}", path.display(), list_steps(steps))]
     NoCheckpoint {
         /// The folder of the run.
         path: PathBuf,
@@ -41,7 +41,7 @@ pub enum RunError {
         steps: Vec<u64>,
     },
     /// The operating system refused.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}: {source}{}", path.display(), elsewhere(action))]
     Io {
         /// What was tried.
         action: &'static str,
@@ -62,23 +62,43 @@ pub enum RunError {
     #[error(transparent)]
     Learner(#[from] FileError),
     /// The saved experiment cannot be read.
-    #[error(transparent)]
+    #[error("{}", of_run(.0))]
     Config(#[from] ConfigError),
     /// The saved training does not fit the game.
     #[error(transparent)]
     Train(#[from] TrainError),
 }
 
+/// What to do about a run that says no longer what it is.
+const MEND: &str = "bring it back from a copy, or train the run anew with --force";
+
+/// What is wrong with the experiment that a run has saved.
+fn of_run(error: &ConfigError) -> String {
+    format!("{error}; the file is part of a run: {MEND}")
+}
+
+/// What is made where the folder of a run is made; nothing is lost yet if that fails.
+pub(super) const FOLDER: &str = "create the folder";
+
+fn elsewhere(action: &str) -> &'static str {
+    if action == FOLDER { "; make room or rights there, or name another folder" } else { "" }
+}
+
 fn list_steps(steps: &[u64]) -> String {
     if steps.is_empty() {
-        return "none".to_owned();
+        return "no checkpoint yet: wait until its training has saved one, or start it again with --force".to_owned();
     }
     let steps: Vec<_> = steps.iter().map(u64::to_string).collect();
-    format!("those of the steps {}", steps.join(", "))
+    format!("no such checkpoint; it has those of the steps {}", steps.join(", "))
 }
 
 pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
     move |source| RunError::Io { action, path: path.into(), source }
+}
+
+/// A file without which a run is none.
+pub(super) fn unreadable(path: &Path, error: &impl ToString) -> RunError {
+    RunError::Damaged { path: path.into(), message: format!("the file is damaged ({}): {MEND}", error.to_string()) }
 }
 
 pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {

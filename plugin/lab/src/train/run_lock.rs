@@ -4,12 +4,16 @@ use std::{
     fs::{File, OpenOptions, TryLockError},
     io,
     path::{Path, PathBuf},
+    thread,
 };
 
 use super::run_dir::{RunError, io_error};
 
 /// Name of the file that is locked. It stays when the lock is given back, and says nothing then.
 pub(super) const LOCK_FILE: &str = "run.lock";
+
+/// Tries before a lock is somebody else's: who only looks, with [`RunLock::is_taken`], has it for a moment.
+const TRIES: usize = 1000;
 
 /// The right to write into the folder of a run, until it is dropped. The system gives it back when the process ends,
 /// however it ends, so that a kill leaves nothing in the way. Who only reads needs none.
@@ -29,7 +33,7 @@ impl RunLock {
         let path = folder.join(LOCK_FILE);
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
         let file = file.map_err(io_error("open", &path))?;
-        match file.try_lock() {
+        match try_often(&file) {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(RunError::Busy(folder.into())),
             // Some network file systems have no locks.
@@ -46,10 +50,26 @@ impl RunLock {
         &self.folder
     }
 
+    /// Whether somebody has the lock of a folder now. Nothing is written.
+    pub fn is_taken(folder: &Path) -> bool {
+        let is_taken = |file: File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+        File::open(folder.join(LOCK_FILE)).is_ok_and(is_taken)
+    }
+
     /// Whether a folder has been locked once, and so is one of ours.
     pub fn is_known(folder: &Path) -> bool {
         folder.join(LOCK_FILE).is_file()
     }
+}
+
+fn try_often(file: &File) -> Result<(), TryLockError> {
+    for _ in 1..TRIES {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => thread::yield_now(),
+            decided => return decided,
+        }
+    }
+    file.try_lock()
 }
 
 #[cfg(test)]
@@ -59,10 +79,13 @@ mod tests {
     #[test]
     fn a_folder_has_one_lock() {
         let folder = tempfile::tempdir().expect("a folder");
-        assert!(!RunLock::is_known(folder.path()));
+        assert!(!RunLock::is_taken(folder.path()));
+        assert!(!RunLock::is_known(folder.path()), "who looks writes nothing");
         let lock = RunLock::take(folder.path()).expect("free");
         assert!(matches!(RunLock::take(folder.path()), Err(RunError::Busy(path)) if path == folder.path()));
+        assert!(RunLock::is_taken(folder.path()));
         drop(lock);
+        assert!(!RunLock::is_taken(folder.path()));
         assert!(RunLock::is_known(folder.path()));
         RunLock::take(folder.path()).expect("free again");
     }

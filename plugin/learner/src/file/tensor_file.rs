@@ -2,7 +2,7 @@
 
 use super::write_atomically;
 use crate::{FileError, LearnError};
-use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+use safetensors::{Dtype, SafeTensorError, SafeTensors, tensor::TensorView};
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -90,13 +90,19 @@ impl TensorFile {
     /// Takes a whole file from memory; `path` is for messages.
     pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
         let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
-        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let foreign = |error: SafeTensorError| match error {
+            SafeTensorError::HeaderTooSmall
+            | SafeTensorError::InvalidHeaderLength
+            | SafeTensorError::MetadataIncompleteBuffer => FileError::CutOff { path: path.to_owned(), advice: "" },
+            error => format(format!("not safetensors: {error}")),
+        };
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(foreign)?;
         let description = metadata
             .metadata()
             .as_ref()
             .and_then(|map| map.get(DESCRIPTION).cloned())
             .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry")))?;
-        let views = SafeTensors::deserialize(bytes).map_err(|e| format(format!("not safetensors: {e}")))?;
+        let views = SafeTensors::deserialize(bytes).map_err(foreign)?;
         let tensors = views
             .iter()
             .map(|(name, view)| {

@@ -13,6 +13,9 @@ use std::path::Path;
 
 const FILE: FileKind = FileKind { name: "policy", version: 1 };
 
+/// How a policy file that is cut off can be had again.
+const AGAIN: &str = ": export the policy again";
+
 /// A policy with everything it needs to play.
 ///
 /// The file is safetensors: networks, normaliser and some rows of observations with what the policy said about them,
@@ -87,7 +90,7 @@ impl PolicyFile {
     /// [`FileError`] says what is wrong with the file, names the tensor that is missing, superfluous or misshapen, or the
     /// example that came out otherwise.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
-        Self::take(TensorFile::read(path)?, device)
+        Self::take(TensorFile::read(path).map_err(|error| error.or_again(AGAIN))?, device)
     }
 
     /// [`Self::load`] for a file that is in memory already, such as an asset or `include_bytes!`; `name` is for messages.
@@ -95,7 +98,7 @@ impl PolicyFile {
     /// # Errors
     /// As [`Self::load`].
     pub fn from_bytes(name: &Path, bytes: &[u8], device: DeviceKind) -> Result<Self, FileError> {
-        Self::take(TensorFile::parse(name, bytes)?, device)
+        Self::take(TensorFile::parse(name, bytes).map_err(|error| error.or_again(AGAIN))?, device)
     }
 
     fn take(mut file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {

@@ -130,7 +130,7 @@ impl SkillModel {
     /// # Errors
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
-        let mut file = TensorFile::read(path)?;
+        let mut file = TensorFile::read(path).map_err(|error| error.or_again(": learn the skills again"))?;
         let header: Header = file.header(FILE)?;
         let description = header.skill;
         let nets = SkillNets::stored(&description, &mut file, &device.plain())?;

@@ -8,7 +8,7 @@ use super::EpisodeFault;
 
 /// A problem with one demonstration file: which file, and what is wrong with it.
 #[derive(Debug, Error)]
-#[error("{}: {fault}", path.display())]
+#[error("{}: {}", path.display(), advised(fault, path))]
 pub struct DemoFileError {
     /// The file (or folder) the problem is about.
     pub path: PathBuf,
@@ -32,6 +32,13 @@ impl DemoFileError {
                 | DemoFault::BadEpisode { .. }
         )
     }
+}
+
+/// A fault in words, whose command to repair `FILE` names this file.
+fn advised(fault: &DemoFault, path: &Path) -> String {
+    let name = path.display().to_string();
+    let word = if name.contains(char::is_whitespace) { format!("'{name}'") } else { name };
+    fault.to_string().replace("demo repair FILE`", &format!("demo repair {word}`"))
 }
 
 /// The ways a demonstration file can be wrong.
@@ -176,7 +183,7 @@ pub enum DemoFault {
         expected: String,
     },
     /// Episodes cannot be appended because the file was recorded under other conditions.
-    #[error("cannot append: `{field}` is {found} in the file, but {wanted} is being recorded")]
+    #[error("cannot append: `{field}` is {found} in the file, but {wanted} is being recorded: record to another file")]
     HeaderDiffers {
         /// The first header field that differs.
         field: &'static str,

@@ -210,6 +210,9 @@ mod tests {
         assert!(header().check_append(&DemoHeader { note: "later".into(), ..header() }).is_ok());
         let other = DemoHeader { demonstrator: "ada".into(), ..header() };
         let text = header().check_append(&other).expect_err("other player").to_string();
-        assert_eq!(text, "cannot append: `demonstrator` is \"\" in the file, but \"ada\" is being recorded");
+        assert_eq!(
+            text,
+            "cannot append: `demonstrator` is \"\" in the file, but \"ada\" is being recorded: record to another file"
+        );
     }
 }

@@ -213,7 +213,11 @@ mod tests {
             let torn = [fs::read(&path).expect("read"), FRAME_MAGIC.to_vec(), vec![9; 7]].concat();
             fs::write(&path, &torn).expect("torn");
             let error = DemoWriter::append(&path, &header()).expect_err("torn");
-            assert!(error.is_repairable() && error.to_string().contains("playbot demo repair FILE"), "{error}");
+            assert!(
+                error.is_repairable()
+                    && error.to_string().contains(&format!("`playbot demo repair {}`", path.display())),
+                "{error}"
+            );
             let report = repair(&path, &path).expect("repaired");
             let backup = folder.path().join(if round == 1 { "a.demo.bak" } else { "a.demo.bak2" });
             assert_eq!((report.kept_episodes, report.dropped_bytes), (round, 11));

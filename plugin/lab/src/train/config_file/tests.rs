@@ -68,7 +68,16 @@ fn a_wrong_value_says_what_was_expected_and_where() {
 
 #[test]
 fn what_is_missing_or_no_experiment_is_named() {
-    assert_eq!(error(&GOOD.replace("steps: 1000,", "")), "x.ron:1:1: `steps` is missing");
+    assert_eq!(
+        error(&GOOD.replace("steps: 1000,", "")),
+        "x.ron:1:1: `steps` is missing: how long to train, such as steps: 1000000"
+    );
+    assert!(
+        error(&GOOD.replace("train: \"hard:0..63\",", ""))
+            .contains("`train` is missing: levels to train on, such as train: ")
+    );
+    assert!(error(" \n").starts_with("x.ron:1:1: the file is empty"), "{}", error(" \n"));
+    assert!(error(&GOOD[..60]).contains("is missing"), "{}", error(&GOOD[..60]));
     assert!(error("[1, 2]").contains("(key: value, ...)"));
     assert!(error(&GOOD.replace("),\n)", ",\n)")).starts_with("x.ron:5:"), "a bracket is missing");
 }
@@ -99,6 +108,7 @@ fn who_spoils_a_sound_file_is_named() {
     assert!(text.starts_with("`arenas=6`, `worlds=4`: `worlds` is 4"), "{text}");
     let bad = GOOD.replace("gamma: 0.99", "gamma: 1.5");
     assert!(error(&bad, &["seed=3"]).starts_with("x.ron: ppo gamma"), "the file is wrong by itself");
+    assert_eq!(error(GOOD, &["steps=0"]), "`steps=0`: must be at least 1", "the key is named once");
     assert!(error(GOOD, &["ppo.lr=0", "ppo.lr=-1"]).starts_with("`ppo.lr=-1`: "), "the last one counts");
 }
 
@@ -180,4 +190,10 @@ fn files_can_be_built_on_files_and_errors_name_the_right_one() {
     assert!(read("top.ron").expect_err("gone").to_string().contains("gone.ron, which cannot be read"));
     write("top.ron", "(base: \"good.ron\")");
     assert!(read("top.ron").expect_err("no list").to_string().contains("must be a list"));
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named_with_the_command_that_begins_one() {
+    let text = read_experiment(Path::new("none.ron")).expect_err("not there").to_string();
+    assert!(text.starts_with("cannot read none.ron: ") && text.ends_with("`playbot config show > none.ron`"), "{text}");
 }

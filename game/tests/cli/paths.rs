@@ -1,0 +1,78 @@
+//! Paths on the command line: what is not here is not taken from elsewhere, and advice can be followed.
+
+use std::{fs, path::Path};
+
+use crate::program::{done, ended};
+
+/// One update of PPO.
+fn write_experiment(folder: &Path) {
+    let text = r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", steps: 128, arenas: 8, worlds: 2,
+        algorithm: "ppo", ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]))"#;
+    fs::write(folder.join("small.ron"), text).expect("writable");
+}
+
+#[test]
+fn what_somebody_names_is_looked_for_here_only() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let file = "demos/coinrun/easy.demo";
+    for args in [
+        &["demo", "ls"][..],
+        &["demo", "ls", "demos/coinrun"],
+        &["demo", "verify", file],
+        &["demo", "show", file],
+        &["demo", "repair", file],
+    ] {
+        let (_, words) = ended(folder, args, 3);
+        assert!(words.contains("`playbot record GAME --out demos/"), "{args:?}: {words}");
+    }
+    let (_, words) = ended(folder, &["demo", "repair", "demos/README.md"], 3);
+    assert!(words.contains("end in .demo") && !words.contains("README.md/"), "{words}");
+}
+
+#[test]
+fn recordings_of_the_experiment_that_comes_with_the_program_are_beside_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let learn = ["learn-skills", "--max-steps", "1", "--epochs", "1", "--out", "skills"];
+    let (_, words) = done(folder, &learn);
+    assert!(words.contains("recordings are taken from ") && words.contains("none at demos/coinrun here"), "{words}");
+    assert!(!words.contains(".."), "{words}");
+    let (_, words) = ended(folder, &[&learn[..], &["--force", "--demos", "demos/coinrun"]].concat(), 3);
+    assert!(words.contains("`playbot record coinrun "), "{words}");
+    let (_, told) = done(folder, &["config", "show"]);
+    assert!(!told.contains("there are no recordings"), "{told}");
+    let (_, told) = done(folder, &["config", "show", "--set", "demos=demos/coinrun"]);
+    assert!(told.contains("there are no recordings at demos/coinrun"), "{told}");
+}
+
+#[test]
+fn an_empty_folder_becomes_a_run_and_a_file_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write_experiment(folder);
+    fs::create_dir(folder.join("empty")).expect("writable");
+    fs::write(folder.join("main.log"), "words").expect("writable");
+    let train = ["train", "--experiment", "small.ron", "--run"];
+    let (_, words) = ended(folder, &["train", "--run", "empty", "--resume"], 3);
+    assert!(words.contains("`playbot train --run empty` starts one"), "{words}");
+    done(folder, &[&train[..], &["empty"]].concat());
+    let (_, words) = ended(folder, &[&train[..], &["empty"]].concat(), 3);
+    assert!(words.contains("empty exists already") && words.contains("--resume"), "{words}");
+    let (_, words) = ended(folder, &[&train[..], &["main.log"]].concat(), 3);
+    assert!(words.contains("main.log is not the folder of a run") && !words.contains("--resume"), "{words}");
+    let (_, words) = ended(folder, &["eval", "--run", "main.log"], 3);
+    assert!(words.contains("it is a file") && !words.contains("--run main.log`"), "{words}");
+    let (_, words) = ended(folder, &["learn-skills", "--out", "empty"], 3);
+    assert!(words.contains("empty is a folder: name a file") && !words.contains("--force"), "{words}");
+}
+
+#[test]
+fn the_best_checkpoint_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write_experiment(folder);
+    done(folder, &["train", "--experiment", "small.ron", "--run", "run"]);
+    let (_, words) = done(folder, &["eval", "--run", "run", "--checkpoint", "best", "--episodes-per-level", "1"]);
+    assert!(words.contains("no checkpoint of run has a return") && words.contains("the last, of step 128"), "{words}");
+}

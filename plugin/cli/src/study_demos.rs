@@ -1,0 +1,60 @@
+//! The recordings that the runs of a study learn from.
+
+use std::path::PathBuf;
+
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{game::Game, games::Games, split::LevelSplit, train::Experiment};
+use playbot_learner::Dataset;
+
+use super::{error::CliError, experiment::ExperimentArgs, learn_skills::read_demos};
+
+/// Reads recordings, and keeps the last ones for the runs that share them.
+pub struct StudyDemos<'a> {
+    games: &'a Games<'a>,
+    from: &'a ExperimentArgs,
+    threads: usize,
+    /// What was read last.
+    last: Option<(RecordingsKey, Dataset)>,
+}
+
+/// What the contents of a dataset depend on.
+#[derive(PartialEq)]
+struct RecordingsKey {
+    game: String,
+    path: PathBuf,
+    /// Levels that must not be among them.
+    held_out: LevelSplit,
+    observation_config: ObservationConfig,
+    /// How many steps at most.
+    steps: Option<u64>,
+}
+
+impl<'a> StudyDemos<'a> {
+    pub fn new(games: &'a Games<'a>, from: &'a ExperimentArgs, threads: usize) -> Self {
+        Self { games, from, threads, last: None }
+    }
+
+    /// The recordings of an experiment.
+    ///
+    /// # Errors
+    ///
+    /// They cannot be read, belong to another game, or show held-out levels.
+    pub fn read(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
+        let key = RecordingsKey {
+            game: experiment.game.clone(),
+            path: self.from.find_recordings(experiment.recordings()?, self.games),
+            held_out: experiment.test.clone(),
+            observation_config: experiment.observation_config(),
+            steps: experiment.demo_steps,
+        };
+        match &self.last {
+            Some((known, dataset)) if *known == key => Ok(dataset.clone()),
+            _ => {
+                let path = self.from.recordings(experiment, self.games)?;
+                let dataset = read_demos(game, experiment, &path, self.threads)?;
+                self.last = Some((key, dataset.clone()));
+                Ok(dataset)
+            }
+        }
+    }
+}
