@@ -13,9 +13,17 @@ struct Tutorial;
 struct OwnGame;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/detectors.md")]
+struct Detectors;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/level-files.md")]
 struct LevelFiles;
 
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/recording-in-builds.md")]
 struct RecordingInBuilds;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/findings.md")]
+struct Findings;

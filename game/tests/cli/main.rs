@@ -1,7 +1,9 @@
 //! The program as its users call it.
 
+mod detectors;
 mod eval;
 mod explore;
+mod findings;
 mod paths;
 #[path = "../shared/program.rs"]
 mod program;

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::program::{code, done, ended, errors, lines, playbot};
 
-const FILES: [&str; 3] = ["results.json", "junit.xml", "summary.md"];
+const FILES: [&str; 4] = ["results.json", "report.html", "junit.xml", "summary.md"];
 
 fn test(folder: &Path, out: &str, rest: &[&str]) -> Output {
     playbot(folder, &[&["test", "coinrun", "--out", out], rest].concat())
@@ -181,6 +181,26 @@ fn changed(line: &str, failed: &str, unsolvable: &str) -> String {
         level["proof"] = serde_json::json!({ "unsolvable": { "why": "walled in" } });
     }
     format!("{level}{comma}")
+}
+
+#[test]
+fn the_page_has_pictures_of_the_levels_and_is_made_again_to_the_byte() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    test(folder, "out", &["--levels", "hard:0..9", "--bot", "right-jump"]);
+    let page = read(folder, "out/report.html");
+    assert_eq!(page.matches("<figure><svg").count(), 10, "{page}");
+    assert!(page.contains("playbot test coinrun --levels hard:"), "{page}");
+    done(folder, &["report", "html", "out", "--out", "pages/again.html"]);
+    assert!(read(folder, "pages/again.html") == page);
+    let (_, words) = ended(folder, &["report", "html", "none"], 3);
+    assert!(words.contains("none has no results.json"), "{words}");
+    // Of another version of the game there are numbers, and no pictures.
+    let results = read(folder, "out/results.json").replace("\"game_version\":1", "\"game_version\":0");
+    fs::write(folder.join("out/results.json"), results).expect("writable");
+    done(folder, &["report", "html", "out"]);
+    let page = read(folder, "out/report.html");
+    assert!(page.contains("version 0 of `coinrun` was tested") && !page.contains("<figure>"), "{page}");
 }
 
 #[cfg(unix)]

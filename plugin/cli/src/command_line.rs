@@ -8,8 +8,8 @@ use playbot_lab::{game::Game, games::Games, level_files::LevelFileError, split::
 use crate::{
     bench, config, demo, doctor,
     error::{CliError, Outcome},
-    eval, explore, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, report,
-    runs, study, test, trace, train, usage_error, view,
+    eval, explore, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, replay,
+    report, runs, study, test, trace, train, usage_error, view,
 };
 
 /// Playtesting bots that learn from demonstrations.
@@ -37,6 +37,7 @@ Examples:
   playbot train --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
   playbot test GAME --levels MODE:0..99 --out runs/test   which levels can be solved?
+  playbot replay runs/test/findings/NAME.finding --apng failure.png   what was found
   playbot policy export --run runs/first --out GAME.policy
   playbot config show --set ppo.lr=0.0003   an experiment with all its values
   playbot study --experiment my.ron --out study
@@ -60,6 +61,7 @@ enum Verb {
     Config(config::Args),
     Eval(eval::Args),
     Test(test::Args),
+    Replay(replay::Args),
     Report(report::Args),
     Explore(explore::Args),
     Eyes(eyes::Args),
@@ -181,6 +183,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Config(args) => config::run(args, games),
         Verb::Eval(args) => eval::run(args, games),
         Verb::Test(args) => test::run(&args, games),
+        Verb::Replay(args) => replay::run(&args, games),
         Verb::Report(args) => report::run(&args, games),
         Verb::Explore(args) => explore::run(args, games),
         Verb::Eyes(args) => eyes::run(args, games),

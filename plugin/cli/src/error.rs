@@ -12,6 +12,7 @@ use bevy_playbot::{
 use playbot_lab::{
     demo::verify::VerifyError,
     eval::EvalError,
+    findings::{FindingError, Unplayable},
     games::{ForeignArtifact, GamesError},
     inspect::InspectError,
     mode::ModeError,
@@ -130,6 +131,10 @@ pub enum CliError {
     Export(#[from] ExportError),
     #[error(transparent)]
     Test(#[from] TestError),
+    #[error(transparent)]
+    Finding(#[from] FindingError),
+    #[error(transparent)]
+    Unplayable(#[from] Unplayable),
     #[cfg(feature = "window")]
     #[error(transparent)]
     Window(#[from] crate::window::WindowError),
@@ -152,6 +157,7 @@ impl CliError {
             | Self::Experiment(_)
             | Self::Study(_)
             | Self::Misfit(_)
+            | Self::Unplayable(_)
             | Self::Vision(_)
             | Self::ObservationConfig(_)
             | Self::Eval(EvalError::Vision(_))
@@ -162,6 +168,13 @@ impl CliError {
             Self::Demo(error) | Self::Verify(VerifyError::File(error)) => demo_code(error),
             Self::Train(error) => train_code(error),
             Self::Test(error) => {
+                if error.is_usage() {
+                    3
+                } else {
+                    2
+                }
+            }
+            Self::Finding(error) => {
                 if error.is_usage() {
                     3
                 } else {

@@ -43,6 +43,7 @@ mod progress;
 mod quickstart;
 mod record;
 mod recording;
+mod replay;
 mod report;
 mod runs;
 mod study;

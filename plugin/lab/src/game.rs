@@ -6,6 +6,7 @@ use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use crate::{
     benchmark::Benchmark,
+    detector::Detector,
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
@@ -174,6 +175,12 @@ pub trait Game: Send + Sync {
     /// shown nothing. By default nothing is known.
     fn prove(&self, _mode: &str, _level: u64) -> LevelProof {
         LevelProof::Unknown
+    }
+
+    /// The game's own detectors, which look for defects in tests beside [those that all games have](crate::detectors). One
+    /// with the name of another takes its place.
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        Vec::new()
     }
 
     /// Bots that every learner is compared with, by name.

@@ -33,6 +33,8 @@ pub enum Artifact {
     Recording,
     /// An experiment, which people write.
     Experiment,
+    /// A finding of a test.
+    Finding,
 }
 
 impl Artifact {
@@ -42,12 +44,13 @@ impl Artifact {
             Self::Policy => "a policy",
             Self::Recording => "a recording",
             Self::Experiment => "an experiment",
+            Self::Finding => "a finding",
         }
     }
 
     fn way_out(self) -> &'static str {
         match self {
-            Self::Run | Self::Policy | Self::Recording => "use the program of that game",
+            Self::Run | Self::Policy | Self::Recording | Self::Finding => "use the program of that game",
             Self::Experiment => "correct `game` in it, or use the program of that game",
         }
     }

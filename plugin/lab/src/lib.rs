@@ -5,7 +5,10 @@
 //! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
 //! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
 //! - [`verdict`] says of each level whether bots solved it, failed, or nobody can; results of shards and of two states of a
-//!   game are joined and compared there.
+//!   game are joined and compared there. [`verdict_report`] makes a page of them that people read.
+//! - [`findings`] keeps what was found with the actions that lead there, plays it again and makes it shorter.
+//! - [`detectors`] look for defects while bots play: agents that are stuck, leave their level or are no numbers any more,
+//!   and what a game adds with a [`detector`] of its own.
 //! - [`explore`] finds its way through a level by itself, without training: what can be reached, and how.
 //! - [`doctor`] finds out whether a game plays the same when it is given the same actions, and what differs if not.
 //! - [`pipeline`] goes the whole road with five functions; [`policy_export`] makes the one file that a game ships with, for
@@ -16,12 +19,15 @@
 pub mod arrangement;
 pub mod benchmark;
 pub mod demo;
+pub mod detector;
+pub mod detectors;
 pub mod doctor;
 pub mod drawing;
 mod escape;
 pub mod eval;
 pub mod experiment_text;
 pub mod explore;
+pub mod findings;
 pub mod floor_plan;
 pub mod foreign;
 pub mod game;
@@ -44,4 +50,5 @@ pub mod stage_clock;
 pub mod trace;
 pub mod train;
 pub mod verdict;
+pub mod verdict_report;
 pub mod worlds;

@@ -1,8 +1,10 @@
 //! Agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
 
+mod detectors;
 mod episodes;
 mod explore;
 mod faults;
+mod findings;
 mod lander;
 mod orders;
 mod pipeline;

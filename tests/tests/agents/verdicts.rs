@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{
+    detectors::Detectors,
     eval::Player,
     foreign::Restart,
     prelude::*,
@@ -27,7 +28,8 @@ fn testers() -> Vec<Tester> {
 }
 
 fn plan(levels: &str, testers: Vec<Tester>, threads: usize) -> TestPlan {
-    TestPlan { split: levels.parse().expect("levels"), testers, episodes: 3, seed: 2, shard: None, threads }
+    let (split, detectors) = (levels.parse().expect("levels"), Detectors::default());
+    TestPlan { split, testers, episodes: 3, seed: 2, detectors, shard: None, threads }
 }
 
 /// All verdicts, in the order of the levels.

@@ -8,6 +8,6 @@ mod window;
 
 pub use args::Args;
 #[cfg(not(feature = "window"))]
-pub use no_window::run;
+pub use no_window::{no_window, run};
 #[cfg(feature = "window")]
 pub use window::run;

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use playbot_lab::verdict::{RESULTS, merge};
+use playbot_lab::{
+    games::Games,
+    verdict::{RESULTS, ResultLines, merge},
+};
 
 use crate::{
     error::{CliError, Outcome},
@@ -34,14 +37,19 @@ pub struct Args {
     json: bool,
 }
 
-pub fn run(args: &Args) -> Result<Outcome, CliError> {
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if !args.force && args.out.join(RESULTS).exists() {
         return Err(CliError::Usage(format!(
             "{} has results already: choose another --out, or replace them with --force",
             args.out.display()
         )));
     }
-    let results = Results { folder: &args.out, against: args.against.as_deref(), json: args.json };
+    let game = match args.shards.first() {
+        // Without the game there are no pictures, and all else is the same.
+        Some(shard) => games.get(&ResultLines::open(shard)?.record().game).ok(),
+        None => None,
+    };
+    let results = Results { folder: &args.out, against: args.against.as_deref(), game, json: args.json };
     results.check_folders()?;
     merge(&args.shards, &args.out)?;
     tell_results(&results)

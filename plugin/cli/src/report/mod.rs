@@ -1,5 +1,6 @@
 //! `playbot report`.
 
+mod html;
 mod merge;
 mod verb;
 

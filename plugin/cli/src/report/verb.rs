@@ -2,13 +2,14 @@
 
 use playbot_lab::games::Games;
 
-use super::merge;
+use super::{html, merge};
 use crate::error::{CliError, Outcome};
 
 /// Work with the results of tests.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot report merge runs/shard-0 runs/shard-1 --out runs/test")]
+  playbot report merge runs/shard-0 runs/shard-1 --out runs/test
+  playbot report html runs/test")]
 pub struct Args {
     #[command(subcommand)]
     verb: Verb,
@@ -18,10 +19,13 @@ pub struct Args {
 enum Verb {
     /// Join the results of all shards of a test.
     Merge(merge::Args),
+    /// Make the page of results again.
+    Html(html::Args),
 }
 
-pub fn run(args: &Args, _games: &Games) -> Result<Outcome, CliError> {
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     match &args.verb {
-        Verb::Merge(args) => merge::run(args),
+        Verb::Merge(args) => merge::run(args, games),
+        Verb::Html(args) => html::run(args, games),
     }
 }

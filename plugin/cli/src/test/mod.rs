@@ -1,5 +1,8 @@
 //! `playbot test`.
 
+mod detectors;
+mod findings;
+mod regress;
 mod testers;
 mod told;
 mod verb;

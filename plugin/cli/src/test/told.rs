@@ -3,11 +3,13 @@
 use std::{fs, path::Path};
 
 use playbot_lab::{
+    game::Game,
     report::{PlainTable, readable, whole},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, Trials, wilson,
         write_reports,
     },
+    verdict_report::{HtmlReport, REPORT, write_html},
 };
 
 use crate::{
@@ -22,6 +24,8 @@ pub struct Results<'a> {
     pub folder: &'a Path,
     /// Folder of earlier ones.
     pub against: Option<&'a Path>,
+    /// The game that was tested, if the program has it: it draws the levels of the report.
+    pub game: Option<&'a dyn Game>,
     /// Whether to print the levels as JSON instead of tables.
     pub json: bool,
 }
@@ -52,6 +56,8 @@ impl Results<'_> {
 pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     let comparison = results.against.map(|before| Comparison::read(before, results.folder)).transpose()?;
     let overview = write_reports(results.folder, comparison.as_ref(), program::name())?;
+    let report = HtmlReport { game: results.game, comparison: comparison.as_ref(), program: program::name() };
+    write_html(results.folder, &results.folder.join(REPORT), &report)?;
     if results.json {
         let mut lines = ResultLines::open(results.folder)?;
         while let Some(line) = lines.next_line()? {
@@ -67,7 +73,7 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     if let Some(comparison) = &comparison {
         tell_comparison(comparison);
     }
-    let names = [RESULTS, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
+    let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
     tell!("{}: {}", results.folder.display(), names.collect::<Vec<_>>().join(", "));
     let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })

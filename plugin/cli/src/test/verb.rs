@@ -3,13 +3,17 @@
 use std::path::PathBuf;
 
 use playbot_lab::{
+    findings::FindingFiles,
     game::Game,
     games::Games,
     split::LevelSplit,
-    verdict::{Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, run_tests},
+    verdict::{Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, run_tests_keeping},
 };
 
 use super::{
+    detectors::{DetectorArgs, forget_slow_ticks, list_detectors, tell_slow_ticks},
+    findings::FindingArgs,
+    regress::RegressArgs,
     testers::TesterArgs,
     told::{Results, tell_results},
 };
@@ -26,7 +30,11 @@ use crate::{
 ///
 /// Each level is solved, or no tester solved it, or it is proved that nobody can; a game that panics or breaks its contract
 /// on a level is a finding of that level, and the others go on. DIR/results.json has every level, with 95 % intervals, and
-/// is the same on any number of threads; DIR/junit.xml is for build servers and DIR/summary.md for a pull request.
+/// is the same on any number of threads; DIR/report.html shows it with pictures of the worst,
+/// DIR/junit.xml is for build servers and DIR/summary.md for a pull request.
+///
+/// What was found by playing is a file in DIR/findings, which `playbot replay` shows. With --regress, such files are played
+/// again instead.
 ///
 /// Exit code 1 if a level was not solved or something was found; with --against, if a level is solved less often than
 /// before, can no longer be solved, or has a new finding.
@@ -36,10 +44,12 @@ use crate::{
   playbot test GAME --levels MODE:0..99 --bot BOT,random --episodes 5 --out runs/test
   playbot test GAME --levels MODE:0..99 --policy bot.policy --out runs/test --resume
   playbot test GAME --levels MODE:0..99 --against runs/before --out runs/after
+  playbot test GAME --levels MODE:0..99 --detect reward-loop --detector stuck.ticks=200 --out runs/test
   playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
 pub struct Args {
     /// Name of the game.
-    game: String,
+    #[arg(required_unless_present_any = ["regress", "list_detectors"])]
+    game: Option<String>,
     /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; the held-out levels of the
     /// game's experiment if none are named.
     #[arg(long)]
@@ -59,14 +69,20 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
     /// Folder for the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["regress", "list_detectors"])]
+    out: Option<PathBuf>,
     /// Go on with a test that was stopped or killed; begin it if there is none.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Replace results that are there.
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    detectors: DetectorArgs,
+    #[command(flatten)]
+    findings: FindingArgs,
+    #[command(flatten)]
+    regress: RegressArgs,
     #[command(flatten)]
     compute: Compute,
     /// Print one line of JSON per level instead of a table.
@@ -75,10 +91,20 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
-    let game = games.get(&args.game)?;
+    if args.detectors.list_detectors {
+        let game = args.game.as_ref().map_or_else(|| Ok(games.first()), |name| games.get(name))?;
+        return list_detectors(game, args.json);
+    }
+    if let Some(outcome) = args.regress.run(games, args.compute.threads(), args.json) {
+        return outcome;
+    }
+    let (Some(name), Some(out)) = (&args.game, &args.out) else {
+        return Err(CliError::Usage("name a game and --out, or a folder of findings with --regress".to_owned()));
+    };
+    let game = games.get(name)?;
     let plan = plan(args, game)?;
     let record = plan.record(game);
-    let results = Results { folder: &args.out, against: args.against.as_deref(), json: args.json };
+    let results = Results { folder: out, against: args.against.as_deref(), game: Some(game), json: args.json };
     results.check_folders()?;
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
@@ -88,10 +114,15 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         (false, true) => Earlier::Replace,
         (false, false) => Earlier::Keep,
     };
-    let (mut folder, message) = TestFolder::open(&args.out, &record, earlier)?;
+    let (mut folder, message) = TestFolder::open(out, &record, earlier)?;
     message.iter().for_each(|message| tell!("warning: {message}"));
     interrupt::listen();
-    match test(game, &plan, &mut folder)? {
+    if !args.resume {
+        forget_slow_ticks(out)?;
+    }
+    let end = test(game, &plan, &mut folder, &args.findings.files(out, &plan.detectors))?;
+    tell_slow_ticks(&plan.detectors, out)?;
+    match end {
         TestEnd::Stopped => {
             tell!(
                 "stopped; {} of {} levels are finished: go on with the same command and --resume",
@@ -124,6 +155,7 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
         testers: args.testers.load(game, args.compute.device())?,
         episodes,
         seed: args.seed,
+        detectors: args.detectors.choose(game)?,
         shard: args.shard,
         threads: args.compute.threads(),
     };
@@ -132,14 +164,15 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
 }
 
 /// Tests what is not finished, with a progress bar.
-fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder) -> Result<TestEnd, CliError> {
+fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder, files: &FindingFiles) -> Result<TestEnd, CliError> {
     let finished = folder.finished();
     let levels = plan.places().len().saturating_sub(finished.len()) as u64;
     let total = levels * plan.testers.len() as u64 * u64::from(plan.episodes);
     let bar = progress::bar(&format!("test {}", game.name()), total, "episodes");
     let progress = |episodes: u64| bar.inc(episodes);
     let watch = TestWatch { progress: &progress, stop: &interrupt::asked };
-    let end = run_tests(game, plan, &finished, &mut |verdict: LevelVerdict| folder.keep(&verdict), &watch);
+    let mut keep = |verdict: LevelVerdict| folder.keep(&verdict);
+    let end = run_tests_keeping(game, plan, &finished, &mut keep, &watch, Some(files));
     bar.finish_and_clear();
     Ok(end?)
 }

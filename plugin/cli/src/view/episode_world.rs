@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{file::DemoEpisode, replay::Divergence},
+    panics::PanicReports,
     policy::Decision,
     renewal::Renewal,
     vision::ObservationConfig,
@@ -81,6 +82,13 @@ impl EpisodeWorld {
         new.over = episode.is_empty();
         Replay::begin(Arc::new(episode), &mut new.world.entity_mut(new.agent));
         Ok(new)
+    }
+
+    /// Writes no recording if the game panics: for who has one.
+    pub fn keep_no_panic_files(&mut self) {
+        if let Some(mut reports) = self.world.get_resource_mut::<PanicReports>() {
+            reports.keep_no_files();
+        }
     }
 
     fn new(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, level: u64) -> Result<Self, CliError> {

@@ -2,10 +2,10 @@
 
 mod caption;
 mod colours;
-mod episode_world;
+pub mod episode_world;
 pub mod film;
 pub mod font;
-mod numbers;
+pub mod numbers;
 mod options;
 pub mod screen;
 mod verb;

@@ -10,7 +10,10 @@ use bevy::{
 };
 use bevy_playbot::{
     camera::TileLayerPlugin,
-    demo::{file::DemoWriter, recorder::Recorder},
+    demo::{
+        file::{DemoEpisode, DemoWriter},
+        recorder::Recorder,
+    },
     headless::{set_fixed_step, set_frame_rate},
     keyboard::KeyboardPlugin,
     placement::TickPlacement,
@@ -24,7 +27,7 @@ use super::{
     Autopilot, Playlist, WindowError, camera,
     ending::{self, Verdict},
     error::catch,
-    frames, keys, own_keys, pace, score,
+    frames, keys, own_keys, pace, replayed, score,
     seats::Seats,
     title,
 };
@@ -161,6 +164,11 @@ impl GameWindow {
     pub fn record(&mut self, writer: DemoWriter) {
         self.app.insert_resource(Recorder::new(writer));
         self.app.world_mut().entity_mut(self.agent).insert(Recording::default());
+    }
+
+    /// Plays this episode first. Where it ends, the person goes on.
+    pub fn replay(&mut self, episode: DemoEpisode) {
+        replayed::build(&mut self.app, self.agent, episode);
     }
 
     /// Plays until the window is closed.

@@ -18,6 +18,7 @@ mod keys;
 mod own_keys;
 mod pace;
 mod playlist;
+mod replayed;
 mod score;
 mod seats;
 #[cfg(feature = "view3d")]

@@ -11,6 +11,7 @@ use super::{
     input::Input,
     restart_kind::Restart,
 };
+use crate::detector::Detector;
 use bevy_playbot::{
     action::ActionSpace,
     episode::EpisodeEnd,
@@ -52,6 +53,7 @@ impl ForeignGame {
             demonstrator: None,
             hash: None,
             plugins: None,
+            detectors: Vec::new(),
         };
         Self { description: Arc::new(description) }
     }
@@ -151,6 +153,13 @@ impl ForeignGame {
     /// ```
     pub fn agent(self, equip: impl Fn(&mut EntityWorldMut) + Send + Sync + 'static) -> Self {
         self.with(|description| description.agent.push(Arc::new(equip)))
+    }
+
+    /// Adds a detector of the game's own, which looks for defects in tests: see [`detector`](crate::detector). It is made anew
+    /// for each test.
+    pub fn detector<D: Detector + 'static>(self, make: impl Fn() -> D + Send + Sync + 'static) -> Self {
+        let make = move || -> Box<dyn Detector> { Box::new(make()) };
+        self.with(|description| description.detectors.push(Arc::new(make)))
     }
 
     /// Names of the actions, for people. Those of keys name themselves.

@@ -8,7 +8,7 @@ use super::{
     demonstrator::ForeignBot, factory::SystemFactory, input::Input, install::ForeignPlugin, paths::ObservedPath,
     restart_kind::Restart, runtime::Sensor,
 };
-use crate::game::Game;
+use crate::{detector::Detector, game::Game};
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
@@ -61,6 +61,8 @@ pub(super) struct Description {
     pub(super) demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
     pub(super) hash: Option<SystemFactory<u64>>,
     pub(super) plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
+    /// What makes the game's own detectors.
+    pub(super) detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
 }
 
 impl Description {
@@ -196,6 +198,10 @@ impl Game for ForeignGame {
         }
         self.description.agent.iter().for_each(|equip| equip(&mut agent));
         agent.id()
+    }
+
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        self.description.detectors.iter().map(|make| make()).collect()
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

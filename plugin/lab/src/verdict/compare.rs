@@ -71,16 +71,17 @@ impl Comparison {
     /// cannot be read.
     pub fn read(before: &Path, now: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(now)?;
-        let Comparable { mut earlier, common, left_out } = comparable(before, lines.record())?;
+        let Comparable { mut earlier, common, other_detectors, left_out } = comparable(before, lines.record())?;
         let mut known = BTreeMap::new();
         while let Some(level) = earlier.next_level()? {
-            known.insert(level.level.clone(), Known::of(level, &common));
+            known.insert(level.level.clone(), Known::of(level, &common, &other_detectors));
         }
         let (mut comparison, mut doubtful) = (Self { left_out, ..Self::default() }, Vec::new());
         while let Some(level) = lines.next_level()? {
             match known.remove(&level.level) {
                 Some(known) => {
-                    comparison.compare(&known, &level.level.clone(), &Known::of(level, &common), &mut doubtful)
+                    let name = level.level.clone();
+                    comparison.compare(&known, &name, &Known::of(level, &common, &other_detectors), &mut doubtful)
                 }
                 None => comparison.only_now += 1,
             }
@@ -185,11 +186,14 @@ impl Comparison {
 }
 
 impl Known {
-    /// What the testers with these names say.
-    fn of(level: LevelVerdict, testers: &[String]) -> Self {
+    /// What the testers with these names say, and all detectors but these.
+    fn of(level: LevelVerdict, testers: &[String], other_detectors: &[String]) -> Self {
         let is_unsolvable = level.proof.why_unsolvable().is_some();
         let is_common = |name: &Option<String>| name.as_ref().is_none_or(|name| testers.contains(name));
-        let findings = level.findings.into_iter().filter(|finding| is_common(&finding.tester));
+        let findings = level
+            .findings
+            .into_iter()
+            .filter(|finding| is_common(&finding.tester) && !other_detectors.contains(&finding.detector));
         let findings = findings.map(|finding| (finding.detector, finding.tester)).collect();
         let mut verdicts = level.testers;
         let own: Vec<TesterVerdict> = testers
@@ -214,19 +218,32 @@ fn add(sum: &mut Trials, more: Trials) {
 struct Comparable {
     earlier: ResultLines,
     common: Vec<String>,
+    /// Detectors that looked only before or only now, or with other settings.
+    other_detectors: Vec<String>,
     left_out: Vec<String>,
 }
 
 fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestError> {
     let earlier = ResultLines::open(before)?;
     let differences = earlier.record().differences_of_game(record);
-    let (common, left_out) = common_testers(earlier.record(), record);
+    let (common, mut left_out) = common_testers(earlier.record(), record);
+    let other_detectors = other_detectors(earlier.record(), record);
+    left_out.extend(other_detectors.iter().map(|name| format!("the detector `{name}` did not look so before and now")));
     let differences = match (differences.is_empty(), common.is_empty()) {
-        (true, false) => return Ok(Comparable { earlier, common, left_out }),
+        (true, false) => return Ok(Comparable { earlier, common, other_detectors, left_out }),
         (true, true) => left_out,
         (false, _) => differences,
     };
     Err(TestError::Incomparable { folder: before.into(), differences })
+}
+
+/// Names of the detectors that are not the same in both.
+fn other_detectors(before: &TestRecord, now: &TestRecord) -> Vec<String> {
+    let only = |these: &TestRecord, those: &TestRecord| {
+        let alone = these.detectors.iter().filter(|detector| !those.detectors.contains(*detector));
+        alone.filter_map(|detector| detector.split(' ').next().map(str::to_owned)).collect::<BTreeSet<_>>()
+    };
+    only(before, now).union(&only(now, before)).cloned().collect()
 }
 
 /// Names of the testers that are the same in both, and why others are left out.

@@ -6,13 +6,13 @@ use bevy::math::{Rect, Vec2};
 
 use super::level_verdict::EndPlace;
 
-/// Squares along the longer side of a floor plan.
-const SQUARES: f32 = 32.0;
+/// Squares along the longer side of a floor plan to which [`EndPlace`]s are rounded.
+pub const END_SQUARES: f32 = 32.0;
 
 /// The squares of a floor plan in which something ended, row by row from below. `ended` has places, and whether time was up
 /// there. Places outside the plan belong to squares outside; what is no number is left out.
 pub(super) fn end_places(bounds: Rect, ended: &[(Vec2, bool)]) -> Vec<EndPlace> {
-    let side = bounds.width().max(bounds.height()) / SQUARES;
+    let side = bounds.width().max(bounds.height()) / END_SQUARES;
     if !(side.is_finite() && side > 0.0) {
         return Vec::new();
     }

@@ -8,7 +8,7 @@ use std::{
 use thiserror::Error;
 
 use super::shard::Shard;
-use crate::eval::EvalError;
+use crate::{eval::EvalError, findings::FindingError};
 
 /// Levels cannot be tested, or results cannot be used.
 #[derive(Debug, Error)]
@@ -98,6 +98,9 @@ pub enum TestError {
     /// The results as JUnit XML cannot be made.
     #[error("the results cannot be written as JUnit XML: {0}")]
     Junit(String),
+    /// A finding could not be written.
+    #[error(transparent)]
+    Finding(#[from] FindingError),
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
@@ -126,7 +129,14 @@ pub enum TestError {
 impl TestError {
     /// Whether calling differently helps; otherwise the game or the system failed.
     pub fn is_usage(&self) -> bool {
-        !matches!(self, Self::Eval(EvalError::Fault(_)) | Self::Io { .. } | Self::NotKept { .. } | Self::Junit(_))
+        !matches!(
+            self,
+            Self::Eval(EvalError::Fault(_))
+                | Self::Finding(_)
+                | Self::Io { .. }
+                | Self::NotKept { .. }
+                | Self::Junit(_)
+        )
     }
 }
 

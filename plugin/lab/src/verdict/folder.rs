@@ -19,6 +19,7 @@ use super::{
     plan::TestRecord,
     results::{RESULTS, ResultWriter},
 };
+use crate::findings::clear_findings;
 
 /// Name of the file that says what is tested.
 const RECORD: &str = "test.json";
@@ -67,6 +68,7 @@ impl TestFolder {
             for file in [&record_file, &results] {
                 remove(file)?;
             }
+            clear_findings(path)?;
             journal.clear()?;
             let text = serde_json::to_string(record).map_err(io::Error::from);
             let written = text.and_then(|text| write_in_pieces(&record_file, |file| write_line(file, &text)));
@@ -149,6 +151,7 @@ mod tests {
             seed: 0,
             testers: vec![TesterRecord::bot("random")],
             episodes: 1,
+            detectors: Vec::new(),
             shard: None,
         }
     }

@@ -4,6 +4,7 @@ use bevy::math::Vec2;
 use bevy_playbot::episode::EpisodeEnd;
 
 use super::{
+    defects::{inspect, seen},
     ends::end_places,
     finish_time::FinishTime,
     interval::wilson,
@@ -29,13 +30,15 @@ pub(super) fn judge(game: &dyn Game, plan: &TestPlan, index: u64, played: &[&[Pl
     // Whoever reached the aim has proved that it can be reached.
     let proof = if score.solved > 0 { LevelProof::Solvable } else { game.prove(mode, level) };
     let mut findings = broken(plan, played);
+    findings.extend(seen(plan, played));
+    findings.extend(inspect(game, plan, index, played));
     let outcome = match proof.why_unsolvable() {
         _ if score.solved > 0 => LevelOutcome::Solved,
         None => LevelOutcome::BotFailed,
         Some(why) => {
             let detector = "unreachable-goal".to_owned();
             let message = why.to_owned();
-            findings.insert(0, Finding { detector, tester: None, episode: None, tick: None, message });
+            findings.insert(0, Finding { detector, tester: None, episode: None, tick: None, message, file: None });
             LevelOutcome::ProvedUnsolvable
         }
     };
@@ -91,7 +94,8 @@ fn broken(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
             let is_known = |known: &Finding| known.tester == name && known.message == *message;
             if !findings.iter().any(is_known) {
                 let (detector, message) = ((*detector).to_owned(), message.clone());
-                findings.push(Finding { detector, tester: name, episode: Some(number), tick: *tick, message });
+                let (episode, tick) = (Some(number), *tick);
+                findings.push(Finding { detector, tester: name, episode, tick, message, file: None });
             }
         }
     }

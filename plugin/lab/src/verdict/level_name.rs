@@ -23,7 +23,7 @@ pub(super) fn level_argument(split: &LevelSplit, name: &str) -> String {
 }
 
 /// A hash of the files of these levels and of what is played in them; `None` for levels that are no files.
-pub(super) fn hash_of_files(game: &dyn Game, split: &LevelSplit) -> Option<String> {
+pub fn hash_of_files(game: &dyn Game, split: &LevelSplit) -> Option<String> {
     let designs = drawn(game, split)?;
     let path = |level| designs.path(level).unwrap_or_default().bytes().map(u64::from).collect::<Vec<_>>();
     let words = split.levels().flat_map(|level| path(level).into_iter().chain([designs.hash(level).unwrap_or(0)]));

@@ -82,7 +82,7 @@ pub struct TesterVerdict {
 /// Something that is wrong with a level or with the game in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finding {
-    /// What found it: `panic`, `fault`, `endless`, `unreachable-goal`.
+    /// What found it: `panic`, `fault`, `endless`, `unreachable-goal`, or the name of a [detector](crate::detectors).
     pub detector: String,
     /// Who played; `None` if nobody had to.
     pub tester: Option<String>,
@@ -92,6 +92,9 @@ pub struct Finding {
     pub tick: Option<u32>,
     /// What is wrong.
     pub message: String,
+    /// Its file, seen from the folder of the results: see [`findings`](crate::findings).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
 }
 
 /// Everything about one level.

@@ -12,9 +12,10 @@ use super::{
     results::{RESULTS, ResultLines, ResultWriter},
     shard::Shard,
 };
+use crate::findings::gather_findings;
 
 /// Joins the results of all shards of a test, given by their folders in any order, into `out`: the same bytes as the results
-/// of the whole test. Levels are not kept in memory.
+/// of the whole test. Levels are not kept in memory. The files of their findings are copied.
 ///
 /// # Errors
 ///
@@ -54,7 +55,8 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
     }
     shards.sort_by_key(|(_, shard, _)| shard.index);
     let mut lines: Vec<ResultLines> = shards.into_iter().map(|(_, _, lines)| lines).collect();
-    write_joined(&record, count, &mut lines, out)
+    write_joined(&record, count, &mut lines, out)?;
+    Ok(gather_findings(folders, out)?)
 }
 
 fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out: &Path) -> Result<(), TestError> {
@@ -101,6 +103,7 @@ mod tests {
             seed: 0,
             testers: vec![TesterRecord::bot("random")],
             episodes: 1,
+            detectors: Vec::new(),
             shard: shard.map(|shard| shard.parse().expect("a shard")),
         }
     }

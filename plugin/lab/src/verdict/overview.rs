@@ -125,6 +125,7 @@ mod tests {
             seed: 0,
             testers: vec![TesterRecord::bot("random")],
             episodes: 4,
+            detectors: Vec::new(),
             shard: None,
         };
         let mut overview = Overview::empty(record);
@@ -138,6 +139,7 @@ mod tests {
             episode: None,
             tick: None,
             message: why.clone(),
+            file: None,
         };
         let proved = LevelVerdict {
             outcome: LevelOutcome::ProvedUnsolvable,

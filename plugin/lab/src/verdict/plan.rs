@@ -9,7 +9,7 @@ use super::{
     shard::Shard,
     tester::{Tester, TesterRecord},
 };
-use crate::{game::Game, split::LevelSplit};
+use crate::{detectors::Detectors, game::Game, split::LevelSplit};
 
 /// How to test.
 #[derive(Clone)]
@@ -22,6 +22,8 @@ pub struct TestPlan {
     pub episodes: u32,
     /// Seed of the testers' random streams.
     pub seed: u64,
+    /// What looks for defects while they play.
+    pub detectors: Detectors,
     /// Which of the levels; all of them if none is named.
     pub shard: Option<Shard>,
     /// Threads: not part of the result.
@@ -46,6 +48,9 @@ pub struct TestRecord {
     pub testers: Vec<TesterRecord>,
     /// Episodes of each tester on each level.
     pub episodes: u32,
+    /// What looked for defects, each detector with its settings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detectors: Vec<String>,
     /// Which of the levels; all of them if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
@@ -84,6 +89,7 @@ impl TestPlan {
             seed: self.seed,
             testers: self.testers.iter().map(|tester| tester.record.clone()).collect(),
             episodes: self.episodes.max(1),
+            detectors: self.detectors.record().to_vec(),
             shard: self.shard,
         }
     }
@@ -120,6 +126,7 @@ impl TestRecord {
         compare("seeds", self.seed.to_string(), other.seed.to_string());
         compare("episodes per level", self.episodes.to_string(), other.episodes.to_string());
         compare("testers", self.describe_testers(), other.describe_testers());
+        compare("detectors", self.describe_detectors(), other.describe_detectors());
         found
     }
 
@@ -130,6 +137,10 @@ impl TestRecord {
         }
         let (one, another) = (self.game_version, other.game_version);
         if one == another { Vec::new() } else { vec![format!("versions {one} and {another} of `{}`", self.game)] }
+    }
+
+    fn describe_detectors(&self) -> String {
+        if self.detectors.is_empty() { "none".to_owned() } else { self.detectors.join(" + ") }
     }
 
     fn describe_testers(&self) -> String {
@@ -155,6 +166,7 @@ mod tests {
             testers: testers.iter().map(tester).collect(),
             episodes: 2,
             seed: 3,
+            detectors: Detectors::default(),
             shard: shard.map(|shard| shard.parse().expect("a shard")),
             threads: 1,
         }
@@ -194,6 +206,7 @@ mod tests {
             seed: 0,
             testers: vec![TesterRecord::bot("search")],
             episodes: 1,
+            detectors: Vec::new(),
             shard: None,
         };
         let trained = TesterRecord { checksum: Some("0f".to_owned()), greedy: true, ..TesterRecord::bot("ppo") };

@@ -62,5 +62,6 @@ fn play_alone(
             PlayedEnd::Broken { detector, tick, message }
         }
     };
-    Ok(Some(Played { end, exact: stage.is_untouched(0, task.seed) }))
+    let found = std::mem::take(&mut stage.found);
+    Ok(Some(Played { end, exact: stage.is_untouched(0, task.seed), found }))
 }

@@ -3,6 +3,8 @@
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 
+use crate::detectors::Detectors;
+
 /// An episode to be played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Task {
@@ -19,6 +21,19 @@ pub(super) struct Played {
     pub end: PlayedEnd,
     /// Whether the player drew no random number.
     pub exact: bool,
+    /// What detectors found in it.
+    pub found: Vec<EpisodeFinding>,
+}
+
+/// What a detector found in an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct EpisodeFinding {
+    /// The detector.
+    pub detector: &'static str,
+    /// Tick of the episode.
+    pub tick: u32,
+    /// What is wrong.
+    pub message: String,
 }
 
 /// How an episode ended.
@@ -61,4 +76,10 @@ pub(super) struct Watch<'a> {
     pub progress: &'a (dyn Fn(u64) + Sync),
     /// Whether to stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
+    /// What looks for defects.
+    pub detectors: &'a Detectors,
+    /// Mode of the levels.
+    pub mode: &'a str,
+    /// Name of who plays.
+    pub tester: &'a str,
 }

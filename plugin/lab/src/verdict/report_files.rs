@@ -18,7 +18,8 @@ pub const SUMMARY: &str = "summary.md";
 pub const AGAINST: &str = "against.json";
 
 /// Writes `junit.xml`, `summary.md` and, with a comparison, `against.json` beside the results in a folder. `program` is the
-/// name of the program in the commands that they show.
+/// name of the program in the commands that they show. `report.html` has pictures, which need the game:
+/// [`verdict_report`](crate::verdict_report) makes it.
 ///
 /// # Errors
 ///

@@ -40,6 +40,7 @@ mod tests {
             seed: 3,
             testers: vec![TesterRecord::bot("random"), trained],
             episodes: 2,
+            detectors: Vec::new(),
             shard: None,
         };
         let testers = vec![tester("random", 2, 2, false), tester("ppo.policy", 1, 2, false)];

@@ -161,6 +161,7 @@ mod tests {
             seed: 5,
             testers: vec![TesterRecord::bot("random")],
             episodes: 2,
+            detectors: Vec::new(),
             shard: Some("0/2".parse().expect("a shard")),
         }
     }

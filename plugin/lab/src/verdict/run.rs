@@ -7,6 +7,7 @@ use std::{
 
 use super::{
     error::TestError,
+    finding_files::keep_findings,
     judge::judge,
     level_name::level_name,
     level_verdict::LevelVerdict,
@@ -14,7 +15,7 @@ use super::{
     play::play_tasks,
     played::{Played, Task, Watch},
 };
-use crate::{eval::EvalError, game::Game};
+use crate::{eval::EvalError, findings::FindingFiles, game::Game};
 use bevy_playbot::fault::Fault;
 
 /// Levels are handed out in about so many portions, so that no thread waits long for the last one.
@@ -65,6 +66,22 @@ pub fn run_tests(
     keep: &mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
     watch: &TestWatch,
 ) -> Result<TestEnd, TestError> {
+    run_tests_keeping(game, plan, finished, keep, watch, None)
+}
+
+/// [`run_tests`], with a file for each finding.
+///
+/// # Errors
+///
+/// As for [`run_tests`], or a finding cannot be written.
+pub fn run_tests_keeping(
+    game: &dyn Game,
+    plan: &TestPlan,
+    finished: &BTreeSet<u64>,
+    keep: &mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
+    watch: &TestWatch,
+    files: Option<&FindingFiles>,
+) -> Result<TestEnd, TestError> {
     plan.check()?;
     if let Some(problem) = game.problem() {
         return Err(EvalError::from(Fault(problem)).into());
@@ -78,9 +95,9 @@ pub fn run_tests(
     let threads = plan.threads.clamp(1, (portions.len() * plan.testers.len()).max(1));
     std::thread::scope(|scope| {
         for _ in 1..threads {
-            scope.spawn(|| work(game, plan, &portions, &shared, watch));
+            scope.spawn(|| work(game, plan, &portions, &shared, watch, files));
         }
-        work(game, plan, &portions, &shared, watch);
+        work(game, plan, &portions, &shared, watch, files);
     });
     let Shared { failure, is_stopped, .. } = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     match failure {
@@ -95,7 +112,14 @@ fn lock<'a, 'b>(shared: &'a Mutex<Shared<'b>>) -> MutexGuard<'a, Shared<'b>> {
 }
 
 /// What one thread does: portion after portion, each by one tester after the other.
-fn work(game: &dyn Game, plan: &TestPlan, portions: &[&[u64]], shared: &Mutex<Shared>, watch: &TestWatch) {
+fn work(
+    game: &dyn Game,
+    plan: &TestPlan,
+    portions: &[&[u64]],
+    shared: &Mutex<Shared>,
+    watch: &TestWatch,
+    files: Option<&FindingFiles>,
+) {
     let testers = plan.testers.len();
     loop {
         let job = {
@@ -120,8 +144,15 @@ fn work(game: &dyn Game, plan: &TestPlan, portions: &[&[u64]], shared: &Mutex<Sh
             }
         };
         let Some(complete) = add(shared, portion, tester, testers, played) else { continue };
-        let verdicts = judge_portion(game, plan, places, &complete);
+        let mut verdicts = judge_portion(game, plan, places, &complete);
+        let written = files.map_or(Ok(()), |files| {
+            verdicts.iter_mut().try_for_each(|verdict| keep_findings(game, plan, files, verdict))
+        });
         let mut shared = lock(shared);
+        if let Err(error) = written {
+            shared.failure.get_or_insert(error);
+            return;
+        }
         for verdict in verdicts {
             if shared.failure.is_none()
                 && let Err(error) = (shared.keep)(verdict)
@@ -140,6 +171,7 @@ fn play_portion(
     watch: &TestWatch,
 ) -> Result<Option<Vec<Played>>, TestError> {
     let tester = &plan.testers[tester];
+    let mode = plan.split.mode.as_str();
     let mut tasks = Vec::new();
     for place in places {
         let level = plan.split.first + place;
@@ -147,8 +179,9 @@ fn play_portion(
         let seed = |episode| plan.episode_seed(&tester.record, &name, episode);
         tasks.extend((0..plan.episodes.max(1)).map(|episode| Task { level, seed: seed(episode) }));
     }
-    let watch = Watch { progress: watch.progress, stop: watch.stop };
-    play_tasks(game, &plan.split.mode, tester, &tasks, &watch).map_err(|error| EvalError::from(error).into())
+    let (detectors, name) = (&plan.detectors, tester.record.name.as_str());
+    let watch = Watch { progress: watch.progress, stop: watch.stop, detectors, mode, tester: name };
+    play_tasks(game, mode, tester, &tasks, &watch).map_err(|error| EvalError::from(error).into())
 }
 
 /// Adds what a tester played of a portion; the episodes of all of them once it is complete.

@@ -14,8 +14,9 @@ use bevy_playbot::{
 };
 
 use super::{
-    played::{Interruption, Played, PlayedEnd, Task, Watch},
+    played::{EpisodeFinding, Interruption, Played, PlayedEnd, Task, Watch},
     tester::Tester,
+    watched::Watched,
 };
 use crate::{arrangement::at_most, eval::Player, game::Game, worlds::build_observing_world};
 
@@ -46,6 +47,8 @@ struct Seat {
 pub(super) struct Stage {
     world: World,
     seats: Vec<Seat>,
+    /// What was found in the only episode, if it broke the World.
+    pub found: Vec<EpisodeFinding>,
 }
 
 impl Stage {
@@ -84,7 +87,7 @@ impl Stage {
             seats.push(Seat { agent, tasks: own, done: 0 });
         }
         player.install(&mut world);
-        Ok(Self { world, seats })
+        Ok(Self { world, seats, found: Vec::new() })
     }
 
     /// Ticks until everybody has played, and notes what came of it.
@@ -94,17 +97,25 @@ impl Stage {
         played: &mut [Option<Played>],
         watch: &Watch,
     ) -> Result<(), Interruption> {
+        let is_alone = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() <= 1;
+        let mut watched = Watched::new(game, watch, self.seats.iter().map(|seat| seat.agent), is_alone);
         while self.seats.iter().any(|seat| Control::of(&self.world, seat.agent).is_active()) {
             if (watch.stop)() {
                 return Err(Interruption::Stopped);
             }
-            if let Err(fault) = tick_world(&mut self.world) {
+            if let Err(fault) = watched.tick(&mut self.world, tick_world) {
                 let message = fault.to_string();
                 let detector = if message.contains(PANICKED) { "panic" } else { "fault" };
+                self.found = watched.take_found(0);
                 return Err(Interruption::Broken { detector, message });
             }
-            self.note_ends(game, played, watch);
+            // Whose it is shows when each plays alone.
+            if let Some((detector, message)) = watched.look(&self.world, &self.world.resource::<EndedEpisodes>().0) {
+                return Err(Interruption::Broken { detector, message });
+            }
+            self.note_ends(game, played, watch, &mut watched);
             if self.longest() >= MOST_TICKS {
+                self.found = watched.take_found(0);
                 let message = format!("the episode has not ended after {MOST_TICKS} ticks: give the game a time limit");
                 return Err(Interruption::Broken { detector: "endless", message });
             }
@@ -112,14 +123,15 @@ impl Stage {
         Ok(())
     }
 
-    fn note_ends(&mut self, game: &dyn Game, played: &mut [Option<Played>], watch: &Watch) {
+    fn note_ends(&mut self, game: &dyn Game, played: &mut [Option<Played>], watch: &Watch, watched: &mut Watched) {
         let ended = std::mem::take(&mut self.world.resource_mut::<EndedEpisodes>().0);
         for (agent, result) in ended {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let Some(&(task, seed)) = self.seats[seat].tasks.get(self.seats[seat].done) else { continue };
             let place = game.whereabouts(&self.world, agent);
             let exact = self.is_untouched(seat, seed);
-            played[task] = Some(Played { end: PlayedEnd::Ended { result, place }, exact });
+            let found = watched.take_found(seat);
+            played[task] = Some(Played { end: PlayedEnd::Ended { result, place }, exact, found });
             self.seats[seat].done += 1;
             (watch.progress)(1);
         }

@@ -197,7 +197,7 @@ fn a_model_comes_back_from_its_file_as_it_was() {
 
     let bytes = std::fs::read(&path).expect("readable");
     std::fs::write(&path, &bytes[..bytes.len() - 8]).expect("written");
-    assert!(matches!(SkillModel::load(&path, DeviceKind::Flex), Err(FileError::Format { .. })));
+    assert!(matches!(SkillModel::load(&path, DeviceKind::Flex), Err(FileError::CutOff { .. })));
     let missing = folder.path().join("none");
     assert!(matches!(SkillModel::load(&missing, DeviceKind::Flex), Err(FileError::Io { .. })));
 }

@@ -185,7 +185,7 @@ fn appending_goes_on_where_the_file_ended() {
     }
     let other = DemoHeader { game_version: 9, ..header() };
     let error = DemoWriter::append(&path, &other).expect_err("another version");
-    assert!(error.to_string().ends_with("`game_version` is 2 in the file, but 9 is being recorded"), "{error}");
+    assert!(error.to_string().contains("`game_version` is 2 in the file, but 9 is being recorded"), "{error}");
     assert_eq!(read_lenient(&path).expect("sound").0, [episode(1, 3), episode(2, 3)]);
     drop(DemoWriter::replace(&path, header()).expect("replaced"));
     assert!(read_lenient(&path).expect("sound").0.is_empty());

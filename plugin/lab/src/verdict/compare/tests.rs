@@ -17,6 +17,7 @@ fn record(testers: &[&str]) -> TestRecord {
         seed: 0,
         testers: testers.iter().map(|name| TesterRecord::bot(*name)).collect(),
         episodes: 1,
+        detectors: Vec::new(),
         shard: None,
     }
 }
@@ -85,6 +86,7 @@ fn a_new_proof_and_a_new_finding_are_always_told() {
         episode: Some(0),
         tick: Some(4),
         message: "words".to_owned(),
+        file: None,
     };
     let walled = LevelVerdict {
         outcome: LevelOutcome::ProvedUnsolvable,
@@ -121,4 +123,30 @@ fn what_cannot_be_compared_is_refused_by_name() {
     let retrained = TesterRecord { checksum: Some("1".to_owned()), ..TesterRecord::bot("random") };
     let retrained = TestRecord { testers: vec![retrained], ..record(&[]) };
     assert!(said(&retrained, 0).expect_err("another policy").contains("random (file 1)"));
+}
+
+#[test]
+fn findings_of_detectors_that_did_not_look_before_are_no_news() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let (one, other) = (parent.path().join("before"), parent.path().join("now"));
+    let finding = |detector: &str| Finding {
+        detector: detector.to_owned(),
+        tester: Some("random".to_owned()),
+        episode: Some(0),
+        tick: Some(4),
+        message: "words".to_owned(),
+        file: None,
+    };
+    let looked = |detectors: &[&str]| {
+        let detectors = detectors.iter().map(|detector| (*detector).to_owned()).collect();
+        TestRecord { detectors, ..record(&["random"]) }
+    };
+    written(&one, &looked(&["stuck ticks=300", "runaway"]), &[verdict(0, 1, 1)]);
+    let all = ["stuck", "runaway", "late", "panic"].map(finding).to_vec();
+    let now = LevelVerdict { findings: all, ..verdict(0, 1, 1) };
+    written(&other, &looked(&["stuck ticks=200", "runaway", "late"]), &[now]);
+    let comparison = Comparison::read(&one, &other).expect("they can be compared");
+    let found: Vec<&str> = comparison.new_findings.iter().map(|finding| finding.detector.as_str()).collect();
+    assert_eq!(found, ["panic", "runaway"]);
+    assert_eq!(comparison.left_out.len(), 2, "{:?}", comparison.left_out);
 }

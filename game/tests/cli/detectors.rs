@@ -1,0 +1,66 @@
+//! Detectors as the command line names them.
+
+use std::fs;
+
+use crate::program::{done, ended};
+
+#[test]
+fn detectors_are_listed_with_what_they_find_and_their_settings() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    for call in [&["test", "--detectors"][..], &["test", "maze2d", "--detectors"]] {
+        let (list, _) = done(temporary.path(), call);
+        for words in ["unreachable-goal", "stuck", "ticks=300", "entity-leak", "tick-time"] {
+            assert!(list.contains(words), "`{words}` is missing in: {list}");
+        }
+    }
+    let (json, _) = done(temporary.path(), &["test", "coinrun", "--detectors", "--json"]);
+    let values: Vec<serde_json::Value> =
+        json.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect();
+    let stuck = values.iter().find(|detector| detector["name"] == "stuck").expect("it is listed");
+    assert_eq!((stuck["looks"].as_str(), stuck["settings"]["ticks"].as_f64()), (Some("usual"), Some(300.0)));
+}
+
+#[test]
+fn slow_ticks_have_a_file_of_their_own_and_fail_nothing() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let test = |rest: &[&str]| {
+        let call = ["test", "coinrun", "--levels", "hard:0..1", "--bot", "search", "--out", "t", "--no-detect", "all"];
+        done(folder, &[&call[..], rest].concat())
+    };
+    let slowest = ["--detect", "tick-time", "--detector", "tick-time.milliseconds=0.0000001"];
+    let (_, messages) = test(&slowest);
+    assert!(messages.contains("slow ticks in"), "{messages}");
+    let slow = fs::read_to_string(folder.join("t/timing.jsonl")).expect("there are slow ticks");
+    assert!(slow.lines().all(|line| line.contains("\"detector\":\"tick-time\"")), "{slow}");
+    let results = || fs::read_to_string(folder.join("t/results.json")).expect("results");
+    let with_clock = results();
+    test(&["--force"]);
+    assert!(!folder.join("t/timing.jsonl").exists(), "those of the earlier test are gone");
+    assert_eq!(with_clock, results());
+}
+
+#[test]
+fn what_is_no_detector_is_told_with_what_would_be_right() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    for (option, value, words) in [
+        ("--detect", "shortcutt", "did you mean `shortcut`?"),
+        ("--no-detect", "stuk", "did you mean `stuck`?"),
+        ("--detector", "stuck.tick=4", "did you mean `ticks`?"),
+        ("--detector", "shortcut.par=4", "--detect shortcut"),
+    ] {
+        let call = ["test", "coinrun", "--levels", "hard:0", "--out", "t", option, value];
+        let (_, messages) = ended(temporary.path(), &call, 3);
+        assert!(messages.contains(words), "{messages}");
+    }
+}
+
+#[test]
+fn a_test_with_other_detectors_does_not_go_on_with_this_one() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let call = ["test", "coinrun", "--levels", "hard:0..1", "--bot", "search", "--out", "t"];
+    done(temporary.path(), &call);
+    let other = [&call[..], &["--no-detect", "stuck", "--resume"]].concat();
+    let (_, messages) = ended(temporary.path(), &other, 3);
+    assert!(messages.contains("detectors"), "{messages}");
+}

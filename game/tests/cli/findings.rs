@@ -1,0 +1,125 @@
+//! Findings of tests, replayed and looked for again.
+
+use std::{fs, path::Path};
+
+use serde_json::{Value, json};
+
+use crate::program::{code, done, ended, errors, json_lines, playbot};
+
+/// The files of findings of a test, by name.
+fn findings(folder: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(folder.join(out).join("findings")).expect("findings");
+    let mut found: Vec<_> = entries
+        .map(|entry| {
+            let path = entry.expect("readable").path();
+            let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+            (name, fs::read(path).expect("readable"))
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+fn line(text: &str) -> Value {
+    json_lines(text).remove(0)
+}
+
+#[test]
+fn a_failure_is_a_file_that_replays_in_another_process_and_gets_shorter() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let test = |out: &str, threads: &str| {
+        let plan = ["test", "coinrun", "--levels", "hard:0..9", "--bot", "right-jump", "--keep-failures"];
+        let output = playbot(folder, &[&plan[..], &["--out", out, "--threads", threads]].concat());
+        assert_eq!(code(&output), 1, "{}", errors(&output));
+    };
+    test("one", "1");
+    test("two", "2");
+    let found = findings(folder, "one");
+    assert!(!found.is_empty() && found == findings(folder, "two"), "threads change no byte");
+    for (name, _) in &found {
+        let file = format!("one/findings/{name}");
+        let (again, _) = done(folder, &["replay", &file, "--json"]);
+        assert_eq!(line(&again)["status"], "still-there", "{again}");
+        assert_eq!(done(folder, &["replay", &file, "--json"]).0, again);
+    }
+    let lost = found.iter().find(|(name, _)| name.contains(".lost.")).unwrap_or(&found[0]);
+    let file = format!("one/findings/{}", lost.0);
+    done(folder, &["demo", "show", &file]);
+    let pictures = ["--png", "new/still.png", "--apng", "new/moving.png", "--scale", "2"];
+    let (out, told) = done(folder, &[&["replay", &file][..], &pictures].concat());
+    assert!(out.contains("played by right-jump") && out.contains("it happens again at tick"), "{out}");
+    assert!(told.contains("still.png shows tick"), "{told}");
+    let moving = fs::read(folder.join("new/moving.png")).expect("drawn");
+    assert!(moving.starts_with(b"\x89PNG") && moving.windows(4).any(|part| part == b"acTL"), "it moves");
+
+    let shorter = ["replay", &file, "--minimise", "--out", "short.finding", "--replays", "60", "--json"];
+    let told = line(&done(folder, &shorter).0);
+    let (before, now) = (told["original_ticks"].as_u64(), told["minimised"]["ticks"].as_u64());
+    assert!(now <= before && told["minimised"]["replays"].as_u64() <= Some(60), "{told}");
+    let short = line(&done(folder, &["replay", "short.finding", "--json"]).0);
+    assert_eq!((short["ticks"].as_u64(), short["original_ticks"].as_u64()), (now, before));
+    assert!(ended(folder, &shorter, 3).1.contains("--force"));
+}
+
+#[test]
+fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let sealed = json!({ "rows": ["#######", "#SOO#G#", "#O#O###", "#######"], "rules": "sparse+end-at-goal" });
+    let open = json!({ "rows": ["#######", "#SOO#G#", "#O#OOO#", "#######"], "rules": "sparse+end-at-goal" });
+    let write = |level: &Value| fs::write(folder.join("sealed.json"), level.to_string()).expect("writable");
+    write(&sealed);
+    let test = ["test", "maze2d", "--levels", "files:*.json", "--bot", "random", "--out", "out"];
+    ended(folder, &test, 1);
+    let found = findings(folder, "out");
+    let (name, _) = found.iter().find(|(name, _)| name.contains(".unreachable-goal-")).expect("it is proved");
+    let results = fs::read_to_string(folder.join("out/results.json")).expect("written");
+    assert!(results.contains(&format!("\"file\":\"findings/{name}\"")), "{results}");
+    let file = format!("out/findings/{name}");
+    let told = done(folder, &["replay", &file]).0;
+    assert!(told.contains("maze2d sealed.json: unreachable-goal: "), "{told}");
+    assert!(done(folder, &["replay", &file, "--png", "a.png"]).1.contains("nothing is drawn"));
+
+    let regress = |more: &[&str], wanted: i32| ended(folder, &[&["test", "--regress", "out"], more].concat(), wanted);
+    let (table, words) = regress(&[], 1);
+    assert!(table.contains("still-there") && words.contains("still there"), "{table}{words}");
+    let pin = |name: &str| format!("(finding: \"{name}\", reason: \"new level is drawn\", until: \"2027-01-31\")");
+    let pins: Vec<String> = found.iter().map(|(name, _)| pin(name)).chain([pin("none")]).collect();
+    fs::write(folder.join("out/pins.ron"), format!("[{}]", pins.join(", "))).expect("writable");
+    let (table, words) = regress(&["--today", "2027-01-31"], 0);
+    assert!(table.contains("until 2027-01-31: new level is drawn"), "{table}");
+    assert!(words.contains("there is no finding none, though it is pinned"), "{words}");
+    assert!(regress(&["--today", "2027-02-01"], 1).1.contains("has expired on 2027-01-31"));
+    assert!(regress(&["--today", "soon"], 3).1.contains("is no day"));
+
+    write(&open);
+    let (_, words) = ended(folder, &["replay", &file], 3);
+    assert!(words.contains("it was changed since"), "{words}");
+    fs::remove_file(folder.join("sealed.json")).expect("it is there");
+    let (_, words) = ended(folder, &["replay", &file], 3);
+    assert!(words.contains("the level no longer exists"), "{words}");
+    let (rows, _) = regress(&["--today", "2027-02-01", "--json"], 1);
+    assert!(json_lines(&rows).iter().any(|row| row["status"] == "unplayable"), "{rows}");
+}
+
+#[test]
+fn what_is_no_finding_is_told() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    done(folder, &["record", "coinrun", "--levels", "easy:0..0", "--out", "a.demo"]);
+    fs::create_dir(folder.join("empty")).expect("writable");
+    for (args, words) in [
+        (&["replay", "none.finding"][..], "none.finding"),
+        (&["replay", "a.demo"], "a recording, but of no finding"),
+        (&["replay", "a.demo", "--minimise"], "--out"),
+        (&["replay", "a.demo", "--apng", "a.gif"], ".png"),
+        (&["test", "--regress", "empty"], "empty has no findings"),
+        (&["test", "--regress", "none"], "none"),
+        (&["test", "coinrun", "--regress", "empty"], "--regress"),
+        (&["test", "--today", "2027-01-31"], "--regress"),
+    ] {
+        let (_, told) = ended(folder, args, 3);
+        assert!(told.contains(words), "{args:?}: {told}");
+    }
+}

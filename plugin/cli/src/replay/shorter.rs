@@ -1,0 +1,33 @@
+//! A finding with fewer actions, in a file of its own.
+
+use std::path::Path;
+
+use playbot_lab::{
+    findings::{Budget, Checks, Minimised, StoredFinding, minimise},
+    game::Game,
+};
+
+use crate::{error::CliError, interrupt, output, progress};
+
+/// Leaves out what is not needed, with a bar, and writes what remains. Ctrl-C ends it with the best so far.
+///
+/// # Errors
+///
+/// The finding is not there any more, or the file cannot be written.
+pub fn write_shorter(
+    game: &dyn Game,
+    finding: &StoredFinding,
+    replays: u32,
+    out: &Path,
+) -> Result<Minimised, CliError> {
+    interrupt::listen();
+    let bar = progress::bar("minimise", replays.into(), "replays");
+    let budget = Budget { replays, ..Budget::default() };
+    let hear = |replays: u32| bar.set_position(replays.into());
+    let shorter = minimise(game, finding, &Checks::of_game(game), budget, &hear, &interrupt::asked);
+    bar.finish_and_clear();
+    let shorter = shorter?;
+    output::make_folder_of(out)?;
+    shorter.finding.write(out)?;
+    Ok(shorter)
+}

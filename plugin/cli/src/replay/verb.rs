@@ -1,0 +1,111 @@
+//! The verb.
+
+use std::path::PathBuf;
+
+use playbot_lab::{
+    findings::{Checks, FindingStatus, Minimised, Recheck, StoredFinding, recheck},
+    game::Game,
+    games::{Artifact, Games},
+};
+
+#[cfg(not(feature = "window"))]
+use super::no_window::show;
+#[cfg(feature = "window")]
+use super::window::show;
+use super::{picture::Pictures, shorter::write_shorter, told::Told};
+use crate::{
+    error::{CliError, Outcome},
+    output, progress,
+};
+
+/// Play a finding again: does it still happen, and how does it look?
+///
+/// Findings are files that `playbot test` writes: a level, the actions that lead there, and what was found, in which tick and
+/// with which state of the game. Exit code 0 if it happens again just so, 1 if not.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot replay runs/test/findings/NAME.finding
+  playbot replay runs/test/findings/NAME.finding --apng failure.png
+  playbot replay runs/test/findings/NAME.finding --png failure.png --scale 4 --json
+  playbot replay runs/test/findings/NAME.finding --minimise --out short.finding
+  playbot replay short.finding --window
+
+Animated PNGs play in browsers and in most viewers of pictures.")]
+pub struct Args {
+    /// File of the finding.
+    finding: PathBuf,
+    /// Write a picture of the last tick, a .png.
+    #[arg(long, value_name = "FILE", value_parser = output::png)]
+    png: Option<PathBuf>,
+    /// Write a moving picture of the whole way, a .png; of a very long one the last 3600 ticks.
+    #[arg(long, value_name = "FILE", value_parser = output::png)]
+    apng: Option<PathBuf>,
+    /// How many times as large as bots see it.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
+    scale: u32,
+    /// Show it in a window, where you go on behind the last tick.
+    #[arg(long)]
+    window: bool,
+    /// Leave out the actions that it does not need, and write what remains to --out. Pictures then show that.
+    #[arg(long, requires = "out")]
+    minimise: bool,
+    /// File for the shorter finding.
+    #[arg(long, value_name = "FILE", requires = "minimise")]
+    out: Option<PathBuf>,
+    /// Most replays to make it shorter.
+    #[arg(long, default_value_t = 500, requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
+    replays: u32,
+    /// Overwrite a finding that exists.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    let finding = StoredFinding::read(&args.finding)?;
+    let game = games.of_file(Artifact::Finding, &args.finding, &finding.header.game)?;
+    let pictures = Pictures { still: args.png.as_deref(), animated: args.apng.as_deref(), scale: args.scale };
+    pictures.prepare()?;
+    check_out(args)?;
+    let again = play_again(game, &finding)?;
+    let status = again.status(&finding);
+    let shorter = match &args.out {
+        Some(out) if status != FindingStatus::Gone => {
+            Some((write_shorter(game, &finding, args.replays, out)?, out.as_path()))
+        }
+        _ => None,
+    };
+    let told = Told {
+        path: &args.finding,
+        finding: &finding,
+        again: &again,
+        shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
+    };
+    told.tell(args.json)?;
+    let shown = shorter.as_ref().map_or(&finding, |(Minimised { finding, .. }, _)| finding);
+    pictures.write(game, shown)?;
+    if args.window {
+        show(game, shown)?;
+    }
+    Ok(if status == FindingStatus::StillThere { Outcome::Pass } else { Outcome::Findings })
+}
+
+fn check_out(args: &Args) -> Result<(), CliError> {
+    let Some(out) = &args.out else { return Ok(()) };
+    if out.is_file() && !args.force {
+        return Err(CliError::Usage(format!(
+            "{} exists: name another file, or overwrite it with --force",
+            out.display()
+        )));
+    }
+    output::prepare(out)
+}
+
+fn play_again(game: &dyn Game, finding: &StoredFinding) -> Result<Recheck, CliError> {
+    let bar = progress::bar("replay", finding.episode.len() as u64, "ticks");
+    let again = recheck(game, finding, &Checks::of_game(game));
+    bar.finish_and_clear();
+    Ok(again?)
+}

@@ -1,0 +1,46 @@
+//! `playbot report html`.
+
+use std::path::PathBuf;
+
+use playbot_lab::{
+    games::Games,
+    verdict::{Comparison, ResultLines},
+    verdict_report::{HtmlReport, REPORT, write_html},
+};
+
+use crate::{
+    error::{CliError, Outcome},
+    output, program,
+};
+
+/// Make the page of results again: one file that opens without network, with a table of the levels that can be sorted and
+/// filtered, and pictures of the worst of them.
+///
+/// `playbot test` and `playbot report merge` write it too. Pictures need the game, in the version that was tested.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot report html runs/test
+  playbot report html runs/test --against runs/before --out levels.html")]
+pub struct Args {
+    /// Folder of the results.
+    #[arg(value_name = "DIR")]
+    results: PathBuf,
+    /// Folder of earlier results of the same version of the game: tell what has changed since.
+    #[arg(long, value_name = "DIR")]
+    against: Option<PathBuf>,
+    /// File to write; report.html in the folder of the results if none is named.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    let lines = ResultLines::open(&args.results)?;
+    let file = args.out.clone().unwrap_or_else(|| args.results.join(REPORT));
+    output::prepare(&file)?;
+    let comparison = args.against.as_ref().map(|before| Comparison::read(before, &args.results)).transpose()?;
+    let game = games.get(&lines.record().game).ok();
+    let report = HtmlReport { game, comparison: comparison.as_ref(), program: program::name() };
+    write_html(&args.results, &file, &report)?;
+    tell!("{}", file.display());
+    Ok(Outcome::Pass)
+}

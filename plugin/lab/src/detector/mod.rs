@@ -1,0 +1,27 @@
+//! The contract of a detector: what looks for one kind of defect while testers play.
+//!
+//! ```
+//! use playbot_lab::detector::{Detector, EachTick, Moment};
+//!
+//! /// A game's own: nobody may ever owe money.
+//! fn debt() -> Box<dyn Detector> {
+//!     Box::new(EachTick::new("debt", "somebody owes money", |moment: &Moment<'_>| {
+//!         let purse = moment.observation.first().copied().unwrap_or_default();
+//!         (purse < 0.0).then(|| format!("the purse holds {purse}"))
+//!     }))
+//! }
+//! assert_eq!(debt().name(), "debt");
+//! ```
+//!
+//! [`Game::detectors`](crate::game::Game::detectors) names a game's own; [`detectors`](crate::detectors) has those that
+//! every game gets.
+
+mod contract;
+mod each_tick;
+mod moment;
+mod setting;
+
+pub use contract::{Detector, LevelAhead, Watch, WorldWatch};
+pub use each_tick::EachTick;
+pub use moment::{Moment, WorldMoment};
+pub use setting::Setting;

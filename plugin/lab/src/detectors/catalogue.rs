@@ -1,0 +1,117 @@
+//! All detectors that there are.
+
+use super::{
+    blank_picture::BlankPicture, determinism::Determinism, entity_leak::EntityLeak, error_log::ErrorLog,
+    explosion::PhysicsExplosion, fell_through::FellThrough, frozen::FrozenWorld, level_detector::LevelDetector,
+    out_of_bounds::OutOfBounds, reward_farm::RewardFarm, reward_loop::RewardLoop, runaway::Runaway, shortcut::Shortcut,
+    stuck::Stuck, tick_time::TickTime, unreachable_region::UnreachableRegion,
+};
+use crate::{
+    detector::{Detector, Setting},
+    game::Game,
+};
+
+/// What every test finds, whoever is selected: names and what they find.
+pub const ALWAYS: [(&str, &str); 4] = [
+    ("panic", "the game panics"),
+    ("fault", "the game breaks its contract: a reward that is no number, an observation that is missing and the like"),
+    ("endless", "an episode does not end"),
+    ("unreachable-goal", "it is proved that the aim of the level cannot be reached"),
+];
+
+/// A detector of one of the kinds that there are.
+pub(super) enum Known {
+    /// Looks at agents or Worlds, tick by tick.
+    Ticks(Box<dyn Detector>),
+    /// Looks at levels after they were tested.
+    Level(Box<dyn LevelDetector>),
+    /// Looks at the clock.
+    Clock(TickTime),
+}
+
+impl Known {
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Ticks(detector) => detector.name(),
+            Self::Level(detector) => detector.name(),
+            Self::Clock(_) => TickTime::NAME,
+        }
+    }
+
+    pub fn describe(&self) -> &'static str {
+        match self {
+            Self::Ticks(detector) => detector.describe(),
+            Self::Level(detector) => detector.describe(),
+            Self::Clock(_) => TickTime::ABOUT,
+        }
+    }
+
+    pub fn is_usual(&self) -> bool {
+        match self {
+            Self::Ticks(detector) => detector.is_usual(),
+            Self::Level(detector) => detector.is_usual(),
+            Self::Clock(_) => false,
+        }
+    }
+
+    pub fn settings(&mut self) -> Vec<Setting<'_>> {
+        match self {
+            Self::Ticks(detector) => detector.settings(),
+            Self::Level(detector) => detector.settings(),
+            Self::Clock(times) => times.settings(),
+        }
+    }
+}
+
+/// All detectors for a game, its own included. Its own one takes the place of another with its name.
+pub(super) fn all(game: &dyn Game) -> Vec<Known> {
+    let ticks: Vec<Box<dyn Detector>> = vec![
+        Box::<Stuck>::default(),
+        Box::<OutOfBounds>::default(),
+        Box::<FellThrough>::default(),
+        Box::<Runaway>::default(),
+        Box::<FrozenWorld>::default(),
+        Box::<ErrorLog>::default(),
+        Box::<PhysicsExplosion>::default(),
+        Box::<BlankPicture>::default(),
+        Box::<RewardLoop>::default(),
+    ];
+    let levels: Vec<Box<dyn LevelDetector>> = vec![
+        Box::<EntityLeak>::default(),
+        Box::<Shortcut>::default(),
+        Box::<UnreachableRegion>::default(),
+        Box::<Determinism>::default(),
+        Box::<RewardFarm>::default(),
+    ];
+    let own = game.detectors();
+    let is_own = |name: &str| own.iter().any(|detector| detector.name() == name);
+    let known = ticks.into_iter().map(Known::Ticks).chain(levels.into_iter().map(Known::Level));
+    let known = known.chain([Known::Clock(TickTime::default())]);
+    let mut known: Vec<Known> = known.filter(|known| !is_own(known.name())).collect();
+    known.extend(own.into_iter().map(Known::Ticks));
+    known
+}
+
+/// What is said of a detector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DetectorInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// What it finds, in one line.
+    pub about: &'static str,
+    /// Whether it looks where nobody chooses.
+    pub is_usual: bool,
+    /// Its settings: name, value and meaning.
+    pub settings: Vec<(&'static str, f64, &'static str)>,
+}
+
+/// What there is for a game, but for [`ALWAYS`].
+pub fn list(game: &dyn Game) -> Vec<DetectorInfo> {
+    let info = |mut known: Known| DetectorInfo {
+        name: known.name(),
+        about: known.describe(),
+        is_usual: known.is_usual(),
+        settings: known.settings().into_iter().map(|setting| (setting.key, *setting.value, setting.what)).collect(),
+    };
+    all(game).into_iter().map(info).collect()
+}

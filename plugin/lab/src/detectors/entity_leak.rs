@@ -1,0 +1,122 @@
+//! Entities that pile up from episode to episode.
+
+use bevy_playbot::{
+    bot::BlindBot,
+    episode::{Episode, EpisodeCount},
+    vision::ObservationConfig,
+};
+
+use super::{
+    level_detector::{LevelDefect, LevelDetector, TestedLevel},
+    probe::Probe,
+};
+use crate::{detector::Setting, eval::Player};
+
+/// Each episode of a level leaves entities behind. Some levels are played a few times anew, each time up to the same tick,
+/// and what is in the World is counted.
+pub struct EntityLeak {
+    every: f64,
+    ticks: f64,
+    episodes: f64,
+}
+
+/// Episodes in the beginning that may make what stays, such as pools.
+const FIRST: usize = 2;
+/// Times as many ticks of the World as of an episode, for levels that take long to load.
+const MOST_TRIES: u32 = 20;
+
+impl Default for EntityLeak {
+    fn default() -> Self {
+        Self { every: 1000.0, ticks: 20.0, episodes: 6.0 }
+    }
+}
+
+impl EntityLeak {
+    /// How many entities there are after each episode; fewer numbers if the game breaks.
+    fn counts(&self, level: &TestedLevel<'_>) -> Vec<u32> {
+        let (episodes, ticks) = (self.episodes as usize, self.ticks as u32);
+        let player = Player::Blind(BlindBot::Uniform);
+        let seeds = vec![0; episodes];
+        let mut counts = Vec::new();
+        let config = ObservationConfig::default();
+        let Ok(mut probe) = Probe::new(level.game, level.mode, level.level, &player, &config, seeds) else {
+            return counts;
+        };
+        for _ in 0..episodes {
+            let finished =
+                |probe: &Probe| probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished);
+            let before = finished(&probe);
+            for _ in 0..ticks.saturating_mul(MOST_TRIES) {
+                // A game that breaks is found by others.
+                if probe.tick().is_err() {
+                    return counts;
+                }
+                let tick = probe.world.get::<Episode>(probe.agent).map_or(ticks, |episode| episode.tick);
+                if tick >= ticks || finished(&probe) > before {
+                    break;
+                }
+            }
+            counts.push(probe.world.entity_count());
+            if let Some(mut episode) = probe.world.get_mut::<Episode>(probe.agent) {
+                episode.abandon();
+            }
+        }
+        counts
+    }
+}
+
+impl LevelDetector for EntityLeak {
+    fn name(&self) -> &'static str {
+        "entity-leak"
+    }
+
+    fn describe(&self) -> &'static str {
+        "every episode leaves entities behind"
+    }
+
+    fn is_usual(&self) -> bool {
+        true
+    }
+
+    fn settings(&mut self) -> Vec<Setting<'_>> {
+        vec![
+            Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
+            Setting::new("ticks", &mut self.ticks, "ticks of an episode").at_least(1.0),
+            Setting::new("episodes", &mut self.episodes, "episodes on a level").at_least(4.0),
+        ]
+    }
+
+    fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        // A World that is built anew has forgotten everything.
+        if !level.is_sample(self.every) || level.game.built_anew().is_some() {
+            return Vec::new();
+        }
+        grows(&self.counts(level))
+            .map(|message| LevelDefect { message, ..LevelDefect::default() })
+            .into_iter()
+            .collect()
+    }
+}
+
+/// Whether there are more each time, in words.
+fn grows(counts: &[u32]) -> Option<String> {
+    let later = counts.get(FIRST..).filter(|later| later.len() > 1)?;
+    let leaks = later.windows(2).all(|pair| pair[0] < pair[1]);
+    leaks.then(|| {
+        let counts: Vec<String> = counts.iter().map(u32::to_string).collect();
+        format!("there are more entities after each episode of the level: {}", counts.join(", "))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grows_each_time_leaks_and_what_comes_to_rest_does_not() {
+        assert!(grows(&[10, 14, 18, 22, 26, 30]).is_some_and(|words| words.contains("10, 14, 18")));
+        assert_eq!(grows(&[10, 14, 18, 18, 18, 18]), None, "a pool was filled");
+        assert_eq!(grows(&[10, 14, 18, 16, 20, 24]), None);
+        assert_eq!(grows(&[10, 20]), None, "too few to say anything");
+    }
+}

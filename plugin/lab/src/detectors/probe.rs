@@ -1,0 +1,61 @@
+//! Worlds in which detectors play themselves.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    control::Control,
+    fault::Fault,
+    headless::tick_world,
+    level::LevelQueue,
+    panics::PanicReports,
+    streams::EpisodeSeeds,
+    vision::{ObservationConfig, VisionError},
+};
+
+use crate::{eval::Player, game::Game, worlds::build_observing_world};
+
+/// A World with one agent, who plays one level again and again, each time from the same seed.
+pub struct Probe {
+    /// The World.
+    pub world: World,
+    /// The agent.
+    pub agent: Entity,
+}
+
+impl Probe {
+    /// A World for so many episodes.
+    ///
+    /// # Errors
+    ///
+    /// The pictures that the player needs cannot be made.
+    pub fn new(
+        game: &dyn Game,
+        mode: &str,
+        level: u64,
+        player: &Player,
+        observation_config: &ObservationConfig,
+        seeds: Vec<u64>,
+    ) -> Result<Self, VisionError> {
+        let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
+        if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
+            // The detector's findings say how to see it again.
+            reports.keep_no_files();
+        }
+        let agent = agents.into_iter().next().expect("one agent was asked for");
+        let queue = LevelQueue::list(vec![level; seeds.len()]);
+        world.entity_mut(agent).insert((queue, EpisodeSeeds::new(seeds)));
+        let control = player.seat(game, &mut world, agent);
+        world.entity_mut(agent).insert(control);
+        player.install(&mut world);
+        Ok(Self { world, agent })
+    }
+
+    /// Plays a tick. Whether the agent is still playing.
+    ///
+    /// # Errors
+    ///
+    /// The game broke.
+    pub fn tick(&mut self) -> Result<bool, Fault> {
+        tick_world(&mut self.world)?;
+        Ok(Control::of(&self.world, self.agent).is_active())
+    }
+}

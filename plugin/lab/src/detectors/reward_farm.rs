@@ -1,0 +1,49 @@
+//! Scores that are better without the aim.
+
+use bevy_playbot::episode::EpisodeEnd;
+
+use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
+use crate::detector::Setting;
+
+/// An episode in which time ran out brought more reward than any that was solved.
+pub struct RewardFarm {
+    factor: f64,
+}
+
+impl Default for RewardFarm {
+    fn default() -> Self {
+        Self { factor: 1.5 }
+    }
+}
+
+impl LevelDetector for RewardFarm {
+    fn name(&self) -> &'static str {
+        "reward-farm"
+    }
+
+    fn describe(&self) -> &'static str {
+        "an episode that was not solved brings more reward than the solved ones"
+    }
+
+    fn settings(&mut self) -> Vec<Setting<'_>> {
+        vec![Setting::new("factor", &mut self.factor, "times the reward of the best solved episode")]
+    }
+
+    fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        let solved = level.episodes().filter(|(_, _, result)| result.success);
+        let best = solved.map(|(_, _, result)| result.total_reward).max_by(f64::total_cmp);
+        let Some(best) = best.filter(|best| *best > 0.0) else { return Vec::new() };
+        let is_farm = |end: EpisodeEnd, total: f64| end == EpisodeEnd::Truncated && total > self.factor * best;
+        let found = level.episodes().find(|(_, _, result)| !result.success && is_farm(result.end, result.total_reward));
+        let defect = found.map(|(tester, episode, result)| LevelDefect {
+            tester: Some(tester.to_owned()),
+            episode: Some(episode),
+            tick: result.ticks.checked_sub(1),
+            message: format!(
+                "a reward of {} until time was up, and at most {best} for reaching the aim",
+                result.total_reward
+            ),
+        });
+        defect.into_iter().collect()
+    }
+}

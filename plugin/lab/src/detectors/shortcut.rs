@@ -1,0 +1,81 @@
+//! Levels that are over too soon.
+
+use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
+
+use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
+use crate::{
+    detector::Setting,
+    eval::{EvalPlan, Player, evaluate},
+    split::LevelSplit,
+};
+
+/// A tester solves a level in far fewer ticks than it should take: the designer's par, or what the game's demonstrator
+/// needs.
+pub struct Shortcut {
+    factor: f64,
+    par: f64,
+}
+
+impl Default for Shortcut {
+    fn default() -> Self {
+        Self { factor: 0.5, par: 0.0 }
+    }
+}
+
+impl Shortcut {
+    /// Ticks that the level should take.
+    fn par(&self, level: &TestedLevel<'_>) -> Option<f64> {
+        if self.par > 0.0 {
+            return Some(self.par);
+        }
+        level.game.demonstrator()?;
+        let split = LevelSplit { mode: level.mode.to_owned(), first: level.level, last: level.level };
+        let plan = EvalPlan {
+            split,
+            observation_config: ObservationConfig::default(),
+            episodes_per_level: 1,
+            seed: 0,
+            arenas: 1,
+            worlds: 1,
+            threads: 1,
+        };
+        // A game that breaks is found by others.
+        let results = evaluate(level.game, &Player::Demonstrator, &plan, |_| {}).ok()?;
+        results.iter().find(|result| result.success).map(|result| f64::from(result.ticks))
+    }
+}
+
+impl LevelDetector for Shortcut {
+    fn name(&self) -> &'static str {
+        "shortcut"
+    }
+
+    fn describe(&self) -> &'static str {
+        "the level is solved far faster than by the demonstrator, or than its par"
+    }
+
+    fn settings(&mut self) -> Vec<Setting<'_>> {
+        vec![
+            Setting::new("factor", &mut self.factor, "share of the par that is too fast"),
+            Setting::new("par", &mut self.par, "ticks that a level should take; 0 for those of the demonstrator"),
+        ]
+    }
+
+    fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        let solved = level.episodes().filter(|(_, _, result)| result.success);
+        let Some((tester, episode, fastest)) = solved.min_by_key(|(_, _, result)| result.ticks) else {
+            return Vec::new();
+        };
+        let Some(par) = self.par(level) else { return Vec::new() };
+        if !is_too_fast(fastest, par, self.factor) {
+            return Vec::new();
+        }
+        let message = format!("solved in {} ticks, where {par} are to be expected", fastest.ticks);
+        let tick = fastest.ticks.checked_sub(1);
+        vec![LevelDefect { tester: Some(tester.to_owned()), episode: Some(episode), tick, message }]
+    }
+}
+
+fn is_too_fast(result: &EpisodeResult, par: f64, factor: f64) -> bool {
+    f64::from(result.ticks) < par * factor
+}

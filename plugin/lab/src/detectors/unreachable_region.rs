@@ -1,0 +1,68 @@
+//! Parts of a level that nobody gets to.
+
+use std::ops::ControlFlow;
+
+use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
+use crate::{
+    detector::Setting,
+    explore::{ExplorePlan, explore},
+};
+
+/// An explorer does not get to tiles that no wall cuts off from the start. It is no proof, and takes some seconds for each
+/// level, so it is not usual.
+pub struct UnreachableRegion {
+    steps: f64,
+    share: f64,
+    every: f64,
+}
+
+/// Most tiles that are named.
+const NAMED: usize = 4;
+
+impl Default for UnreachableRegion {
+    fn default() -> Self {
+        Self { steps: 100_000.0, share: 0.05, every: 1.0 }
+    }
+}
+
+impl LevelDetector for UnreachableRegion {
+    fn name(&self) -> &'static str {
+        "unreachable-region"
+    }
+
+    fn describe(&self) -> &'static str {
+        "an explorer does not get to tiles that no wall cuts off"
+    }
+
+    fn settings(&mut self) -> Vec<Setting<'_>> {
+        vec![
+            Setting::new("steps", &mut self.steps, "steps of the explorer on a level").at_least(1.0),
+            Setting::new("share", &mut self.share, "share of the tiles that it may miss"),
+            Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
+        ]
+    }
+
+    fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        if !level.is_sample(self.every) {
+            return Vec::new();
+        }
+        let plan = ExplorePlan {
+            steps: self.steps as u64,
+            arenas: 8,
+            worlds: 1,
+            threads: 1,
+            ..ExplorePlan::new(level.mode, level.level)
+        };
+        // A game that breaks or does not replay is found by others.
+        let Ok(found) = explore(level.game, &plan, |_| {}, |_| ControlFlow::Continue(())) else { return Vec::new() };
+        let Some(coverage) = found.coverage().filter(|coverage| 1.0 - coverage > self.share) else { return Vec::new() };
+        let missed: Vec<String> = found.missed().take(NAMED).map(ToString::to_string).collect();
+        let message = format!(
+            "an explorer of {} steps reached {:.0} % of the open tiles, and not {}",
+            found.steps,
+            100.0 * coverage,
+            missed.join(" or ")
+        );
+        vec![LevelDefect { message, ..LevelDefect::default() }]
+    }
+}

@@ -1,0 +1,55 @@
+//! Actions one by one, and as recordings have them.
+
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    demo::{file::EpisodeActions, replay::recorded_action},
+};
+
+/// What a game's agents do when they do nothing: action 0, or zeros.
+pub(super) fn idle(space: &ActionSpace) -> ActionValue {
+    match space {
+        ActionSpace::Discrete(_) => ActionValue::Discrete(0),
+        ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; *count]),
+    }
+}
+
+/// The actions of a recorded episode.
+pub(super) fn listed(actions: &EpisodeActions) -> Vec<ActionValue> {
+    (0..).map_while(|tick| recorded_action(actions, tick)).collect()
+}
+
+/// The same for a recording. Actions that do not fit the space are left out.
+pub(super) fn recorded(actions: &[ActionValue], space: &ActionSpace) -> EpisodeActions {
+    match space {
+        ActionSpace::Discrete(_) => {
+            let index = |action: &ActionValue| match action {
+                ActionValue::Discrete(index) => Some(*index),
+                ActionValue::Continuous(_) => None,
+            };
+            EpisodeActions::Discrete(actions.iter().filter_map(index).collect())
+        }
+        ActionSpace::Continuous(dim) => {
+            let values = actions.iter().filter_map(|action| match action {
+                ActionValue::Continuous(values) => Some(values.iter().copied()),
+                ActionValue::Discrete(_) => None,
+            });
+            EpisodeActions::Continuous { dim: *dim, values: values.flatten().collect() }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn actions_go_into_recordings_and_come_back() {
+        let space = ActionSpace::Discrete(3);
+        let actions = [2, 0, 1].map(ActionValue::Discrete);
+        assert_eq!(listed(&recorded(&actions, &space)), actions);
+        let space = ActionSpace::Continuous(2);
+        let actions = [ActionValue::Continuous(vec![0.5, -1.0]), idle(&space)];
+        assert_eq!(listed(&recorded(&actions, &space)), actions);
+        assert!(listed(&recorded(&[], &space)).is_empty());
+    }
+}

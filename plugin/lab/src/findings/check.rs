@@ -1,0 +1,17 @@
+//! How it is found out whether a finding is still there.
+
+use std::sync::Arc;
+
+use super::{head::FindingHead, moment::Watcher, play::Replayed};
+use crate::game::Game;
+
+/// How a detector's findings are looked for again.
+#[derive(Clone)]
+pub enum Check {
+    /// In the level itself: nobody has to play. Asks whether the finding of this mode and level is there.
+    Level(fn(&dyn Game, &str, u64) -> bool),
+    /// In what came of the episode: the tick of the finding, if it is there.
+    Episode(fn(&FindingHead, &Replayed) -> Option<u32>),
+    /// In the World, tick by tick; each replay gets a watcher of its own.
+    Ticks(Arc<dyn Fn(&FindingHead) -> Watcher + Send + Sync>),
+}

@@ -1,0 +1,96 @@
+//! What can be wrong with files of findings.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use bevy_playbot::demo::file::{DemoFault, DemoFileError};
+use thiserror::Error;
+
+/// Findings cannot be read or written.
+#[derive(Debug, Error)]
+pub enum FindingError {
+    /// The file cannot be read as a recording, or not be written.
+    #[error("{0}; a finding is one episode: if the file is damaged, test the level again with `playbot test`")]
+    File(#[from] DemoFileError),
+    /// It is a recording without a head.
+    #[error(
+        "{}: a recording, but of no finding ({why}): name a .finding that `playbot test` has written; recordings are shown by \
+         `playbot view` and checked by `playbot demo verify`", path.display()
+    )]
+    NoFinding {
+        /// The file.
+        path: PathBuf,
+        /// What its note says.
+        why: String,
+    },
+    /// The head was written by a later version.
+    #[error("{}: a finding in form {found}, but this program reads forms up to {newest}: update the program", path.display())]
+    NewerForm {
+        /// The file.
+        path: PathBuf,
+        /// Form of the head.
+        found: u32,
+        /// Newest form that is read.
+        newest: u32,
+    },
+    /// It holds none or several episodes.
+    #[error("{}: {episodes} episodes, but a finding has one: test the level again with `playbot test`", path.display())]
+    Episodes {
+        /// The file.
+        path: PathBuf,
+        /// How many.
+        episodes: usize,
+    },
+    /// A folder has no findings.
+    #[error(
+        "{} has no findings: name a folder with .finding files, or one that `playbot test` has written with findings in it",
+        .0.display()
+    )]
+    None(PathBuf),
+    /// The pins cannot be understood.
+    #[error(
+        "{}, line {line}, column {column}: {message}; write \
+         [(finding: \"NAME\", reason: \"why it is known\", until: \"2027-01-31\")]", path.display()
+    )]
+    Pins {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+impl FindingError {
+    /// Whether calling differently helps; otherwise the system failed.
+    pub fn is_usage(&self) -> bool {
+        use io::ErrorKind::{IsADirectory, NotADirectory, NotFound};
+        let is_named = |source: &io::Error| matches!(source.kind(), NotFound | IsADirectory | NotADirectory);
+        match self {
+            Self::File(DemoFileError { fault: DemoFault::Io { source, .. }, .. }) | Self::Io { source, .. } => {
+                is_named(source)
+            }
+            Self::File(DemoFileError { fault: DemoFault::PushFailed { .. } | DemoFault::PushTorn { .. }, .. }) => false,
+            _ => true,
+        }
+    }
+}
+
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FindingError {
+    move |source| FindingError::Io { action, path: path.into(), source }
+}

@@ -1,0 +1,116 @@
+//! Playing an episode once more, by its actions or by its player.
+
+use bevy_playbot::{
+    action::{ActionValue, misfit},
+    episode::EpisodeResult,
+    level_files::LevelFile,
+    vision::{ObservationConfig, VisionError},
+};
+
+use super::{
+    actions::idle,
+    breakage::Breakage,
+    moment::Watcher,
+    solo::{Setting, Solo},
+};
+use crate::eval::Player;
+
+/// What came of an episode that was played again.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Replayed {
+    /// Reward of each tick.
+    pub rewards: Vec<f32>,
+    /// Hash of the game's state after each tick.
+    pub state_hashes: Vec<u32>,
+    /// What came of the episode, if it ended.
+    pub end: Option<EpisodeResult>,
+    /// How the game broke, if it did.
+    pub broken: Option<Breakage>,
+    /// The tick in which a watcher saw the finding; nothing is played behind it.
+    pub noticed: Option<u32>,
+    /// The file of the level, where levels are files.
+    pub level_file: Option<LevelFile>,
+}
+
+impl Replayed {
+    /// Hash of the state after a tick, or after the last one before it.
+    pub fn state_hash(&self, tick: u32) -> Option<u32> {
+        self.state_hashes.get(tick as usize).or(self.state_hashes.last()).copied()
+    }
+
+    /// Notes a tick; whether the episode goes on.
+    fn note(&mut self, solo: &Solo, watcher: Option<&mut Watcher>) -> bool {
+        let (reward, hash) = solo.outcome();
+        self.rewards.push(reward);
+        self.state_hashes.push(hash);
+        self.end = solo.end();
+        self.noticed = watcher.and_then(|watch| watch(&solo.moment()));
+        self.end.is_none() && self.noticed.is_none()
+    }
+}
+
+/// Plays actions up to their end, that of the episode, or the tick in which the watcher has seen enough.
+pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], mut watcher: Option<Watcher>) -> Replayed {
+    // The watcher looks at the World, not at what agents see.
+    let built = Solo::new(setting, &ObservationConfig::default());
+    let mut solo = built.expect("nothing can be wrong with a vector");
+    let mut replayed = Replayed { level_file: solo.level_file(), ..Replayed::default() };
+    while let Some(action) = actions.get(solo.ticks() as usize) {
+        solo.act(action.clone());
+        match solo.tick() {
+            Err(broken) => {
+                replayed.broken = Some(broken);
+                return replayed;
+            }
+            Ok(is_tick) => {
+                if is_tick && !replayed.note(&solo, watcher.as_mut()) {
+                    return replayed;
+                }
+            }
+        }
+    }
+    replayed.broken = solo.endless();
+    replayed
+}
+
+/// Lets a player play to the end of the episode, or until the game breaks. The actions include that of the tick in which it
+/// broke.
+///
+/// # Errors
+///
+/// What the player sees cannot be drawn.
+pub(super) fn play_player(
+    setting: Setting,
+    player: &Player,
+    observation_config: &ObservationConfig,
+) -> Result<(Vec<ActionValue>, Replayed), VisionError> {
+    let sees = matches!(player, Player::Policy { .. });
+    let observation_config = if sees { *observation_config } else { ObservationConfig::default() };
+    let mut solo = Solo::new(setting, &observation_config)?;
+    solo.seat(player);
+    let (mut actions, mut replayed) = (Vec::new(), Replayed { level_file: solo.level_file(), ..Replayed::default() });
+    let space = setting.game.actions();
+    let done = |solo: &Solo| {
+        // What does not fit was not done.
+        let action = solo.action().filter(|action| misfit(action, &space).is_none());
+        action.unwrap_or_else(|| idle(&space))
+    };
+    loop {
+        match solo.tick() {
+            Err(broken) => {
+                if broken.detector != "endless" {
+                    actions.push(done(&solo));
+                }
+                replayed.broken = Some(broken);
+                return Ok((actions, replayed));
+            }
+            Ok(true) => {
+                actions.push(done(&solo));
+                if !replayed.note(&solo, None) {
+                    return Ok((actions, replayed));
+                }
+            }
+            Ok(false) => {}
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Whether a finding can be played again at all.
+
+use bevy_playbot::demo::recorder::demo_actions;
+use thiserror::Error;
+
+use super::stored::StoredFinding;
+use crate::{
+    game::Game,
+    level_files::{LevelDesigns, is_level_files},
+};
+
+/// Why a finding cannot be played again, in words.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("{0}")]
+pub struct Unplayable(pub String);
+
+impl StoredFinding {
+    /// Checks that the game is the one that was tested, and that the level is still there.
+    ///
+    /// # Errors
+    ///
+    /// [`Unplayable`]: another game or version, other actions, a mode that the game no longer has, a level file that is gone
+    /// or was changed.
+    pub fn check_playable(&self, game: &dyn Game) -> Result<(), Unplayable> {
+        let StoredFinding { header, episode, .. } = self;
+        if header.game != game.name() {
+            return Err(Unplayable(format!("it was found in the game `{}`, not in `{}`", header.game, game.name())));
+        }
+        if header.game_version != game.version() {
+            return Err(Unplayable(format!(
+                "it was found in version {} of `{}`, but this is version {}: test the level again",
+                header.game_version,
+                header.game,
+                game.version()
+            )));
+        }
+        let actions = demo_actions(&game.actions());
+        if header.actions != actions {
+            return Err(Unplayable(format!(
+                "its actions are {}, but those of `{}` are {actions}",
+                header.actions, header.game
+            )));
+        }
+        if !is_level_files(&header.mode) {
+            return game.check_mode(&header.mode).map_err(gone);
+        }
+        let designs = LevelDesigns::read(game.name(), &header.mode, &|text| game.parse_level(text)).map_err(gone)?;
+        match &episode.level_file {
+            Some(file) => {
+                designs.files().difference(episode.level_seed, file).map_or(Ok(()), |what| Err(Unplayable(what)))
+            }
+            None => Err(Unplayable("it names no level file, though its levels are files".to_owned())),
+        }
+    }
+}
+
+fn gone(error: impl std::fmt::Display) -> Unplayable {
+    Unplayable(format!("the level no longer exists: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{findings::testing::stored, foreign::ForeignGame};
+
+    #[test]
+    fn other_games_and_versions_are_named() {
+        let said = |name, version| {
+            let game = ForeignGame::new(name, version, |_: &mut bevy::prelude::App| {});
+            stored().check_playable(&game).expect_err("another one").to_string()
+        };
+        assert_eq!(said("forest", 1), "it was found in the game `garden`, not in `forest`");
+        assert!(said("garden", 2).starts_with("it was found in version 1 of `garden`, but this is version 2"));
+        assert!(said("garden", 1).starts_with("its actions are discrete (2 actions), but"));
+    }
+}

@@ -1,0 +1,142 @@
+//! One agent that plays one episode, in a World of its own.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    action::{Action, ActionValue},
+    control::Control,
+    episode::{Episode, EpisodeEnded, EpisodeResult},
+    headless::tick_world,
+    level::LevelQueue,
+    level_files::{LevelFile, LevelFiles},
+    panics::PanicReports,
+    renewal::Renewal,
+    reward::Reward,
+    state_hash::StateHash,
+    streams::EpisodeSeeds,
+    vision::{ObservationConfig, VisionError},
+};
+
+use super::{breakage::Breakage, moment::Moment};
+use crate::{eval::Player, game::Game, worlds::build_observing_world};
+
+/// Ticks after which an episode counts as one that never ends, as in tests of levels.
+const MOST_TICKS: u32 = 1_000_000;
+
+/// What came of the only episode.
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
+struct SoloEnd(Option<EpisodeResult>);
+
+fn note_end(event: On<EpisodeEnded>, mut end: ResMut<SoloEnd>) {
+    end.0 = Some(event.result);
+}
+
+/// Which episode is played.
+#[derive(Clone, Copy)]
+pub(super) struct Setting<'a> {
+    pub game: &'a dyn Game,
+    pub mode: &'a str,
+    pub level: u64,
+    /// Seed of the agent's streams.
+    pub seed: u64,
+}
+
+/// The World and its agent.
+pub(super) struct Solo<'a> {
+    game: &'a dyn Game,
+    mode: &'a str,
+    level: u64,
+    world: World,
+    agent: Entity,
+    /// Ticks of the episode so far.
+    ticks: u32,
+    /// Ticks and frames of the World: a level need not ever be ready.
+    runs: u32,
+}
+
+impl<'a> Solo<'a> {
+    /// A World as tests of levels build it, with an agent for whom somebody else writes the actions.
+    pub fn new(setting: Setting<'a>, observation_config: &ObservationConfig) -> Result<Self, VisionError> {
+        let Setting { game, mode, level, seed } = setting;
+        let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
+        Renewal::set_up(&mut world, |world| {
+            world.init_resource::<SoloEnd>();
+            world.add_observer(note_end);
+        });
+        Renewal::carry_resource::<SoloEnd>(&mut world);
+        if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
+            // The finding is the report.
+            reports.keep_no_files();
+        }
+        let agent = agents[0];
+        let queue = LevelQueue::list([level]);
+        world.entity_mut(agent).insert((Control::Bot, queue, EpisodeSeeds::new([seed])));
+        Ok(Self { game, mode, level, world, agent, ticks: 0, runs: 0 })
+    }
+
+    /// Hands the agent over to a player.
+    pub fn seat(&mut self, player: &Player) {
+        let control = player.seat(self.game, &mut self.world, self.agent);
+        self.world.entity_mut(self.agent).insert(control);
+        player.install(&mut self.world);
+    }
+
+    /// Says what the agent does in the next tick.
+    pub fn act(&mut self, action: ActionValue) {
+        self.world.entity_mut(self.agent).insert(Action(action));
+    }
+
+    /// Plays on; whether that was a tick of the episode. A level that is made ready has none.
+    pub fn tick(&mut self) -> Result<bool, Breakage> {
+        if let Some(endless) = self.endless() {
+            return Err(endless);
+        }
+        self.runs += 1;
+        tick_world(&mut self.world).map_err(|fault| Breakage::of_fault(&fault, self.ticks))?;
+        let played = match self.end() {
+            Some(end) => end.ticks,
+            None => self.world.get::<Episode>(self.agent).map_or(0, |episode| episode.tick),
+        };
+        let is_tick = played != self.ticks;
+        self.ticks = played;
+        Ok(is_tick)
+    }
+
+    /// Ticks of the episode so far.
+    pub fn ticks(&self) -> u32 {
+        self.ticks
+    }
+
+    /// What it means that so many ticks have been played, if anything.
+    pub fn endless(&self) -> Option<Breakage> {
+        (self.ticks >= MOST_TICKS || self.runs >= 2 * MOST_TICKS).then(|| Breakage::endless(MOST_TICKS))
+    }
+
+    /// What came of the episode, once it is over.
+    pub fn end(&self) -> Option<EpisodeResult> {
+        self.world.get_resource::<SoloEnd>()?.0
+    }
+
+    /// What the agent did in the last tick.
+    pub fn action(&self) -> Option<ActionValue> {
+        self.world.get::<Action>(self.agent).map(|action| action.0.clone())
+    }
+
+    /// Reward and state hash of the last tick.
+    pub fn outcome(&self) -> (f32, u32) {
+        let reward = self.world.get::<Reward>(self.agent).map_or(0.0, Reward::get);
+        let hash = self.world.get::<StateHash>(self.agent).map_or(0, StateHash::folded);
+        (reward, hash)
+    }
+
+    /// The file of the level, where levels are files.
+    pub fn level_file(&self) -> Option<LevelFile> {
+        self.world.get_resource::<LevelFiles>()?.of(self.level).cloned()
+    }
+
+    /// The World after its last tick.
+    pub fn moment(&self) -> Moment<'_> {
+        let tick = self.ticks.saturating_sub(1);
+        Moment { game: self.game, mode: self.mode, world: &self.world, agent: self.agent, tick, end: self.end() }
+    }
+}

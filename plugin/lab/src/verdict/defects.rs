@@ -1,0 +1,74 @@
+//! What detectors found, as findings of a level.
+
+use bevy_playbot::episode::EpisodeResult;
+
+use super::{
+    level_name::level_name,
+    level_verdict::Finding,
+    plan::TestPlan,
+    played::{Played, PlayedEnd},
+};
+use crate::{
+    detectors::{TestedBy, TestedLevel},
+    game::Game,
+};
+
+/// What was found while testers played. What a detector finds in several episodes of a tester is told once: of the first.
+pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = Vec::new();
+    for (tester, episodes) in plan.testers.iter().zip(played) {
+        for (number, episode) in (0..).zip(episodes.iter()) {
+            for found in &episode.found {
+                let name = Some(tester.record.name.clone());
+                let is_known = |known: &Finding| known.tester == name && known.detector == found.detector;
+                if !findings.iter().any(is_known) {
+                    findings.push(Finding {
+                        detector: found.detector.to_owned(),
+                        tester: name,
+                        episode: Some(number),
+                        tick: Some(found.tick),
+                        message: found.message.clone(),
+                        file: None,
+                    });
+                }
+            }
+        }
+    }
+    findings
+}
+
+/// What those find that look at a level after it was tested.
+pub(super) fn inspect(game: &dyn Game, plan: &TestPlan, index: u64, played: &[&[Played]]) -> Vec<Finding> {
+    if plan.detectors.levels.is_empty() {
+        return Vec::new();
+    }
+    let level = plan.split.first + index;
+    let name = level_name(game, &plan.split, level);
+    let testers = plan.testers.iter().zip(played).map(|(tester, episodes)| TestedBy {
+        name: &tester.record.name,
+        player: &tester.player,
+        observation_config: tester.observation_config,
+        seed: plan.episode_seed(&tester.record, &name, 0),
+        episodes: (0..).zip(episodes.iter()).filter_map(ended).collect(),
+    });
+    let tested = TestedLevel { game, mode: &plan.split.mode, level, place: index, testers: testers.collect() };
+    let mut findings = Vec::new();
+    for detector in &plan.detectors.levels {
+        findings.extend(detector.inspect(&tested).into_iter().map(|defect| Finding {
+            detector: detector.name().to_owned(),
+            tester: defect.tester,
+            episode: defect.episode,
+            tick: defect.tick,
+            message: defect.message,
+            file: None,
+        }));
+    }
+    findings
+}
+
+fn ended((number, episode): (u32, &Played)) -> Option<(u32, EpisodeResult)> {
+    match &episode.end {
+        PlayedEnd::Ended { result, .. } => Some((number, *result)),
+        PlayedEnd::Broken { .. } => None,
+    }
+}

@@ -1,0 +1,60 @@
+//! One level in the table.
+
+use std::fmt::Write;
+
+use super::{
+    details::details,
+    words::{interval, text, what},
+};
+use crate::{
+    escape::escape,
+    report::readable,
+    verdict::{LevelVerdict, TestRecord},
+};
+
+/// Stands for a finish time that nobody has when levels are sorted: after all others.
+const NEVER: f64 = 1e12;
+
+/// The rows of a level: its numbers, and below them what is wrong and all about it, if anything is or it has a picture.
+/// `data-v` is what columns are sorted by, `data-k` what levels are filtered by.
+pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, picture: Option<&str>) -> String {
+    let LevelVerdict { score, findings, .. } = level;
+    let outcome = level.outcome.name();
+    let kinds = if findings.is_empty() { outcome.to_owned() } else { format!("{outcome} findings") };
+    let share = score.solved as f64 / score.episodes.max(1) as f64;
+    let median = score.ticks.map(|ticks| ticks.median);
+    let mut out = format!(
+        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th><td data-v=\"{}\" class=\"{outcome}\">\
+         {outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
+         <td data-v=\"{}\">{}</td></tr>\n",
+        level.index,
+        text(&level.level),
+        level.outcome as u8,
+        score.solved,
+        score.episodes,
+        score.interval[0],
+        interval(score.interval),
+        median.unwrap_or(NEVER),
+        median.map_or_else(|| "–".to_owned(), readable),
+        findings.len(),
+        detectors(level),
+    );
+    let is_perfect = level.is_sound() && score.solved == score.episodes;
+    if !is_perfect || picture.is_some() {
+        let _ = writeln!(
+            out,
+            "<tr><td colspan=\"6\"><details><summary>{}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
+            what(level),
+            details(record, level, program, picture)
+        );
+    }
+    out + "</tbody>\n"
+}
+
+/// Names of what has found something, each once.
+fn detectors(level: &LevelVerdict) -> String {
+    let mut names: Vec<&str> = level.findings.iter().map(|finding| finding.detector.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.is_empty() { "–".to_owned() } else { escape(&names.join(", ")) }
+}

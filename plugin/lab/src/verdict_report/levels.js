@@ -1,0 +1,41 @@
+(() => {
+  const table = document.getElementById("levels");
+  const form = document.getElementById("filter");
+  const count = document.getElementById("count");
+  const levels = [...table.tBodies];
+  const texts = new Map();
+  const text = (level) => {
+    if (!texts.has(level)) texts.set(level, level.textContent.toLowerCase());
+    return texts.get(level);
+  };
+  const filter = () => {
+    const words = form.elements.words.value.trim().toLowerCase();
+    const kind = form.elements.kind.value;
+    let shown = 0;
+    for (const level of levels) {
+      const isOfKind = kind === "" || level.dataset.k.split(" ").includes(kind);
+      level.hidden = !(isOfKind && (words === "" || text(level).includes(words)));
+      if (!level.hidden) shown += 1;
+    }
+    count.textContent = `${shown} of ${levels.length} levels`;
+  };
+  const headings = [...table.tHead.rows[0].cells];
+  headings.forEach((heading, column) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...heading.childNodes);
+    heading.append(button);
+    button.addEventListener("click", () => {
+      const sign = heading.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+      headings.forEach((other) => other.removeAttribute("aria-sort"));
+      heading.setAttribute("aria-sort", sign === 1 ? "ascending" : "descending");
+      const value = (level) => Number(level.rows[0].cells[column].dataset.v);
+      levels.sort((one, other) => sign * (value(one) - value(other)));
+      table.append(...levels);
+    });
+  });
+  form.addEventListener("input", filter);
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.hidden = false;
+  filter();
+})();

@@ -1,0 +1,26 @@
+//! Results of a test as one HTML file: every level in a table that can be sorted and filtered, with pictures of the worst.
+//!
+//! [`write_html`] makes `report.html` of the results in a folder. The file needs nothing else: no network, no fonts, and
+//! without its few lines of script it is a plain table. It follows the reader's light or dark setting.
+//!
+//! The page is a function of the results, of what they are compared with and of the game, which draws the pictures: the
+//! results of a whole range and those joined from shards give the same bytes.
+
+mod compared;
+mod details;
+mod level_row;
+mod level_table;
+mod numbers;
+mod page;
+mod picture;
+mod plans;
+mod selection;
+mod shapes;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod words;
+mod write;
+
+pub use write::{HtmlReport, REPORT, html, write_html};

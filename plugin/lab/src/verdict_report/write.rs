@@ -1,0 +1,53 @@
+//! Making the page of the results in a folder.
+
+use std::path::Path;
+
+use super::{page::Page, plans::Plans, selection::Selection};
+use crate::{
+    game::Game,
+    verdict::{Comparison, Overview, TestError},
+};
+
+/// Name of the file in the folder of a test.
+pub const REPORT: &str = "report.html";
+
+/// What a report has besides the results.
+#[derive(Clone, Copy)]
+pub struct HtmlReport<'a> {
+    /// The game that was tested, which draws its levels; without it there are no pictures.
+    pub game: Option<&'a dyn Game>,
+    /// What has changed since earlier results.
+    pub comparison: Option<&'a Comparison>,
+    /// Name of the program in the commands that the report shows.
+    pub program: &'a str,
+}
+
+/// Makes the report of the results in a folder.
+///
+/// # Errors
+///
+/// There are no results, or they are damaged.
+pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
+    let overview = Overview::read(results)?;
+    let selection = Selection::read(results)?;
+    let plans = Plans::of(report.game, &overview.record);
+    let page = Page {
+        overview: &overview,
+        comparison: report.comparison,
+        selection: &selection,
+        plans: &plans,
+        program: report.program,
+    };
+    Ok(page.to_html())
+}
+
+/// Makes the report of the results in a folder, and writes it to a file.
+///
+/// # Errors
+///
+/// There are no results, they are damaged, or the file cannot be written.
+pub fn write_html(results: &Path, file: &Path, report: &HtmlReport) -> Result<(), TestError> {
+    let html = html(results, report)?;
+    let written = playbot_learner::write_atomically(file, html.as_bytes());
+    written.map_err(|source| TestError::Io { action: "write", path: file.to_owned(), source })
+}

@@ -1,0 +1,267 @@
+//! Detectors in tests of games with planted defects, and of sound ones.
+
+use std::collections::BTreeSet;
+
+use bevy::prelude::*;
+use bevy_playbot::vision::ObservationConfig;
+use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
+use playbot_lab::{
+    detector::{Detector, EachTick, Moment},
+    detectors::{DetectorChoice, Detectors},
+    eval::Player,
+    floor_plan::FloorPlan,
+    prelude::*,
+    verdict::{Finding, LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
+};
+use playbot_tests::{Cell, Corridor, as_corridor, corridor_plugin, faulty::Fault as Garden};
+
+/// What is wrong with a copy of the corridor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Resource)]
+enum Defect {
+    /// Nothing.
+    None,
+    /// In the second tick of level 2 a body flies away.
+    FlyingBody,
+    /// An error is logged in the second tick of level 2.
+    LoggedError,
+    /// Whoever stays where it is is paid for it.
+    PaidRest,
+    /// The plan of the level goes on where nobody can walk.
+    ClosedWing,
+}
+
+#[derive(Component)]
+struct Body;
+
+fn go_wrong(
+    defect: Res<Defect>,
+    mut agents: Query<(&Control, &Episode, &Action, &mut Reward)>,
+    mut bodies: Query<&mut Transform, With<Body>>,
+) {
+    for (control, episode, action, mut reward) in &mut agents {
+        if !control.is_active() || !episode.is_running() {
+            continue;
+        }
+        let is_moment = episode.level == 2 && episode.tick == 1;
+        match *defect {
+            Defect::FlyingBody if is_moment => bodies.iter_mut().for_each(|mut body| body.translation.x = f32::NAN),
+            Defect::LoggedError if is_moment => tracing::error!("the door has no key"),
+            Defect::PaidRest if action.discrete() == Some(2) => reward.add(0.5),
+            _ => {}
+        }
+    }
+}
+
+impl Game for Defect {
+    as_corridor! {
+        fn name() -> &'static str;
+        fn version() -> u32;
+        fn modes() -> &'static [&'static str];
+        fn tick_hz() -> f64;
+        fn actions() -> ActionSpace;
+        fn observation() -> ObservationSpace;
+        fn spawn_agent(world: &mut World, index: u32) -> Entity;
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        corridor_plugin(app);
+        app.insert_resource(*self).add_systems(FixedPostUpdate, go_wrong.before(PlaybotSystems::Judge));
+        app.world_mut().spawn((Body, Name::new("Crate"), Transform::default()));
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<Cell>(agent).map(|cell| Vec2::new(cell.0 as f32 + 0.5, 1.5))
+    }
+
+    fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
+        let columns = if *self == Self::ClosedWing { 17 } else { 7 };
+        let square = |row: usize, column: usize| {
+            let corner = Vec2::new(column as f32, row as f32);
+            Rect::from_corners(corner, corner + 1.0)
+        };
+        let ends = [Vec2::new(3.5, 1.5), Vec2::new(6.5, 1.5)];
+        Some(FloorPlan::of_tiles([3, columns], |row, _| row != 1, square, ends))
+    }
+
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        vec![Box::new(EachTick::new("late", "somebody is still there after ten ticks", |moment: &Moment<'_>| {
+            (moment.tick == 10).then(|| "it takes too long".to_owned())
+        }))]
+    }
+}
+
+fn tester(name: &str, player: Player) -> Tester {
+    Tester { record: TesterRecord::bot(name), player, observation_config: ObservationConfig::default() }
+}
+
+fn random() -> Tester {
+    tester("random", Player::Blind(BlindBot::Uniform))
+}
+
+/// Always the same action: 1 is to the right, and 2 stays.
+fn always(action: u32) -> Tester {
+    let name = format!("always {action}");
+    tester(&name, Player::Blind(BlindBot::Constant(ActionValue::Discrete(action))))
+}
+
+/// Only these detectors, with these settings.
+fn only(game: &dyn Game, names: &[&str], settings: &[&str]) -> Detectors {
+    let words = |list: &[&str]| list.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+    let choice = DetectorChoice { with: words(names), without: words(&["all"]), settings: words(settings) };
+    Detectors::choose(game, &choice).expect("there are such detectors")
+}
+
+fn verdicts(
+    game: &dyn Game,
+    levels: &str,
+    testers: Vec<Tester>,
+    detectors: Detectors,
+    threads: usize,
+) -> Vec<LevelVerdict> {
+    let split = levels.parse().expect("levels");
+    let plan = TestPlan { split, testers, episodes: 2, seed: 1, detectors, shard: None, threads };
+    let mut found = Vec::new();
+    let mut keep = |verdict: LevelVerdict| -> Result<(), TestError> {
+        found.push(verdict);
+        Ok(())
+    };
+    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    run_tests(game, &plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
+    found.sort_by_key(|verdict| verdict.index);
+    found
+}
+
+/// All findings, with the places of their levels.
+fn findings(game: &dyn Game, levels: &str, testers: Vec<Tester>, detectors: Detectors) -> Vec<(u64, Finding)> {
+    let of_level = |verdict: LevelVerdict| {
+        let index = verdict.index;
+        verdict.findings.into_iter().map(move |finding| (index, finding)).collect::<Vec<_>>()
+    };
+    verdicts(game, levels, testers, detectors, 1).into_iter().flat_map(of_level).collect()
+}
+
+fn assert_silent(found: &[(u64, Finding)]) {
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
+fn what_is_wrong_in_a_shared_world_is_told_of_the_episode_that_did_it() {
+    let testers = || vec![always(2), random()];
+    for (defect, detector, words) in
+        [(Defect::FlyingBody, "runaway", "`Crate`"), (Defect::LoggedError, "error-log", "the door has no key")]
+    {
+        let found = findings(&defect, "plain:0..7", testers(), only(&defect, &[detector], &[]));
+        let of_resting = &found.first().expect("it is found").1;
+        assert!(found.iter().all(|(index, finding)| *index == 2 && finding.detector == detector), "{found:?}");
+        assert_eq!(
+            (of_resting.tester.as_deref(), of_resting.episode, of_resting.tick),
+            (Some("always 2"), Some(0), Some(1))
+        );
+        assert!(of_resting.message.contains(words), "{}", of_resting.message);
+
+        let one = verdicts(&defect, "plain:0..7", testers(), only(&defect, &[detector], &[]), 1);
+        assert_eq!(one, verdicts(&defect, "plain:0..7", testers(), only(&defect, &[detector], &[]), 2), "threads");
+        let sound = findings(&Defect::None, "plain:0..7", testers(), only(&defect, &[detector], &[]));
+        assert_silent(&sound);
+    }
+}
+
+#[test]
+fn a_games_own_detector_looks_with_the_others() {
+    let found = findings(&Defect::None, "plain:0..1", vec![always(1), always(2)], Detectors::usual(&Defect::None));
+    let who: Vec<_> = found.iter().map(|(index, finding)| (*index, finding.detector.as_str(), finding.tick)).collect();
+    assert_eq!(who, [(0, "late", Some(10)), (1, "late", Some(10))]);
+    assert!(found.iter().all(|(_, finding)| finding.tester.as_deref() == Some("always 2")), "{found:?}");
+}
+
+#[test]
+fn entities_that_stay_are_a_leak() {
+    let leaks = |game: Garden| findings(&game, "bed:0..1", vec![random()], only(&game, &["entity-leak"], &[]));
+    let found = leaks(Garden::LeftOvers);
+    assert_eq!(found.len(), 1, "only the first of a thousand levels is looked at");
+    assert_eq!((found[0].0, found[0].1.detector.as_str(), &found[0].1.tester), (0, "entity-leak", &None));
+    assert_silent(&leaks(Garden::None));
+}
+
+#[test]
+fn a_game_that_plays_differently_each_time_is_found() {
+    let breaches = |game: Garden| {
+        let detectors = only(&game, &["determinism"], &["determinism.every=2"]);
+        findings(&game, "bed:0..2", vec![random()], detectors)
+    };
+    let found = breaches(Garden::UnseededRandomness);
+    assert_eq!(found.iter().map(|(index, _)| *index).collect::<Vec<_>>(), [0, 2]);
+    assert!(found.iter().all(|(_, finding)| finding.message.contains("doctor")), "{found:?}");
+    assert_silent(&breaches(Garden::None));
+}
+
+#[test]
+fn a_level_that_is_solved_too_fast_has_a_shortcut() {
+    let solve = |par: &str| findings(&Corridor, "plain:1", vec![always(1)], only(&Corridor, &["shortcut"], &[par]));
+    let found = solve("shortcut.par=20");
+    // From cell 3 to cell 6.
+    assert!(found[0].1.message.contains("solved in 3 ticks"), "{found:?}");
+    assert_eq!(found[0].1.tick, Some(2));
+    assert_silent(&solve("shortcut.par=5"));
+    // Nobody demonstrates the corridor.
+    assert_silent(&solve("shortcut.factor=0.9"));
+}
+
+#[test]
+fn rewards_for_doing_nothing_are_found() {
+    let names = ["reward-farm", "reward-loop"];
+    let testers = || vec![always(1), always(2)];
+    let found = findings(&Defect::PaidRest, "plain:1", testers(), only(&Defect::PaidRest, &names, &[]));
+    let who: Vec<_> = found.iter().map(|(_, finding)| (finding.detector.as_str(), finding.tick)).collect();
+    // The tenth payment comes in tick 9; time is up after 20 ticks.
+    assert_eq!(who, [("reward-loop", Some(9)), ("reward-farm", Some(19))], "{found:?}");
+    assert_silent(&findings(&Defect::None, "plain:1", testers(), only(&Defect::None, &names, &[])));
+}
+
+#[test]
+fn a_wing_that_nobody_gets_to_is_found() {
+    let explore = |game: Defect| {
+        // Cells on which an episode ends may not count as reached.
+        let settings = ["unreachable-region.steps=3000", "unreachable-region.share=0.4"];
+        findings(&game, "plain:1", vec![always(1)], only(&game, &["unreachable-region"], &settings))
+    };
+    let found = explore(Defect::ClosedWing);
+    assert!(found.len() == 1 && found[0].1.message.contains("of the open tiles"), "{found:?}");
+    assert_silent(&explore(Defect::None));
+}
+
+#[test]
+fn usual_detectors_are_silent_on_sound_levels() {
+    let (coinrun, maze, ants) = (CoinRun::default(), Maze2d::default(), AntMaze);
+    let games: [(&dyn Game, u64); 3] = [(&coinrun, 9), (&maze, 1), (&ants, 0)];
+    for (game, last) in games {
+        let levels = format!("{}:0..{last}", game.modes()[0]);
+        let mut testers = vec![random()];
+        if game.name() != ants.name() {
+            testers.push(tester("demonstrator", Player::Demonstrator));
+        }
+        let found = findings(game, &levels, testers, Detectors::usual(game));
+        assert!(found.is_empty(), "{} {levels}: {found:?}", game.name());
+    }
+}
+
+#[test]
+fn mistakes_are_told_with_what_would_be_right() {
+    let said = |with: &str, setting: &str| {
+        let words = |word: &str| if word.is_empty() { Vec::new() } else { vec![word.to_owned()] };
+        let choice = DetectorChoice { with: words(with), without: Vec::new(), settings: words(setting) };
+        Detectors::choose(&Corridor, &choice).map(drop).expect_err("it is wrong").to_string()
+    };
+    for (words, part) in [
+        (said("stuk", ""), "did you mean `stuck`?"),
+        (said("", "stuck.tick=3"), "did you mean `ticks`?"),
+        (said("", "stuck"), "stuck.ticks=200"),
+        (said("", "stuck.ticks=0"), "at least 1"),
+        (said("", "stuck.ticks=many"), "at least 1"),
+        (said("", "shortcut.par=3"), "--detect shortcut"),
+    ] {
+        assert!(words.contains(part), "{words}");
+    }
+    let record = only(&Corridor, &["stuck"], &["stuck.ticks=200"]).record().to_vec();
+    assert_eq!(record, ["stuck ticks=200 distance=0.01"]);
+}
