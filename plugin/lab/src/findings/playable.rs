@@ -60,7 +60,6 @@ fn gone(error: impl std::fmt::Display) -> Unplayable {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::{findings::testing::stored, foreign::ForeignGame};
 
     #[test]

@@ -147,7 +147,7 @@ impl WatchedSeat {
         watches.retain_mut(|(detector, watch)| {
             let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));
             let is_silent = message.is_none();
-            let finding = message.map(|message| EpisodeFinding { detector: *detector, tick: moment.tick, message });
+            let finding = message.map(|message| EpisodeFinding { detector, tick: moment.tick, message });
             self.found.extend(finding);
             is_silent
         });

@@ -109,7 +109,6 @@ pub fn finding(detector: &str, message: &str) -> Finding {
         tick: Some(7),
         message: message.to_owned(),
         file: None,
-        file: None,
     }
 }
 
