@@ -9,6 +9,7 @@ use bevy_playbot::{headless_plugins::HeadlessPlugins, vision::Picture};
 use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
+    detector::Detector,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelTextError},
@@ -84,6 +85,7 @@ impl<G: SenseRays> Game for WithRays<G> {
         fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
         fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
         fn prove(mode: &str, level: u64) -> LevelProof;
+        fn detectors() -> Vec<Box<dyn Detector>>;
         fn blind_bots() -> Vec<(&'static str, BlindBot)>;
         fn demonstrator() -> Option<&'static str>;
         fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);

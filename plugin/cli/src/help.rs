@@ -21,7 +21,13 @@ pub fn named(command: Command, program: &'static str, games: &[&dyn Game]) -> Co
     let plays = command.get_arguments().any(|argument| argument.get_id() == "game");
     let examples = command.get_after_help().map(|text| examples(&text.to_string(), plays, program, games));
     let command = command.mut_args(|argument| of_argument(argument, program));
-    let command = command.mut_subcommands(|verb| named(verb, program, games));
+    let mut command = command.mut_subcommands(|verb| named(verb, program, games));
+    if let Some(text) = command.get_about().map(ToString::to_string) {
+        command = command.about(with_name(&text, program));
+    }
+    if let Some(text) = command.get_long_about().map(ToString::to_string) {
+        command = command.long_about(with_name(&text, program));
+    }
     match examples {
         Some(text) => command.after_help(text),
         None => command,

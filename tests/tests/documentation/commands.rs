@@ -12,6 +12,8 @@ fn commands(text: &str) -> Vec<Vec<String>> {
     let mut commands = Vec::new();
     for line in text.replace("\\\n", " ").lines() {
         let line = line.split(" #").next().unwrap_or_default();
+        // What the shell writes into a file is no part of the command.
+        let line = line.split(" > ").next().unwrap_or_default();
         commands.extend(line.split("&&").map(words).filter(|words| !words.is_empty()));
     }
     commands
