@@ -44,7 +44,7 @@ fn slow_ticks_have_a_file_of_their_own_and_fail_nothing() {
 fn what_is_no_detector_is_told_with_what_would_be_right() {
     let temporary = tempfile::tempdir().expect("a folder");
     for (option, value, words) in [
-        ("--detect", "shortcutt", "did you mean `shortcut`?"),
+        ("--detect", "short-cut", "did you mean `shortcut`?"),
         ("--no-detect", "stuk", "did you mean `stuck`?"),
         ("--detector", "stuck.tick=4", "did you mean `ticks`?"),
         ("--detector", "shortcut.par=4", "--detect shortcut"),

@@ -120,7 +120,7 @@ fn what_cannot_be_tested_is_an_error_and_never_a_pass() {
         (&["--levels", "hard:0..2", "--shard", "3/7"], "shard 3/7 has no level"),
         (&["--levels", "hard:0..2", "--shard", "7/7"], "the last one is 6/7"),
         (&["--levels", "hurd:0..2"], "hard"),
-        (&["--levels", "hard:0..2", "--bot", "seach"], "search"),
+        (&["--levels", "hard:0..2", "--bot", "scout"], "search"),
         (&["--levels", "hard:0..2", "--bot", "search,search"], "two testers are called `search`"),
         (&["--levels", "hard:0..2", "--policy", "none.policy"], "none.policy"),
         (&["--levels", "hard:0..2", "--against", "none"], "none has no results.json"),

@@ -19,16 +19,11 @@ fn write(folder: &Path, name: &str, level: &Value) {
 
 /// Puts rock around the coin, but not into it.
 fn wall_in(level: &mut Value) {
-    let coin = level["coin"].as_array().expect("a cell").iter().map(|along| along.as_u64().expect("a number") as usize);
-    let coin: Vec<usize> = coin.collect();
-    let rows = level["rows"].as_array_mut().expect("rows");
-    for (y, row) in rows.iter_mut().enumerate().filter(|(y, _)| y.abs_diff(coin[1]) <= 2) {
+    let coin = level["coin"][0].as_u64().expect("a number") as usize;
+    for row in level["rows"].as_array_mut().expect("rows") {
         let letters = row.as_str().expect("a row").chars().enumerate();
-        let walled = |(x, letter): (usize, char)| {
-            let is_near = x.abs_diff(coin[0]) <= 2 && [x, y] != coin[..];
-            if is_near { '#' } else { letter }
-        };
-        *row = letters.map(walled).collect::<String>().into();
+        let walled = letters.map(|(x, letter)| if x.abs_diff(coin) == 2 { '#' } else { letter });
+        *row = walled.collect::<String>().into();
     }
 }
 

@@ -98,7 +98,7 @@ mod tests {
         fs::create_dir_all(root.join("empty")).expect("writable");
         fs::write(root.join("file"), "").expect("writable");
         for (path, words) in [
-            (root.join("frist"), "first?"),
+            (root.join("fist"), "first?"),
             (root.join("none"), "lists those there are"),
             (root.join("empty"), "no training began in it; `playbot train --run "),
             (root.join("file"), "it is a file"),
