@@ -7,6 +7,7 @@ use bevy_playbot::vision::{ObservationKind, Picture};
 use playbot_lab::{
     benchmark::Benchmark,
     floor_plan::FloorPlan,
+    game::{level_designs, read_level_designs},
     inspect::{InspectError, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
@@ -73,7 +74,7 @@ impl Game for AntMaze {
 
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
         if is_level_files(mode) {
-            LevelDesigns::read(self.name(), mode, &|text| self.parse_level(text))?;
+            read_level_designs(self, mode)?;
             return Ok(());
         }
         read_mode::<AntMazeMode>(mode).map(drop)
@@ -86,7 +87,7 @@ impl Game for AntMaze {
 
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
         if is_level_files(mode) {
-            return LevelDesigns::of(self.name(), mode, &|text| self.parse_level(text)).ok()?.hash(level);
+            return level_designs(self, mode).ok()?.hash(level);
         }
         mode.parse::<AntMazeMode>().ok()?.map.fingerprint(level)
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::{ecs::system::SystemParam, prelude::*};
 use playbot_lab::{
-    game::Game,
+    game::{Game, level_designs},
     level_files::{LevelDesigns, is_level_files},
 };
 
@@ -35,7 +35,7 @@ impl Levels<'_> {
 /// A level of a mode that has been checked, or in words why there is none.
 pub(super) fn level_of(game: &dyn Game, mode: &str, level: u64) -> Result<Arc<AntMazeLevel>, String> {
     if is_level_files(mode) {
-        let designs = LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text));
+        let designs = level_designs(game, mode);
         return designs.map_err(|error| error.to_string())?.get(level);
     }
     generated(&mode.parse().map_err(|error: MazeModeError| error.to_string())?, level)

@@ -8,6 +8,7 @@ use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
     floor_plan::FloorPlan,
+    game::{level_designs, read_level_designs},
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
@@ -79,7 +80,7 @@ impl Game for Maze2d {
 
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
         if is_level_files(mode) {
-            LevelDesigns::read(self.name(), mode, &|text| self.parse_level(text))?;
+            read_level_designs(self, mode)?;
             return Ok(());
         }
         read_mode::<Maze2dMode>(mode).map(drop)
@@ -92,7 +93,7 @@ impl Game for Maze2d {
 
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
         if is_level_files(mode) {
-            return LevelDesigns::of(self.name(), mode, &|text| self.parse_level(text)).ok()?.hash(level);
+            return level_designs(self, mode).ok()?.hash(level);
         }
         mode.parse::<Maze2dMode>().ok()?.map.fingerprint(level)
     }

@@ -60,6 +60,15 @@ fn assert_reads_back(game: &dyn Game, mode: &str, request: &LevelRequest, folder
     );
 }
 
+/// As [`assert_reads_back`] for a game of mazes, and for agents that see rays, each with so many ticks.
+fn assert_mazes_read_back(games: [(&dyn Game, usize); 2], mode: &str, level: u64, seed: u64) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let request = LevelRequest { map: Some(mode), seed: Some(level), ..LevelRequest::default() };
+    for (game, ticks) in games {
+        assert_reads_back(game, mode, &request, folder.path(), seed, ticks);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
@@ -84,10 +93,7 @@ proptest! {
         ]),
         seed in 0u64..1000,
     ) {
-        let folder = tempfile::tempdir().expect("a folder");
-        let request = LevelRequest { map: Some(mode), seed: Some(level), ..LevelRequest::default() };
-        assert_reads_back(&MAZE2D, mode, &request, folder.path(), seed, 80);
-        assert_reads_back(&Maze2dWithRays::default(), mode, &request, folder.path(), seed, 20);
+        assert_mazes_read_back([(&MAZE2D, 80), (&Maze2dWithRays::default(), 20)], mode, level, seed);
     }
 
     #[test]
@@ -101,10 +107,7 @@ proptest! {
         ]),
         seed in 0u64..1000,
     ) {
-        let folder = tempfile::tempdir().expect("a folder");
-        let request = LevelRequest { map: Some(mode), seed: Some(level), ..LevelRequest::default() };
-        assert_reads_back(&AntMaze, mode, &request, folder.path(), seed, 20);
-        assert_reads_back(&AntMazeWithRays::default(), mode, &request, folder.path(), seed, 5);
+        assert_mazes_read_back([(&AntMaze, 20), (&AntMazeWithRays::default(), 5)], mode, level, seed);
     }
 }
 

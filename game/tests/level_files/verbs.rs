@@ -17,7 +17,7 @@ fn write(folder: &Path, name: &str, level: &Value) {
     fs::write(path, serde_json::to_string_pretty(level).expect("text")).expect("writable");
 }
 
-/// Puts rock around the coin, but not into it.
+/// Puts walls of the level's whole height on both sides of the coin.
 fn wall_in(level: &mut Value) {
     let coin = level["coin"][0].as_u64().expect("a number") as usize;
     for row in level["rows"].as_array_mut().expect("rows") {

@@ -12,19 +12,18 @@ pub use bevy_playbot::episode::EpisodeResult;
 pub use summary::{EvalSummary, error_over_levels, summarize};
 
 use crate::{
-    arrangement::Arrangement, game::Game, parallel::on_threads, split::LevelSplit, train::Experiment,
-    worlds::build_observing_world,
+    arrangement::Arrangement, ended_episodes::EndedEpisodes, game::Game, parallel::on_threads, split::LevelSplit,
+    train::Experiment, worlds::build_observing_world,
 };
 use bevy_playbot::{
     agent::Agent,
     bot::BlindBot,
     control::Control,
-    episode::{Episode, EpisodeEnded},
+    episode::Episode,
     fault::Fault,
     headless::tick_world,
     level::LevelQueue,
     policy::{ActionDraw, ActivePolicy},
-    renewal::Renewal,
     skill_prior::SkillPrior,
     vision::{ObservationConfig, VisionError},
 };
@@ -132,14 +131,6 @@ pub struct Trail {
     pub places: Vec<Vec2>,
 }
 
-#[derive(Resource, Default, Reflect)]
-#[reflect(Resource)]
-struct Results(Vec<(Entity, EpisodeResult)>);
-
-fn note_result(event: On<EpisodeEnded>, mut results: ResMut<Results>) {
-    results.0.push((event.entity, event.result));
-}
-
 /// Plays every level of the plan and returns all episodes, sorted by level. `progress` hears each finished episode; it
 /// is called from several threads.
 ///
@@ -207,11 +198,7 @@ fn build_eval_world(
         if matches!(player, Player::Policy { .. }) { plan.observation_config } else { ObservationConfig::default() };
     let (mut world, agents) =
         build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
-    Renewal::set_up(&mut world, |world| {
-        world.init_resource::<Results>();
-        world.add_observer(note_result);
-    });
-    Renewal::carry_resource::<Results>(&mut world);
+    EndedEpisodes::note_in(&mut world);
     let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
@@ -234,7 +221,7 @@ fn play_out(
     let mut trails = Vec::new();
     while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) {
         tick_world(world)?;
-        let ended = std::mem::take(&mut world.resource_mut::<Results>().0);
+        let ended = EndedEpisodes::take(world);
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {
             let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
             let is_seen = is_playing || ended.iter().any(|(entity, _)| *entity == agent);

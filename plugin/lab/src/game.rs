@@ -10,7 +10,7 @@ use crate::{
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
-    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
+    level_files::{LevelDesign, LevelDesigns, LevelFileError, LevelTextError, is_level_files},
     mode::ModeError,
     proof::LevelProof,
 };
@@ -49,7 +49,7 @@ pub trait Game: Send + Sync {
     /// [`ModeError`] with what is valid.
     fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
         if is_level_files(mode) {
-            LevelDesigns::read(self.name(), mode, &|text| self.parse_level(text))?;
+            read_level_designs(self, mode)?;
             return Ok(());
         }
         let valid = self.modes();
@@ -68,7 +68,7 @@ pub trait Game: Send + Sync {
         if !is_level_files(mode) {
             return None;
         }
-        LevelDesigns::of(self.name(), mode, &|text| self.parse_level(text)).ok()?.hash(level)
+        level_designs(self, mode).ok()?.hash(level)
     }
 
     /// Reads a level that somebody drew, in the game's own format. Worlds of level files have what was read as the resource
@@ -265,4 +265,22 @@ pub trait Game: Send + Sync {
             has_picture: self.picture().is_some() || self.has_camera(),
         }
     }
+}
+
+/// The level files of a mode, as they were when they were read last: [`LevelDesigns::of`] this game.
+///
+/// # Errors
+///
+/// The mode names no files, or one of them cannot be read or is no level of this game.
+pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
+    LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text))
+}
+
+/// The level files of a mode, as they are on disk now: [`LevelDesigns::read`] for this game.
+///
+/// # Errors
+///
+/// As for [`level_designs`].
+pub fn read_level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
+    LevelDesigns::read(game.name(), mode, &|text| game.parse_level(text))
 }

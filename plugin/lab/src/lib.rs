@@ -23,6 +23,7 @@ pub mod detector;
 pub mod detectors;
 pub mod doctor;
 pub mod drawing;
+mod ended_episodes;
 mod escape;
 pub mod eval;
 pub mod experiment_text;

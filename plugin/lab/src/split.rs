@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{
-    game::Game,
-    level_files::{LevelDesigns, LevelFileError, find_level_files, is_level_files, level_file_pattern},
+    game::{Game, level_designs},
+    level_files::{LevelFileError, find_level_files, is_level_files, level_file_pattern},
     mode::ModeError,
 };
 
@@ -60,7 +60,7 @@ impl LevelSplit {
         if !is_level_files(&self.mode) {
             return Ok(());
         }
-        let count = LevelDesigns::of(game.name(), &self.mode, &|text| game.parse_level(text))?.count();
+        let count = level_designs(game, &self.mode)?.count();
         if self.last < count {
             return Ok(());
         }

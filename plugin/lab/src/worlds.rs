@@ -13,8 +13,8 @@ use bevy_playbot::{
 };
 
 use crate::{
-    game::Game,
-    level_files::{LevelDesigns, is_level_files},
+    game::{Game, level_designs},
+    level_files::is_level_files,
     sensors::GameSensors,
     stage_clock::{self, StageClock},
 };
@@ -102,7 +102,7 @@ pub fn add_game(
         faults.report(problem);
     }
     if is_level_files(mode) {
-        match LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text)) {
+        match level_designs(game, mode) {
             Ok(designs) => {
                 app.insert_resource(designs.files()).insert_resource(designs);
             }

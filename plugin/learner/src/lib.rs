@@ -53,7 +53,7 @@ mod spec;
 
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
-pub use file::write_atomically;
+pub use file::{write_atomically, write_atomically_with};
 pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;
 pub use observation::{ImageShape, ObsKind, ObsSlice, Observations, PictureCard};

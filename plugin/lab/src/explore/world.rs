@@ -1,13 +1,7 @@
 //! A World in which agents make visits.
 
 use bevy::prelude::*;
-use bevy_playbot::{
-    control::Control,
-    episode::{EpisodeEnded, EpisodeResult},
-    headless::tick_world,
-    renewal::Renewal,
-    vision::VisionError,
-};
+use bevy_playbot::{control::Control, headless::tick_world, vision::VisionError};
 use playbot_learner::Streams;
 
 use super::{
@@ -18,16 +12,7 @@ use super::{
     plan::ExplorePlan,
     visit::{Draws, Visit, Visited},
 };
-use crate::{game::Game, worlds::build_observing_world};
-
-/// Episodes that ended in this tick.
-#[derive(Resource, Default, Reflect)]
-#[reflect(Resource)]
-struct Ended(Vec<(Entity, EpisodeResult)>);
-
-fn note_end(event: On<EpisodeEnded>, mut ended: ResMut<Ended>) {
-    ended.0.push((event.entity, event.result));
-}
+use crate::{ended_episodes::EndedEpisodes, game::Game, worlds::build_observing_world};
 
 /// Some arenas of an exploration.
 pub(super) struct ExploreWorld<'a> {
@@ -54,11 +39,7 @@ impl<'a> ExploreWorld<'a> {
         count: u32,
     ) -> Result<Self, VisionError> {
         let (mut world, agents) = build_observing_world(game, &plan.mode, &plan.observation_config, 0, first, count)?;
-        Renewal::set_up(&mut world, |world| {
-            world.init_resource::<Ended>();
-            world.add_observer(note_end);
-        });
-        Renewal::carry_resource::<Ended>(&mut world);
+        EndedEpisodes::note_in(&mut world);
         plan.explorer.install(&mut world);
         let draws = Draws {
             streams: Streams::new(plan.seed),
@@ -105,7 +86,7 @@ impl<'a> ExploreWorld<'a> {
                 return Ok(done);
             }
             tick_world(&mut self.world)?;
-            let ended = std::mem::take(&mut self.world.resource_mut::<Ended>().0);
+            let ended = EndedEpisodes::take(&mut self.world);
             for (visit, &agent) in visits.iter_mut().zip(&self.agents) {
                 let Some(running) = visit.as_mut() else { continue };
                 let end = ended.iter().find(|(entity, _)| *entity == agent).map(|(_, result)| *result);

@@ -17,8 +17,8 @@ use super::{
 };
 use crate::{
     eval::Player,
-    game::Game,
-    level_files::{LevelDesigns, is_level_files, level_files_mode},
+    game::{Game, level_designs},
+    level_files::{is_level_files, level_files_mode},
 };
 
 /// Where findings are written, and which.
@@ -153,7 +153,7 @@ fn by(head: FindingHead, played: Played) -> FindingHead {
 fn alone(game: &dyn Game, level: SeenLevel) -> (String, u64) {
     if is_level_files(level.mode) {
         let mode = level_files_mode(level.name);
-        if LevelDesigns::of(game.name(), &mode, &|text| game.parse_level(text)).is_ok() {
+        if level_designs(game, &mode).is_ok() {
             return (mode, 0);
         }
     }

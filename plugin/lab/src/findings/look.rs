@@ -8,7 +8,7 @@ use super::{
     play::{Replayed, play_actions},
     solo::Setting,
 };
-use crate::level_files::{LevelDesigns, is_level_files};
+use crate::{game::level_designs, level_files::is_level_files};
 
 /// What was seen.
 pub(super) struct Look {
@@ -25,8 +25,7 @@ pub(super) fn look(setting: Setting, head: &FindingHead, actions: &[ActionValue]
     match check {
         Check::Level(is_there) => {
             let Setting { game, mode, level, .. } = setting;
-            let designs =
-                is_level_files(mode).then(|| LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text)).ok());
+            let designs = is_level_files(mode).then(|| level_designs(game, mode).ok());
             let level_file = designs.flatten().and_then(|designs| designs.files().of(level).cloned());
             let replayed = Replayed { level_file, ..Replayed::default() };
             Look { is_there: is_there(game, mode, level), tick: None, replayed }

@@ -5,8 +5,8 @@ use thiserror::Error;
 
 use super::stored::StoredFinding;
 use crate::{
-    game::Game,
-    level_files::{LevelDesigns, is_level_files},
+    game::{Game, read_level_designs},
+    level_files::is_level_files,
 };
 
 /// Why a finding cannot be played again, in words.
@@ -44,7 +44,7 @@ impl StoredFinding {
         if !is_level_files(&header.mode) {
             return game.check_mode(&header.mode).map_err(gone);
         }
-        let designs = LevelDesigns::read(game.name(), &header.mode, &|text| game.parse_level(text)).map_err(gone)?;
+        let designs = read_level_designs(game, &header.mode).map_err(gone)?;
         match &episode.level_file {
             Some(file) => {
                 designs.files().difference(episode.level_seed, file).map_or(Ok(()), |what| Err(Unplayable(what)))

@@ -4,12 +4,11 @@ use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionValue},
     control::Control,
-    episode::{Episode, EpisodeEnded, EpisodeResult},
+    episode::{Episode, EpisodeResult},
     headless::tick_world,
     level::LevelQueue,
     level_files::{LevelFile, LevelFiles},
     panics::PanicReports,
-    renewal::Renewal,
     reward::Reward,
     state_hash::StateHash,
     streams::EpisodeSeeds,
@@ -17,19 +16,10 @@ use bevy_playbot::{
 };
 
 use super::{breakage::Breakage, moment::Moment};
-use crate::{eval::Player, game::Game, worlds::build_observing_world};
+use crate::{ended_episodes::EndedEpisodes, eval::Player, game::Game, worlds::build_observing_world};
 
 /// Ticks after which an episode counts as one that never ends, as in tests of levels.
 const MOST_TICKS: u32 = 1_000_000;
-
-/// What came of the only episode.
-#[derive(Resource, Default, Reflect)]
-#[reflect(Resource)]
-struct SoloEnd(Option<EpisodeResult>);
-
-fn note_end(event: On<EpisodeEnded>, mut end: ResMut<SoloEnd>) {
-    end.0 = Some(event.result);
-}
 
 /// Which episode is played.
 #[derive(Clone, Copy)]
@@ -59,11 +49,7 @@ impl<'a> Solo<'a> {
     pub fn new(setting: Setting<'a>, observation_config: &ObservationConfig) -> Result<Self, VisionError> {
         let Setting { game, mode, level, seed } = setting;
         let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
-        Renewal::set_up(&mut world, |world| {
-            world.init_resource::<SoloEnd>();
-            world.add_observer(note_end);
-        });
-        Renewal::carry_resource::<SoloEnd>(&mut world);
+        EndedEpisodes::note_in(&mut world);
         if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
             // The finding is the report.
             reports.keep_no_files();
@@ -114,7 +100,7 @@ impl<'a> Solo<'a> {
 
     /// What came of the episode, once it is over.
     pub fn end(&self) -> Option<EpisodeResult> {
-        self.world.get_resource::<SoloEnd>()?.0
+        EndedEpisodes::of(&self.world).last().map(|(_, result)| *result)
     }
 
     /// What the agent did in the last tick.

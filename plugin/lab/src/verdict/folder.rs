@@ -11,8 +11,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_learner::write_atomically_with;
+
 use super::{
-    atomic::write_in_pieces,
     error::{TestError, io_error},
     journal::{JOURNAL, Journal},
     level_verdict::LevelVerdict,
@@ -71,7 +72,7 @@ impl TestFolder {
             clear_findings(path)?;
             journal.clear()?;
             let text = serde_json::to_string(record).map_err(io::Error::from);
-            let written = text.and_then(|text| write_in_pieces(&record_file, |file| write_line(file, &text)));
+            let written = text.and_then(|text| write_atomically_with(&record_file, |file| write_line(file, &text)));
             written.map_err(io_error("write", &record_file))?;
         }
         let message = (goes_on && cut > 0).then(|| {
@@ -101,7 +102,7 @@ impl TestFolder {
     /// It cannot be written; the levels are still kept.
     pub fn finish(&mut self) -> Result<(), TestError> {
         let path = self.path.join(RESULTS);
-        let written = write_in_pieces(&path, |file| {
+        let written = write_atomically_with(&path, |file| {
             let mut results = ResultWriter::begin(file, &self.record)?;
             self.journal.in_order(|line| results.push(line))?;
             results.end()

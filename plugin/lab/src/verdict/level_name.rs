@@ -3,7 +3,7 @@
 use bevy_playbot::state_hash::StateHash;
 
 use crate::{
-    game::Game,
+    game::{Game, level_designs},
     level_files::{LevelDesigns, is_level_files, level_files_mode},
     split::LevelSplit,
 };
@@ -32,7 +32,7 @@ pub fn hash_of_files(game: &dyn Game, split: &LevelSplit) -> Option<String> {
 
 fn drawn(game: &dyn Game, split: &LevelSplit) -> Option<LevelDesigns> {
     let is_drawn = is_level_files(&split.mode);
-    is_drawn.then(|| LevelDesigns::of(game.name(), &split.mode, &|text| game.parse_level(text)).ok()).flatten()
+    is_drawn.then(|| level_designs(game, &split.mode).ok()).flatten()
 }
 
 #[cfg(test)]

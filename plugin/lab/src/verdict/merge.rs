@@ -5,8 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_learner::write_atomically_with;
+
 use super::{
-    atomic::write_in_pieces,
     error::{TestError, io_error},
     plan::TestRecord,
     results::{RESULTS, ResultLines, ResultWriter},
@@ -64,7 +65,7 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
     let path = out.join(RESULTS);
     // The writer knows errors of the system alone.
     let mut damaged = None;
-    let written = write_in_pieces(&path, |file| {
+    let written = write_atomically_with(&path, |file| {
         let mut results = ResultWriter::begin(file, record)?;
         for index in 0..record.range.len() {
             match shards[(index % count) as usize].line_of(index) {

@@ -7,7 +7,6 @@
 //! - [`merge()`] joins the results of shards to those of the whole range, byte for byte.
 //! - [`Comparison`] tells what has changed since earlier results, and what is noise.
 
-mod atomic;
 mod change;
 mod compare;
 mod defects;
@@ -34,8 +33,8 @@ mod rerun;
 mod results;
 mod run;
 mod shard;
-mod stage;
 mod summary;
+mod test_world;
 mod tester;
 #[cfg(test)]
 mod testing;

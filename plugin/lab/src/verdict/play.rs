@@ -4,7 +4,7 @@ use bevy_playbot::vision::VisionError;
 
 use super::{
     played::{Interruption, Played, PlayedEnd, Task, Watch},
-    stage::Stage,
+    test_world::TestWorld,
     tester::Tester,
 };
 use crate::game::Game;
@@ -27,12 +27,12 @@ pub(super) fn play_tasks(
     let mut played: Vec<Option<Played>> = vec![None; tasks.len()];
     let mut waiting: Vec<usize> = (0..tasks.len()).collect();
     while !waiting.is_empty() {
-        let mut stage = Stage::build(game, mode, tester, tasks, &waiting)?;
-        match stage.play_out(game, &mut played, watch) {
+        let mut test_world = TestWorld::build(game, mode, tester, tasks, &waiting)?;
+        match test_world.play_out(game, &mut played, watch) {
             Ok(()) => {}
             Err(Interruption::Stopped) => return Ok(None),
             Err(Interruption::Broken { .. }) => {
-                for suspect in stage.suspects() {
+                for suspect in test_world.suspects() {
                     let Some(alone) = play_alone(game, mode, tester, tasks[suspect], watch)? else { return Ok(None) };
                     played[suspect] = Some(alone);
                 }
@@ -51,17 +51,17 @@ fn play_alone(
     task: Task,
     watch: &Watch,
 ) -> Result<Option<Played>, VisionError> {
-    let mut stage = Stage::build(game, mode, tester, &[task], &[0])?;
+    let mut test_world = TestWorld::build(game, mode, tester, &[task], &[0])?;
     let mut played = [None];
-    let end = match stage.play_out(game, &mut played, watch) {
+    let end = match test_world.play_out(game, &mut played, watch) {
         Ok(()) => return Ok(played[0].take()),
         Err(Interruption::Stopped) => return Ok(None),
         Err(Interruption::Broken { detector, message }) => {
             (watch.progress)(1);
-            let (tick, message) = stage.without_moment(&message);
+            let (tick, message) = test_world.without_moment(&message);
             PlayedEnd::Broken { detector, tick, message }
         }
     };
-    let found = std::mem::take(&mut stage.found);
-    Ok(Some(Played { end, exact: stage.is_untouched(0, task.seed), found }))
+    let found = std::mem::take(&mut test_world.found);
+    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found }))
 }

@@ -5,6 +5,6 @@ mod header;
 mod network;
 mod tensor_file;
 
-pub use atomic::write_atomically;
+pub use atomic::{write_atomically, write_atomically_with};
 pub(crate) use header::FileKind;
 pub(crate) use tensor_file::TensorFile;

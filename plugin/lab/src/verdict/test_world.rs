@@ -4,11 +4,10 @@ use bevy::prelude::*;
 use bevy_playbot::{
     agent::Agent,
     control::Control,
-    episode::{Episode, EpisodeEnded, EpisodeResult},
+    episode::Episode,
     headless::tick_world,
     level::LevelQueue,
     panics::PanicReports,
-    renewal::Renewal,
     streams::{AgentStreams, EpisodeSeeds},
     vision::{ObservationConfig, VisionError},
 };
@@ -18,7 +17,9 @@ use super::{
     tester::Tester,
     watched::Watched,
 };
-use crate::{arrangement::at_most, eval::Player, game::Game, worlds::build_observing_world};
+use crate::{
+    arrangement::at_most, ended_episodes::EndedEpisodes, eval::Player, game::Game, worlds::build_observing_world,
+};
 
 /// Most arenas of a World. It changes no result.
 const MOST_ARENAS: usize = 16;
@@ -26,14 +27,6 @@ const MOST_ARENAS: usize = 16;
 const MOST_TICKS: u32 = 1_000_000;
 /// How a game's panic is told, behind where it was.
 const PANICKED: &str = "the game panicked: ";
-
-#[derive(Resource, Default, Reflect)]
-#[reflect(Resource)]
-struct EndedEpisodes(Vec<(Entity, EpisodeResult)>);
-
-fn note_end(event: On<EpisodeEnded>, mut ended: ResMut<EndedEpisodes>) {
-    ended.0.push((event.entity, event.result));
-}
 
 /// An agent and what it plays, in this order.
 struct Seat {
@@ -44,14 +37,14 @@ struct Seat {
 }
 
 /// The World and who plays in it.
-pub(super) struct Stage {
+pub(super) struct TestWorld {
     world: World,
     seats: Vec<Seat>,
     /// What was found in the only episode, if it broke the World.
     pub found: Vec<EpisodeFinding>,
 }
 
-impl Stage {
+impl TestWorld {
     /// A World for the tasks that wait, shared out evenly over its agents.
     pub fn build(
         game: &dyn Game,
@@ -66,11 +59,7 @@ impl Stage {
         let count = at_most(game, MOST_ARENAS.min(waiting.len()));
         // Agents have the seeds of their episodes; that of the World is left to the game, and always the same.
         let (mut world, agents) = build_observing_world(game, mode, &observation_config, 0, 0, count as u32)?;
-        Renewal::set_up(&mut world, |world| {
-            world.init_resource::<EndedEpisodes>();
-            world.add_observer(note_end);
-        });
-        Renewal::carry_resource::<EndedEpisodes>(&mut world);
+        EndedEpisodes::note_in(&mut world);
         if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
             // The episode can be played again by its level and its seed.
             reports.keep_no_files();
@@ -110,7 +99,7 @@ impl Stage {
                 return Err(Interruption::Broken { detector, message });
             }
             // Whose it is shows when each plays alone.
-            if let Some((detector, message)) = watched.look(&self.world, &self.world.resource::<EndedEpisodes>().0) {
+            if let Some((detector, message)) = watched.look(&self.world, EndedEpisodes::of(&self.world)) {
                 return Err(Interruption::Broken { detector, message });
             }
             self.note_ends(game, played, watch, &mut watched);
@@ -124,7 +113,7 @@ impl Stage {
     }
 
     fn note_ends(&mut self, game: &dyn Game, played: &mut [Option<Played>], watch: &Watch, watched: &mut Watched) {
-        let ended = std::mem::take(&mut self.world.resource_mut::<EndedEpisodes>().0);
+        let ended = EndedEpisodes::take(&mut self.world);
         for (agent, result) in ended {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let Some(&(task, seed)) = self.seats[seat].tasks.get(self.seats[seat].done) else { continue };
@@ -147,7 +136,7 @@ impl Stage {
     /// The tasks one of which may have broken the World: those that were being played or have just ended, or else those
     /// that would be next.
     pub fn suspects(&self) -> Vec<usize> {
-        let ended = self.world.get_resource::<EndedEpisodes>().map_or(&[][..], |ended| ended.0.as_slice());
+        let ended = EndedEpisodes::of(&self.world);
         let is_begun =
             |seat: &&Seat| is_playing(&self.world, seat.agent) || ended.iter().any(|(agent, _)| *agent == seat.agent);
         let task = |seat: &Seat| seat.tasks.get(seat.done).map(|(task, _)| *task);
