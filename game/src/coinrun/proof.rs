@@ -6,16 +6,15 @@ use playbot_lab::proof::LevelProof;
 
 use super::{level::Level, planner::coin_is_unreachable, sim::Sim};
 
-/// Unsolvable where [`coin_is_unreachable`] says so of the level's start: a search that allows more than the rules do has
-/// ended without the coin. Nothing is proved of other levels, since that search does not know hazards, time and momentum.
+/// Unsolvable where [`coin_is_unreachable`] says so of the level's start: a search that allows all that the rules do, and
+/// more, has ended without the coin. Nothing is proved of other levels, since that search knows neither enemies nor time.
 pub(super) fn prove(level: Arc<Level>) -> LevelProof {
     if !coin_is_unreachable(&Sim::new(level)) {
         return LevelProof::Unknown;
     }
-    let why =
-        "the coin cannot be reached: a search over all cells, in which nothing kills and every place may give support \
-               for a whole jump, ended without it"
-            .to_owned();
+    let why = "the coin cannot be reached: a search through all that the rules allow, in which enemies do no harm and time is \
+               never up, ended without it"
+        .to_owned();
     LevelProof::Unsolvable { why }
 }
 

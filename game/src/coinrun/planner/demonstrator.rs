@@ -1,6 +1,6 @@
 //! A player that follows plans and makes a new one whenever something else happened.
 
-use super::{config::PlannerConfig, plan::plan_or_progress, reach::coin_is_unreachable, search::Found};
+use super::{config::PlannerConfig, plan::plan_or_progress, search::Found};
 use crate::coinrun::sim::Sim;
 
 /// An actor in a closed loop: ask it for an action, play that action or another one, ask again.
@@ -52,8 +52,8 @@ impl Demonstrator {
         self.replans += 1;
         let (found, _) = plan_or_progress(sim, &self.config);
         // Otherwise every tick would be searched again to the end.
-        self.is_hopeless = matches!(found, Found::Progress(_)) && coin_is_unreachable(sim);
-        let (Found::Coin(mut actions) | Found::Progress(mut actions)) = found;
+        self.is_hopeless = matches!(found, Found::Hopeless(_));
+        let (Found::Coin(mut actions) | Found::Progress(mut actions) | Found::Hopeless(mut actions)) = found;
         actions.reverse();
         self.actions = actions;
     }

@@ -31,35 +31,37 @@ pub fn plan(sim: &Sim, config: &PlannerConfig) -> Plan {
     }
     match plan_or_progress(sim, config) {
         (Found::Coin(actions), _) => Plan::Found(actions),
-        (Found::Progress(_), _) if coin_is_unreachable(sim) => Plan::ProvedUnsolvable,
+        (Found::Hopeless(_), _) => Plan::ProvedUnsolvable,
         (Found::Progress(_), expansions) => Plan::GaveUp { expansions },
     }
 }
 
-/// Searches with the whole margin, with half of it, and at last by the exact rules alone.
+/// Searches with the whole margin, with half of it, and at last by the exact rules alone, unless there is no way at all.
 pub(super) fn plan_or_progress(sim: &Sim, config: &PlannerConfig) -> (Found, usize) {
-    let mut expansions = 0;
-    let mut attempts = Vec::new();
+    let exact = PlannerConfig { margin: 0.0, caution: 0.0, ..*config };
+    let mut attempts = vec![exact];
     if config.margin > 0.0 || config.caution > 0.0 {
-        let margin = config.margin / 2.0;
-        let max_expansions = config.max_cautious_expansions;
-        attempts.push(PlannerConfig { max_expansions, ..*config });
-        attempts.push(PlannerConfig { max_expansions, margin, ..*config });
+        let cautious = PlannerConfig { max_expansions: config.max_cautious_expansions, ..*config };
+        let less_cautious = PlannerConfig { margin: config.margin / 2.0, ..cautious };
+        attempts = vec![cautious, less_cautious, exact];
     }
-    for attempt in attempts {
-        let (found, more) = search(sim, &attempt, &COARSE);
-        expansions += more;
-        if matches!(found, Found::Coin(_)) {
-            return (found, expansions);
+    let mut all = 0;
+    for (number, attempt) in attempts.iter().enumerate() {
+        let (found, expansions) = search(sim, attempt, &COARSE);
+        all += expansions;
+        match found {
+            // The proof takes no longer than a short search, and saves the long ones.
+            Found::Progress(actions) if number == 0 && coin_is_unreachable(sim) => {
+                return (Found::Hopeless(actions), all);
+            }
+            Found::Progress(actions) if number + 1 == attempts.len() && expansions == config.max_expansions => {
+                return (Found::Progress(actions), all);
+            }
+            Found::Progress(_) => {}
+            found => return (found, all),
         }
     }
-    let exact = PlannerConfig { margin: 0.0, caution: 0.0, ..*config };
-    let (found, more) = search(sim, &exact, &COARSE);
-    expansions += more;
     // Few states mean that the player is in a tight spot, not that the way is long.
-    if matches!(found, Found::Progress(_)) && more < config.max_expansions {
-        let (found, more) = search(sim, &exact, &FINE);
-        return (found, expansions + more);
-    }
-    (found, expansions)
+    let (found, expansions) = search(sim, &exact, &FINE);
+    (found, all + expansions)
 }

@@ -51,6 +51,8 @@ pub(super) enum Found {
     Coin(Vec<u8>),
     /// Actions to the most promising state that was seen.
     Progress(Vec<u8>),
+    /// The same, where it is proved that nothing leads to the coin.
+    Hopeless(Vec<u8>),
 }
 
 /// How a node was reached: the held action, for how long, and from where.

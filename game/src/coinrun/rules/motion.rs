@@ -37,14 +37,14 @@ pub(super) fn advance(body: &mut Body, x_first: bool, mut displace: impl FnMut(&
 
 /// Number of equal parts of a step: four per tile of speed, at least four.
 #[inline]
-fn part_count(vx: f32, vy: f32) -> u32 {
+pub(in crate::coinrun) fn part_count(vx: f32, vy: f32) -> u32 {
     let speed = (vx * vx + vy * vy).sqrt();
     ((4.0 * speed) as u32).max(4)
 }
 
 /// The corners of `body` that are tested against tiles, if its centre were at (x, y).
 #[inline]
-pub(super) fn corners(body: &Body, x: f32, y: f32) -> Corners {
+pub(in crate::coinrun) fn corners(body: &Body, x: f32, y: f32) -> Corners {
     let (rx, ry) = (body.rx * CORNER, body.ry * CORNER);
     Corners { left: x - rx, right: x + rx, low: y - ry, high: y + ry }
 }
@@ -52,7 +52,7 @@ pub(super) fn corners(body: &Body, x: f32, y: f32) -> Corners {
 /// The centre of a body of half size `half` that was stopped on its way to `centre`: flush with
 /// the tile edge in front of it.
 #[inline]
-pub(super) fn flush(centre: f32, half: f32, moves_up: bool) -> f32 {
+pub(in crate::coinrun) fn flush(centre: f32, half: f32, moves_up: bool) -> f32 {
     if moves_up { (centre + half).floor() - half } else { (centre - half).ceil() + half }
 }
 

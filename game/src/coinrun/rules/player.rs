@@ -8,7 +8,7 @@ use super::motion::{advance, corners, flush};
 use crate::coinrun::tile::TileGrid;
 
 /// How often a crate may pass the player on to another crate within one displacement.
-const MAX_PUSHES: u32 = 5;
+pub(in crate::coinrun) const MAX_PUSHES: u32 = 5;
 
 /// What a player remembers from step to step besides its [`Body`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -100,7 +100,7 @@ fn walk(vx: f32, ax: i8, supported: bool) -> f32 {
 
 /// A jump sets the vertical velocity; otherwise gravity acts, and "down" on the ground adds to it.
 #[inline]
-fn fall(vy: f32, ay: i8, supported: bool) -> f32 {
+pub(in crate::coinrun) fn fall(vy: f32, ay: i8, supported: bool) -> f32 {
     if ay > 0 {
         return JUMP_SPEED;
     }
@@ -187,7 +187,7 @@ fn land_on_crates(
 
 /// The displacement that puts the player flush on the side of `block` on which its centre is. The
 /// sum is exact before it is rounded to f32.
-fn rise_to_top(player: &Body, block: &Body) -> f32 {
+pub(in crate::coinrun) fn rise_to_top(player: &Body, block: &Body) -> f32 {
     let reach = f64::from(block.ry + player.ry);
     let side = match player.y - block.y {
         above if above > 0.0 => reach,

@@ -1,0 +1,230 @@
+//! The search: from state to state until there is nothing new.
+
+use std::collections::HashMap;
+
+use super::{
+    bins::Bins,
+    ground::Ground,
+    loose::{self, Loose},
+    state::{Exact, State},
+    step::step,
+};
+use crate::coinrun::{rules::corners, sim::Sim};
+
+/// The search gives up after so many steps; levels need some thousands.
+const MOST_STEPS: usize = 100_000;
+
+/// Whether no sequence of actions whatever leads from the state of `sim` to the coin.
+///
+/// `true` is a proof, `false` says nothing. The search follows heights and vertical speeds exactly until walls stop a step
+/// half-way, and places along x by an eighth of a tile, within which everything counts as possible; the player may turn at
+/// full speed. It knows walls, crates, lava and saws, and neither enemies nor the time.
+pub fn coin_is_unreachable(sim: &Sim) -> bool {
+    let (level, player, memory) = (sim.level(), sim.player(), sim.player_state());
+    if level.tiles.blocks_player(&corners(player, player.x, player.y)) {
+        // Who starts in a wall moves as nobody else.
+        return false;
+    }
+    let mut ground = Ground::new(level);
+    let mut known = Known::default();
+    let is_held = memory.on_crate || memory.lent_support;
+    let start = State::Exact(Exact { y: player.y, vy: player.vy + 0.0, is_held });
+    let mut open = vec![(start, Bins::at(player.x))];
+    let mut after = Vec::new();
+    for _ in 0..MOST_STEPS {
+        let Some((state, places)) = open.pop() else { return true };
+        match state {
+            State::Exact(state) => step(&mut ground, state, places, &mut after),
+            State::Loose(state) => loose::step(&mut ground, state, places, &mut after),
+        }
+        for (next, places) in after.drain(..) {
+            let touched = match next {
+                State::Exact(state) => ground.touched(state.y),
+                State::Loose(state) => loose::touched(&mut ground, state.level),
+            };
+            if !(places & touched.coin).is_empty() {
+                return false;
+            }
+            let new = known.add(next, places & touched.alive);
+            if !new.is_empty() {
+                open.push((next, new));
+            }
+        }
+    }
+    false
+}
+
+/// Where the search has been.
+#[derive(Default)]
+struct Known {
+    exact: HashMap<(u32, u32, bool), Bins>,
+    loose: HashMap<Loose, Bins>,
+}
+
+impl Known {
+    /// Adds places; those that are new.
+    fn add(&mut self, state: State, places: Bins) -> Bins {
+        let known = match state {
+            State::Exact(state) => self.exact.entry(state.key()).or_default(),
+            State::Loose(state) => {
+                // Whoever may rise faster may do the same.
+                let faster =
+                    (state.lift + 1..=loose::FASTEST).filter_map(|lift| self.loose.get(&Loose { lift, ..state }));
+                let covered = faster.fold(Bins::NONE, |covered, places| covered | *places);
+                let known = self.loose.entry(state).or_default();
+                *known |= covered & places;
+                known
+            }
+        };
+        let new = places & !*known;
+        *known |= places;
+        new
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use crate::coinrun::{
+        generator::generate,
+        level::{Level, LevelParts, Mode},
+        planner::{Plan, PlannerConfig, plan},
+        rules::{CORNER, FOOT_MARGIN, PLAYER_HALF_WIDTH},
+        spawn::Spawn,
+        tile::{Tile, TileGrid},
+    };
+
+    fn start(text: &str) -> Sim {
+        Sim::new(Arc::new(Level::from_text(text).expect("a valid picture")))
+    }
+
+    /// A level with a wall of this height between the start and the coin.
+    fn tower(height: usize) -> String {
+        let rows = "#...#.....#\n".repeat(height - 1);
+        format!("#.........#\n{rows}#A..#....C#\n#=========#\n")
+    }
+
+    /// A level with a pit of this width and depth on the way to the coin.
+    fn pit(width: usize, bottom: &str) -> String {
+        let row =
+            |ground: &str, gap: &str| format!("#{}{}{}#\n", ground.repeat(12), gap.repeat(width), ground.repeat(4));
+        let air = row(".", ".").repeat(9);
+        let coin = format!("#{}{}..C.#\n", ".".repeat(12), ".".repeat(width));
+        // The start is at the bottom; steps lead up to the pit's edge.
+        let steps = |free: usize| format!("#{}{}{}====#\n", ".".repeat(free), "=".repeat(12 - free), ".".repeat(width));
+        let start = format!("#A..={}{}====#\n", "=".repeat(8), bottom.repeat(width));
+        let bottom = format!("#{}#\n", "=".repeat(16 + width));
+        [air, coin, steps(8).repeat(4), steps(4).repeat(4), start, bottom].concat()
+    }
+
+    #[test]
+    fn pits_are_jumped_up_to_the_longest_jump_and_not_beyond() {
+        // Nine tiles are too far, by less than what a bin may hide.
+        for width in 4..=14 {
+            let sims = ["^", "="].map(|bottom| start(&pit(width, bottom)));
+            match width {
+                ..9 => assert!(sims.iter().all(|sim| matches!(plan(sim, &PlannerConfig::default()), Plan::Found(_)))),
+                9 => {}
+                _ => assert!(sims.iter().all(coin_is_unreachable), "{width}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_tower_that_no_jump_clears_is_proved_and_a_low_one_is_jumped() {
+        assert!(coin_is_unreachable(&start(&tower(30))));
+        assert_eq!(plan(&start(&tower(30)), &PlannerConfig::default()), Plan::ProvedUnsolvable);
+        // A jump lifts by 6.4 tiles.
+        assert!(coin_is_unreachable(&start(&tower(7))));
+        assert!(matches!(plan(&start(&tower(6)), &PlannerConfig::default()), Plan::Found(_)));
+    }
+
+    #[test]
+    fn the_player_looks_for_support_where_walls_stop_it() {
+        let corner = PLAYER_HALF_WIDTH * CORNER;
+        assert_eq!(PLAYER_HALF_WIDTH - FOOT_MARGIN, corner);
+    }
+
+    #[test]
+    fn generated_levels_are_never_called_unsolvable() {
+        for seed in 0..150 {
+            for mode in [Mode::Easy, Mode::Hard] {
+                let sim = Sim::new(Arc::new(generate(mode, seed)));
+                assert!(!coin_is_unreachable(&sim), "{mode} {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_of_rock_keep_the_player_out_and_holes_let_it_in() {
+        let level = |upper: &str, lower: &str| {
+            let air = "#...............#\n".repeat(9);
+            let roof = "#......######...#\n".repeat(2);
+            start(&format!("{air}{roof}#......{upper}...#\n#A.....{lower}...#\n#======######===#\n"))
+        };
+        assert!(coin_is_unreachable(&level("##.C##", "##..##")));
+        assert!(coin_is_unreachable(&level("##.C..", "##..##")), "a hole too low to pass");
+        assert!(!coin_is_unreachable(&level("##.C..", "##....")));
+    }
+
+    /// A level of random walls, ledges, crates, saws and lava, with room at the start.
+    fn random_level(rng: &mut ChaCha8Rng) -> LevelParts {
+        let mut tiles = TileGrid::default();
+        tiles.fill(0, 0, 64, 1, Tile::WallTop);
+        tiles.fill(0, 0, 1, 64, Tile::Wall);
+        tiles.fill(20, 0, 44, 64, Tile::Wall);
+        let cell = |rng: &mut ChaCha8Rng| [rng.random_range(3..20), rng.random_range(1..16)];
+        for _ in 0..rng.random_range(0..16) {
+            let ([x, y], length) = (cell(rng), rng.random_range(1..6));
+            let tile = if rng.random_bool(0.1) { Tile::LavaTop } else { Tile::WallTop };
+            if rng.random_bool(0.6) { tiles.fill(x, y, length, 1, tile) } else { tiles.fill(x, y, 1, length, tile) }
+        }
+        let mut spawns: Vec<Spawn> =
+            (0..rng.random_range(0..6)).map(|_| Spawn::Crate { cell: cell(rng), sprite: 0 }).collect();
+        spawns.extend((0..rng.random_range(0..2)).map(|_| Spawn::Enemy { cell: cell(rng), dir: 1, sprite: 0 }));
+        spawns.extend((0..rng.random_range(0..2)).map(|_| Spawn::Saw(cell(rng))));
+        LevelParts { tiles, spawns, ..generate(Mode::Hard, 0).parts().clone() }
+    }
+
+    #[test]
+    fn wherever_somebody_got_is_not_called_unreachable() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (mut walks, mut proofs) = (0, 0);
+        for _ in 0..150 {
+            let mut parts = random_level(&mut rng);
+            let mut sim = Sim::new(Arc::new(Level::new(parts.clone())));
+            let (mut action, mut last) = (4, sim.clone());
+            for _ in 0..rng.random_range(20..400) {
+                if rng.random_bool(0.2) {
+                    action = rng.random_range(0..9);
+                }
+                sim.step(action);
+                if sim.end().is_some() {
+                    break;
+                }
+                last = sim.clone();
+            }
+            let cell = [last.x() as i32, last.y() as i32];
+            let before = sim.level().tiles.get(cell[0], cell[1]);
+            if before.is_wall() || cell == [1, 1] {
+                continue;
+            }
+            parts.tiles.set(cell[0], cell[1], Tile::Coin);
+            parts.coin = cell;
+            let level = Arc::new(Level::new(parts.clone()));
+            assert!(!coin_is_unreachable(&Sim::new(level.clone())), "{cell:?}\n{}", level.to_text());
+            walks += 1;
+            // Somewhere else.
+            parts.tiles.set(cell[0], cell[1], before);
+            parts.coin = [rng.random_range(2..20), rng.random_range(1..20)];
+            parts.tiles.set(parts.coin[0], parts.coin[1], Tile::Coin);
+            proofs += u32::from(coin_is_unreachable(&Sim::new(Arc::new(Level::new(parts)))));
+        }
+        assert!(walks > 100 && proofs > 10, "{walks} walks, {proofs} proofs");
+    }
+}

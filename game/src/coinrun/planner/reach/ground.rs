@@ -1,0 +1,212 @@
+//! What a level lets a player do at a height: where there is room, what is in the way, and what kills or is the coin.
+
+use std::{collections::HashMap, ops::RangeInclusive};
+
+use super::bins::{BINS, Bins};
+use crate::coinrun::{
+    level::Level,
+    rules::{Body, FOOT_MARGIN, OVERLAP_MARGIN, corners},
+    spawn::Spawn,
+    tile::{Corners, Tile},
+};
+
+/// Places are moved by so much where a bin is asked which columns it may touch: more than rounding does.
+const SLACK: f32 = 1e-4;
+
+/// Pairs of columns that the two sides of a player can be in, for each bin.
+type Columns = Vec<Vec<[i32; 2]>>;
+
+/// The rows that the corners of a player are in: low and high.
+pub(super) type Rows = [i32; 2];
+
+/// A level as the search asks for it. What it has answered once it knows.
+pub(super) struct Ground<'a> {
+    level: &'a Level,
+    /// A player at the left border, at the bottom.
+    body: Body,
+    corner_columns: Columns,
+    body_columns: Columns,
+    answers: HashMap<Question, Bins>,
+    touched: HashMap<u32, Touched>,
+    /// Crates, and the bins in which a player may overlap each.
+    pub crates: Vec<(Body, Bins)>,
+    saws: Vec<(Body, Bins)>,
+    /// Whether enemies may lend support; see [`patrol`](crate::coinrun::rules::patrol).
+    pub enemies_lend: bool,
+}
+
+/// What is asked of corners. They are the same corners in both rows of a question: who is free in the one and stopped by the
+/// other does not slide down beside a wall as if on steps.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Question {
+    Room(Rows),
+    Passes(Rows, Rows),
+    Stops(Rows, i32),
+}
+
+/// Where a player touches things, at a height.
+#[derive(Clone, Copy)]
+pub(super) struct Touched {
+    /// Where a player may live on: where not all places of a bin touch something deadly that never moves.
+    pub alive: Bins,
+    /// Where a player may touch the coin.
+    pub coin: Bins,
+}
+
+impl<'a> Ground<'a> {
+    pub fn new(level: &'a Level) -> Self {
+        let body = Body { x: 0.0, y: 0.0, ..Body::player() };
+        let blocks = |kind: fn(&Spawn) -> Option<Body>| level.spawns.iter().filter_map(kind);
+        let crates: Vec<_> = blocks(Spawn::solid_crate).map(|block| (block, beside(&block, &body, true))).collect();
+        let has_enemies = blocks(Spawn::enemy).next().is_some();
+        Self {
+            level,
+            body,
+            corner_columns: columns(corners(&body, 0.0, 0.0).right),
+            body_columns: columns(body.rx + OVERLAP_MARGIN),
+            answers: HashMap::new(),
+            touched: HashMap::new(),
+            enemies_lend: has_enemies && !crates.is_empty(),
+            crates,
+            saws: blocks(Spawn::saw).map(|saw| (saw, beside(&saw, &body, false))).collect(),
+        }
+    }
+
+    /// The player's body with its centre at this height.
+    pub fn body(&self, y: f32) -> Body {
+        Body { y, ..self.body }
+    }
+
+    /// The rows of the corners of a player at this height.
+    pub fn rows(&self, y: f32) -> Rows {
+        let Corners { low, high, .. } = corners(&self.body, 0.0, y);
+        [low.floor() as i32, high.floor() as i32]
+    }
+
+    /// The row in which a player at this height looks for support.
+    pub fn feet(&self, y: f32) -> i32 {
+        (y - (self.body.ry + FOOT_MARGIN)).floor() as i32
+    }
+
+    /// Where all corners may be free, for corners in these rows.
+    pub fn room(&mut self, rows: Rows) -> Bins {
+        self.ask(Question::Room(rows))
+    }
+
+    /// Where all corners may be free in both rows.
+    pub fn passes(&mut self, here: Rows, there: Rows) -> Bins {
+        self.ask(Question::Passes(here, there))
+    }
+
+    /// Where all corners may be free, and a wall in this row below or above one of them.
+    pub fn stops(&mut self, here: Rows, row: i32) -> Bins {
+        self.ask(Question::Stops(here, row))
+    }
+
+    fn ask(&mut self, question: Question) -> Bins {
+        let (tiles, columns) = (&self.level.tiles, &self.corner_columns);
+        let is_wall = |column, row| tiles.get(column, row).is_wall();
+        let is_free = |pair: [i32; 2], rows: Rows| !pair.iter().any(|&x| rows.iter().any(|&row| is_wall(x, row)));
+        *self.answers.entry(question).or_insert_with(|| match question {
+            Question::Room(rows) => any(columns, |pair| is_free(pair, rows)),
+            Question::Passes(here, there) => any(columns, |pair| is_free(pair, here) && is_free(pair, there)),
+            Question::Stops(here, row) => {
+                any(columns, |pair| is_free(pair, here) && pair.iter().any(|&column| is_wall(column, row)))
+            }
+        })
+    }
+
+    /// What a player at this height touches.
+    pub fn touched(&mut self, y: f32) -> Touched {
+        if let Some(&known) = self.touched.get(&y.to_bits()) {
+            return known;
+        }
+        let touched = Touched { alive: self.alive(y), coin: self.covers(y, |tile| tile == Tile::Coin) };
+        self.touched.insert(y.to_bits(), touched);
+        touched
+    }
+
+    fn alive(&self, y: f32) -> Bins {
+        let rows = self.touched_rows(y);
+        let is_lava = |column: &i32| rows.clone().any(|row| self.level.tiles.get(*column, row).is_lava());
+        let dry = any(&self.body_columns, |pair| !pair.iter().any(is_lava));
+        let body = self.body(y);
+        let saws = self.saws.iter().filter(|(saw, _)| Body { x: saw.x, ..body }.overlaps(saw, -SLACK));
+        saws.fold(dry, |alive, (_, deadly)| alive & !*deadly)
+    }
+
+    /// Where a player at this height may cover such a tile.
+    fn covers(&self, y: f32, is_one: fn(Tile) -> bool) -> Bins {
+        let rows = self.touched_rows(y);
+        let holds = |column: &i32| rows.clone().any(|row| is_one(self.level.tiles.get(*column, row)));
+        any(&self.body_columns, |pair| pair.iter().any(holds))
+    }
+
+    fn touched_rows(&self, y: f32) -> RangeInclusive<i32> {
+        let reach = self.body.ry + OVERLAP_MARGIN;
+        (y - reach) as i32..=(y + reach) as i32
+    }
+}
+
+/// The pairs of columns of what lies so far to the left and to the right of each bin's places.
+fn columns(reach: f32) -> Columns {
+    let of_bin = |bin| {
+        let [first, last] = Bins::ends(bin);
+        let range = |offset: f32| (first + offset - SLACK).floor() as i32..=(last + offset + SLACK).floor() as i32;
+        let pairs = range(-reach).flat_map(|left| range(reach).map(move |right| [left, right]));
+        // The player is less than a tile wide.
+        pairs.filter(|[left, right]| (0..=1).contains(&(right - left))).collect()
+    };
+    (0..BINS).map(of_bin).collect()
+}
+
+fn any(columns: &Columns, holds: impl Fn([i32; 2]) -> bool) -> Bins {
+    Bins::of(|bin| columns[bin].iter().any(|&pair| holds(pair)))
+}
+
+/// The bins in which a player overlaps a block along x: at some of their places, or at all.
+fn beside(block: &Body, player: &Body, at_some: bool) -> Bins {
+    let reach = block.rx + player.rx;
+    Bins::of(|bin| {
+        let [first, last] = Bins::ends(bin);
+        if at_some {
+            first - SLACK < block.x + reach && last + SLACK > block.x - reach
+        } else {
+            first - SLACK > block.x - reach && last + SLACK < block.x + reach
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ground(text: &str) -> Level {
+        Level::from_text(text).expect("a valid picture")
+    }
+
+    #[test]
+    fn there_is_room_between_walls_and_none_in_them() {
+        let level = ground("#..#..\n#A.#.C\n######\n");
+        let mut ground = Ground::new(&level);
+        let rows = ground.rows(Body::player().y);
+        assert_eq!(rows, [1, 2]);
+        let room = ground.room(rows);
+        let is_in = |x: f32| !(room & Bins::at(x)).is_empty();
+        assert!(is_in(1.5) && is_in(2.45) && is_in(4.55) && !is_in(2.7) && !is_in(3.5) && !is_in(1.2));
+        let stops = ground.stops(rows, 0);
+        assert!(!(stops & Bins::at(2.0)).is_empty() && (stops & Bins::at(3.5)).is_empty(), "the floor");
+        assert!((ground.stops(rows, 1)).is_empty(), "a wall beside is not below");
+        assert!(ground.room([-1, 0]).is_empty(), "everything outside is a wall");
+    }
+
+    #[test]
+    fn what_certainly_kills_is_not_survived() {
+        let level = ground("#......\n#A..^.C\n#######\n");
+        let Touched { alive, coin } = Ground::new(&level).touched(Body::player().y);
+        let is_in = |bins: Bins, x: f32| !(bins & Bins::at(x)).is_empty();
+        assert!(is_in(alive, 2.0) && is_in(alive, 3.4) && is_in(alive, 5.7));
+        assert!(!is_in(alive, 4.0) && !is_in(alive, 5.0));
+        assert!(is_in(coin, 5.8) && !is_in(coin, 4.0));
+    }
+}

@@ -1,0 +1,180 @@
+//! Players who were stopped in the midst of a step: what is left of their speed may be nearly anything.
+//!
+//! Their height is known by a tenth of a tile, and of their speed the most that it can be upwards. Within a step they may go
+//! to every height between that and the fastest fall.
+
+use std::collections::BTreeMap;
+
+use super::{
+    bins::{Bins, STEP_BINS},
+    ground::{Ground, Touched},
+    state::{Exact, State, put},
+};
+use crate::coinrun::rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT};
+
+/// Heights and speeds are counted in tenths of a tile.
+const TENTHS: f32 = 10.0;
+/// The most that a player falls in a step, and rises, tenths of a tile.
+pub(super) const FASTEST: i32 = (JUMP_SPEED * TENTHS) as i32;
+/// What a step takes from the speed, tenths of a tile.
+const SLOWED: i32 = (GRAVITY * TENTHS) as i32;
+/// Who stands on something is in the middle of a tenth.
+const OFFSET: f32 = PLAYER_HALF_HEIGHT - 0.55;
+/// Bins between two places in the same columns, and one more for a part of a step.
+const LEDGE_REACH: usize = 12;
+/// A player who overlaps a crate is at most so far below its top, tenths of a tile.
+const CRATE_DEPTH: i32 = 22;
+
+/// A height and an upper limit of the speed upwards, in tenths.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(super) struct Loose {
+    /// Which tenth of a tile the centre is in.
+    pub level: i32,
+    /// The most that it rises in the last step.
+    pub lift: i32,
+}
+
+/// Which tenth of a tile a height is in.
+fn level_of(y: f32) -> i32 {
+    ((y - OFFSET) * TENTHS).floor() as i32
+}
+
+/// Where a tenth of a tile begins and ends.
+fn ends(level: i32) -> [f32; 2] {
+    [level, level + 1].map(|end| end as f32 / TENTHS + OFFSET)
+}
+
+impl Loose {
+    /// At this height, with at most this speed.
+    pub fn at(y: f32, vy: f32) -> Self {
+        Self { level: level_of(y), lift: ((vy * TENTHS).ceil() as i32).clamp(-FASTEST, FASTEST) }
+    }
+}
+
+/// A player whose corners have got into a ledge at this height, after having stood across it: until all of them are free
+/// again, it stays in the same columns and near the same height, and may have any speed then.
+pub(super) fn out_of_ledge(ground: &mut Ground, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
+    let ledge = y.floor();
+    let half = ledge + PLAYER_HALF_HEIGHT;
+    for y in [half, ledge + 0.5, ledge + 1.0 - PLAYER_HALF_HEIGHT] {
+        let rows = ground.rows(y);
+        let out = places.spread(LEDGE_REACH) & ground.room(rows);
+        put(after, State::Loose(Loose { level: level_of(y), lift: FASTEST }), out);
+    }
+}
+
+/// Where there may be room at a level.
+fn room(ground: &mut Ground, level: i32) -> Bins {
+    ends(level).into_iter().fold(Bins::NONE, |room, y| {
+        let rows = ground.rows(y);
+        room | ground.room(rows)
+    })
+}
+
+/// Where a player may stand at a level, and on which height exactly.
+fn standing(ground: &mut Ground, level: i32) -> (f32, Bins) {
+    let [low, high] = ends(level);
+    let y = (high - PLAYER_HALF_HEIGHT).floor() + PLAYER_HALF_HEIGHT;
+    if y < low {
+        return (y, Bins::NONE);
+    }
+    let (rows, feet) = (ground.rows(y), ground.feet(y));
+    (y, ground.stops(rows, feet))
+}
+
+/// What a player at a level touches.
+pub(super) fn touched(ground: &mut Ground, level: i32) -> Touched {
+    let [low, high] = ends(level).map(|y| ground.touched(y));
+    Touched { alive: low.alive | high.alive, coin: low.coin | high.coin }
+}
+
+/// All states after a step from these places, with any action.
+pub(super) fn step(ground: &mut Ground, state: Loose, places: Bins, after: &mut Vec<(State, Bins)>) {
+    let lift = (state.lift - SLOWED).max(-FASTEST);
+    let reached = reached(ground, state.level, lift, places);
+    let lends = ground.enemies_lend;
+    for (&level, &places) in &reached {
+        let (y, standing) = standing(ground, level);
+        let stopped = places & standing;
+        put(after, State::Exact(Exact { y, vy: 0.0, is_held: lends }), stopped);
+        put(after, State::Loose(Loose { level, lift: lift.max(0) }), stopped);
+        // Others have risen or fallen as far as they must.
+        if level <= state.level + lift {
+            put(after, State::Loose(Loose { level, lift }), places);
+        }
+        for index in 0..ground.crates.len() {
+            let (block, beside) = ground.crates[index];
+            let y = block.y + block.ry + PLAYER_HALF_HEIGHT;
+            let top = level_of(y);
+            if state.level >= top && (top - CRATE_DEPTH..=top).contains(&level) {
+                put(after, State::Exact(Exact { y, vy: 0.0, is_held: true }), places & beside);
+            }
+        }
+    }
+}
+
+/// Where a player may be at the end of a step, by level.
+fn reached(ground: &mut Ground, from: i32, lift: i32, places: Bins) -> BTreeMap<i32, Bins> {
+    let (lowest, highest) = (from - FASTEST, from + lift.max(0));
+    let mut reached = BTreeMap::from([(from, places)]);
+    for _ in 0..=STEP_BINS {
+        for (&level, places) in &mut reached {
+            *places |= places.spread(1) & room(ground, level);
+        }
+        let downwards = (lowest..highest).rev().map(|level| [level + 1, level]);
+        let upwards = (lowest..highest).map(|level| [level, level + 1]);
+        for [here, there] in downwards.chain(upwards) {
+            let Some(&places) = reached.get(&here) else { continue };
+            let passes = places & passes(ground, here, there);
+            if !passes.is_empty() {
+                *reached.entry(there).or_default() |= passes;
+            }
+        }
+    }
+    let within = places.spread(STEP_BINS);
+    reached.values_mut().for_each(|places| *places = *places & within);
+    reached
+}
+
+/// Where corners may be free at both of two levels.
+fn passes(ground: &mut Ground, here: i32, there: i32) -> Bins {
+    let mut passes = Bins::NONE;
+    for one in ends(here) {
+        for other in ends(there) {
+            let (one, other) = (ground.rows(one), ground.rows(other));
+            passes |= ground.passes(one, other);
+        }
+    }
+    passes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coinrun::{level::Level, rules::Body};
+
+    #[test]
+    fn who_stands_is_in_the_middle_of_a_tenth() {
+        let y = Body::player().y;
+        let [low, high] = ends(level_of(y));
+        assert!((low - (y - 0.05)).abs() < 1e-4 && (high - (y + 0.05)).abs() < 1e-4);
+        assert_eq!(Loose::at(y, -0.73).lift, -7);
+    }
+
+    #[test]
+    fn who_falls_comes_to_stand_and_does_not_rise() {
+        let level = Level::from_text("#......\n#......\n#A....C\n#======\n").expect("a valid picture");
+        let mut ground = Ground::new(&level);
+        let start = Loose::at(Body::player().y + 0.4, -0.35);
+        let mut after = Vec::new();
+        step(&mut ground, start, Bins::at(3.5), &mut after);
+        let stands = State::Exact(Exact { y: Body::player().y, vy: 0.0, is_held: false });
+        assert!(after.iter().any(|(state, _)| *state == stands), "{after:?}");
+        for (state, places) in after {
+            assert_eq!(places & !Bins::at(3.5).spread(STEP_BINS), Bins::NONE);
+            if let State::Loose(Loose { level, .. }) = state {
+                assert!((level_of(Body::player().y)..start.level).contains(&level), "{state:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! One step of a player whose height and speed are known exactly, for all places at once.
+
+use super::{
+    bins::{Bins, STEP_BINS},
+    ground::Ground,
+    loose::{Loose, out_of_ledge},
+    state::{Exact, State, put},
+    vertical::{Stopped, displace},
+};
+use crate::coinrun::rules::{WALK_SPEED, fall, part_count};
+
+/// A state during a step.
+#[derive(Clone, Copy, PartialEq)]
+struct Part {
+    y: f32,
+    /// Parts in which nothing was in the way along y.
+    free: u32,
+    /// Whether a crate has caught the player.
+    is_caught: bool,
+}
+
+/// What a player does in a step, and where.
+struct Act {
+    y: f32,
+    vy: f32,
+    /// Whether crates hold who falls onto them.
+    is_held: bool,
+    places: Bins,
+}
+
+/// All states after a step from these places, with any action.
+pub(super) fn step(ground: &mut Ground, state: Exact, places: Bins, after: &mut Vec<(State, Bins)>) {
+    let supported = supported(ground, state, places);
+    // Who presses down in the air falls like anybody else, and past crates, as who misses them does.
+    let actions = [(0, false, places), (1, true, supported), (-1, true, supported)];
+    for (ay, has_support, places) in actions {
+        if places.is_empty() {
+            continue;
+        }
+        let vy = fall(state.vy, ay, has_support);
+        let act = Act { y: state.y, vy, is_held: vy < 0.0 && ay >= 0, places };
+        let slowest = part_count(0.0, vy);
+        // A little more than full speed, since rounding adds to it.
+        let fastest = part_count(WALK_SPEED + 1e-4, vy);
+        for parts in slowest..=fastest {
+            play(ground, &act, parts, after);
+        }
+    }
+}
+
+/// Where a player can jump.
+fn supported(ground: &mut Ground, state: Exact, places: Bins) -> Bins {
+    if state.vy != 0.0 {
+        return Bins::NONE;
+    }
+    if state.is_held {
+        return places;
+    }
+    let (rows, feet) = (ground.rows(state.y), ground.feet(state.y));
+    places & ground.stops(rows, feet)
+}
+
+/// Makes a step of so many parts.
+fn play(ground: &mut Ground, act: &Act, parts: u32, after: &mut Vec<(State, Bins)>) {
+    let held_from = (act.is_held && !ground.crates.is_empty()).then_some(act.y);
+    let share = 1.0 / parts as f32;
+    let first = Part { y: act.y, free: 0, is_caught: false };
+    let mut now = vec![(first, sideways(ground, act.y, act.places))];
+    for _ in 0..parts {
+        let mut next = Vec::new();
+        for (part, places) in now {
+            if part.is_caught {
+                put(&mut next, part, sideways(ground, part.y, places));
+                continue;
+            }
+            for (y, stopped, places) in displace(ground, places, part.y, act.vy * share, held_from) {
+                if stopped == Stopped::ByLedge {
+                    out_of_ledge(ground, y, places, after);
+                    continue;
+                }
+                let is_free = stopped == Stopped::Not;
+                let moved = Part { y, free: part.free + u32::from(is_free), is_caught: stopped == Stopped::ByCrate };
+                if !is_free {
+                    // A player who is stopped along x as well makes no more parts.
+                    end(ground, act, parts, moved, places, after);
+                }
+                put(&mut next, moved, sideways(ground, y, places));
+            }
+        }
+        now = next;
+    }
+    for (part, places) in now {
+        end(ground, act, parts, part, places, after);
+    }
+}
+
+/// After one part of a step along x, or none.
+fn sideways(ground: &mut Ground, y: f32, places: Bins) -> Bins {
+    let rows = ground.rows(y);
+    places | places.spread(1) & ground.room(rows)
+}
+
+fn end(ground: &Ground, act: &Act, parts: u32, part: Part, places: Bins, after: &mut Vec<(State, Bins)>) {
+    let share = part.free as f32 / parts as f32;
+    // There is one zero.
+    let vy = if part.is_caught { 0.0 } else { act.vy * share + 0.0 };
+    let is_held = part.is_caught || ground.enemies_lend && act.vy < 0.0 && vy == 0.0;
+    // What is left of a speed is followed loosely: there would be too many.
+    let is_partly_stopped = !part.is_caught && part.free > 0 && part.free < parts;
+    let state = if is_partly_stopped {
+        State::Loose(Loose::at(part.y, vy))
+    } else {
+        State::Exact(Exact { y: part.y, vy, is_held })
+    };
+    put(after, state, places & act.places.spread(STEP_BINS));
+}
