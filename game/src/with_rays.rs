@@ -9,6 +9,7 @@ use bevy_playbot::{headless_plugins::HeadlessPlugins, vision::Picture};
 use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
+    defect::DefectKind,
     detector::Detector,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
@@ -83,9 +84,12 @@ impl<G: SenseRays> Game for WithRays<G> {
         fn build_picture(app: &mut App);
         fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
         fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
+        fn end_cause(world: &World, agent: Entity) -> Option<&'static str>;
         fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
         fn prove(mode: &str, level: u64) -> LevelProof;
+        fn prove_from(world: &World, agent: Entity) -> LevelProof;
         fn detectors() -> Vec<Box<dyn Detector>>;
+        fn defects() -> Vec<DefectKind>;
         fn blind_bots() -> Vec<(&'static str, BlindBot)>;
         fn demonstrator() -> Option<&'static str>;
         fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);

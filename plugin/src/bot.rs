@@ -27,23 +27,56 @@ use crate::{action::Action, agent::Agent, control::Control, episode::Episode, st
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
+#[require(HeldAction)]
 pub enum BlindBot {
     /// The same action in every tick.
     Constant(ActionValue),
     /// Uniformly random: over the indices of a discrete space, over [-1, 1] per continuous value.
     Uniform,
+    /// Chaos: uniformly random actions, each held for 1 to 30 ticks, every number of which is as likely. It begins anew in
+    /// every episode.
+    Chaos,
+}
+
+/// Most ticks for which chaos holds an action.
+const LONGEST_HOLD: u32 = 30;
+
+/// What [`BlindBot::Chaos`] holds.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+#[doc(hidden)]
+pub struct HeldAction {
+    action: Action,
+    /// Ticks for which it is held on.
+    left: u32,
+}
+
+impl HeldAction {
+    /// What is done in this tick of the episode.
+    fn next(&mut self, tick: u32, space: &ActionSpace, rng: &mut impl rand::Rng) -> &ActionValue {
+        if tick == 0 || self.left == 0 {
+            self.action = Action(uniform(space, rng));
+            self.left = rng.random_range(1..=LONGEST_HOLD);
+        }
+        self.left -= 1;
+        &self.action.0
+    }
 }
 
 pub(crate) fn run_blind_bots(
-    mut agents: Query<(&Agent, &Control, &BlindBot, &Episode, &mut AgentStreams, &mut Action)>,
+    mut agents: Query<(&Agent, &Control, &BlindBot, &Episode, &mut HeldAction, &mut AgentStreams, &mut Action)>,
 ) {
-    for (agent, control, bot, episode, mut streams, mut action) in &mut agents {
+    for (agent, control, bot, episode, mut held, mut streams, mut action) in &mut agents {
         if *control != Control::Bot || !episode.is_running() {
             continue;
         }
         match bot {
             BlindBot::Constant(value) => action.0.clone_from(value),
             BlindBot::Uniform => action.0 = uniform(&agent.actions, &mut streams.action),
+            BlindBot::Chaos => {
+                action.0.clone_from(held.next(episode.tick, &agent.actions, &mut streams.action));
+            }
         }
     }
 }
@@ -70,5 +103,48 @@ pub fn with_noise(planned: ActionValue, space: &ActionSpace, noise: f64, rng: &m
             ActionValue::Continuous(values.into_iter().map(noisy).collect())
         }
         planned => planned,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prelude::*;
+
+    /// What chaos does in episodes of this length.
+    fn chaos(seed: u64, length: u32, ticks: usize) -> Vec<f32> {
+        let mut app = headless_app();
+        app.insert_resource(PlaybotSeed(seed));
+        app.add_systems(FixedUpdate, move |mut episodes: Query<&mut Episode>| {
+            episodes.iter_mut().filter(|episode| episode.tick + 1 == length).for_each(|mut it| it.terminate(false));
+        });
+        let agent = (Agent::new(0, ActionSpace::Continuous(1)), Control::Bot, BlindBot::Chaos);
+        let agent = app.world_mut().spawn(agent).id();
+        let mut next = || {
+            app.tick().expect("no agent broke its contract");
+            let action = app.world().get::<Action>(agent).and_then(Action::continuous);
+            action.map_or(f32::NAN, |values| values[0])
+        };
+        (0..ticks).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn chaos_holds_each_action_for_one_to_thirty_ticks() {
+        let actions = chaos(7, 10_000, 4000);
+        let mut holds: Vec<usize> = actions.chunk_by(|one, other| one == other).map(<[f32]>::len).collect();
+        // The last one may have been cut off.
+        holds.pop();
+        holds.sort_unstable();
+        assert!(holds.len() > 200, "{}", holds.len());
+        assert_eq!((holds.first(), holds.last()), (Some(&1), Some(&(LONGEST_HOLD as usize))));
+        assert_eq!(actions, chaos(7, 10_000, 4000));
+        assert_ne!(actions, chaos(8, 10_000, 4000));
+    }
+
+    #[test]
+    fn chaos_begins_anew_in_every_episode() {
+        let actions = chaos(7, 3, 300);
+        let changes = (3..300).step_by(3).filter(|&start| actions[start] != actions[start - 1]).count();
+        assert_eq!(changes, 99);
     }
 }

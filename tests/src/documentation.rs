@@ -27,3 +27,11 @@ struct RecordingInBuilds;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/findings.md")]
 struct Findings;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/cargo-test.md")]
+struct CargoTest;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/planted-defects.md")]
+struct PlantedDefects;

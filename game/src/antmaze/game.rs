@@ -6,6 +6,9 @@ use bevy::prelude::*;
 use bevy_playbot::vision::{ObservationKind, Picture};
 use playbot_lab::{
     benchmark::Benchmark,
+    defect::DefectKind,
+    detector::Detector,
+    detectors::{FarGoal, GoalIgnored, ThroughWall},
     floor_plan::FloorPlan,
     game::{level_designs, read_level_designs},
     inspect::{InspectError, LevelRequest, LevelView},
@@ -17,6 +20,7 @@ use playbot_lab::{
 
 use super::{
     components::{MazeAnt, PlaysIn},
+    defects,
     demonstrator_bot::DemonstratorBot,
     level::AntMazeLevel,
     level_text::{self, LevelText},
@@ -148,6 +152,16 @@ impl Game for AntMaze {
     fn prove(&self, mode: &str, level: u64) -> LevelProof {
         let level = level_of(self, mode, level);
         level.map_or(LevelProof::Unknown, |level| prove(&level.maze, level.start, level.goal))
+    }
+
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        // Tiles: the goal reaches half a metre, and walls are as thick as a tile.
+        let (ignored, far) = (GoalIgnored::within(0.11), FarGoal::beyond(0.2));
+        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3))]
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        defects::defects()
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

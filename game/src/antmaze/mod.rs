@@ -6,6 +6,7 @@
 
 mod arena;
 pub mod components;
+mod defects;
 mod demonstrator_bot;
 mod floor_plan;
 pub mod game;

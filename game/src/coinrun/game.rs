@@ -7,6 +7,8 @@ use bevy_playbot::vision::{ObservationKind, Picture};
 use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
+    defect::DefectKind,
+    detector::Detector,
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView},
@@ -16,13 +18,15 @@ use playbot_lab::{
 
 use super::{
     components::{LastOutcome, PlayerBody, PlaysIn, Tiles},
+    defects,
     demonstrator_bot::DemonstratorBot,
+    detectors,
     level::Mode,
     level_text,
     levels::level_of,
     picture::{CoinRunPicturePlugin, VIEW},
     plugin::CoinRunPlugin,
-    proof::prove,
+    proof::{prove, prove_from},
     rules::ACTIONS,
     show_level, view,
 };
@@ -129,8 +133,24 @@ impl Game for CoinRun {
         world.get::<PlayerBody>(agent).map(|body| Vec2::new(body.0.x, body.0.y))
     }
 
+    fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {
+        world.get::<LastOutcome>(agent)?.0?.cause()
+    }
+
     fn prove(&self, mode: &str, level: u64) -> LevelProof {
         level_of(self, mode, level).map_or(LevelProof::Unknown, prove)
+    }
+
+    fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
+        prove_from(world, agent)
+    }
+
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        detectors::detectors()
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        defects::defects()
     }
 
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {

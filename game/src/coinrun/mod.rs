@@ -7,7 +7,9 @@
 pub mod arena;
 pub mod components;
 mod creation_order;
+mod defects;
 mod demonstrator_bot;
+mod detectors;
 mod floor_plan;
 pub mod game;
 pub mod generator;

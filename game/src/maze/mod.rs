@@ -5,6 +5,7 @@
 //! without end from a [`MazeSpec`] and a seed, and [`Planner`] knows the way to a goal from everywhere.
 
 mod cell;
+pub(crate) mod defects;
 mod distances;
 mod draw;
 mod ends;

@@ -7,6 +7,9 @@ use bevy_playbot::vision::{ObservationKind, Picture};
 use playbot_lab::prelude::*;
 use playbot_lab::{
     benchmark::Benchmark,
+    defect::DefectKind,
+    detector::Detector,
+    detectors::{FarGoal, GoalIgnored, ThroughWall},
     floor_plan::FloorPlan,
     game::{level_designs, read_level_designs},
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
@@ -17,6 +20,7 @@ use playbot_lab::{
 
 use super::{
     components::{MazeBall, PlaysIn},
+    defects,
     demonstrator_bot::DemonstratorBot,
     floor_plan::point,
     level::Maze2dLevel,
@@ -157,6 +161,16 @@ impl Game for Maze2d {
     fn prove(&self, mode: &str, level: u64) -> LevelProof {
         let level = level_of(self, mode, level);
         level.map_or(LevelProof::Unknown, |(level, _)| prove(&level.maze, level.start_cell, level.goal_cell))
+    }
+
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        // Tiles: the goal reaches half a metre, and walls are as thick as a tile.
+        let (ignored, far) = (GoalIgnored::within(0.45), FarGoal::beyond(0.6));
+        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3))]
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        defects::defects()
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

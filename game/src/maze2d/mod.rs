@@ -8,6 +8,7 @@
 pub mod arena;
 pub mod ball;
 pub mod components;
+mod defects;
 pub mod demonstrator;
 mod demonstrator_bot;
 mod draws;

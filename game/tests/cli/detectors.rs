@@ -64,3 +64,34 @@ fn a_test_with_other_detectors_does_not_go_on_with_this_one() {
     let (_, messages) = ended(temporary.path(), &other, 3);
     assert!(messages.contains("detectors"), "{messages}");
 }
+
+#[test]
+fn pars_are_those_of_a_file_or_of_recordings() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let test = |par: &str, wanted: i32| {
+        let call = ["test", "coinrun", "--levels", "easy:0", "--bot", "search", "--out", "t", "--force"];
+        ended(folder, &[&call[..], &["--no-detect", "all", "--par", par]].concat(), wanted)
+    };
+    let results = || fs::read_to_string(folder.join("t/results.json")).expect("results");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("writable");
+    write("slow.json", r#"{"easy:0": 100000}"#);
+    let (_, messages) = test("slow.json", 1);
+    assert!(results().contains("\"detector\":\"shortcut\""), "{}", results());
+    assert!(messages.contains("see it: playbot replay t/findings/easy-0.shortcut.search-"), "{messages}");
+    let regress = |more: &[&str], wanted: i32| ended(folder, &[&["test", "--regress", "t"][..], more].concat(), wanted);
+    assert!(regress(&[], 1).0.contains("still-there"));
+    assert!(regress(&["--detector", "shortcut.factor=0.4"], 1).0.contains("still-there"));
+    assert!(regress(&["--detector", "shortcut.facto=0.4"], 3).1.contains("did you mean `factor`?"));
+    assert!(regress(&["--no-detect", "shortcut"], 3).1.contains("--regress"));
+
+    write("quick.json", r#"{"easy:0": 1, "easy:1": 5}"#);
+    test("quick.json", 1);
+    assert!(results().contains("\"detector\":\"too-long\"") && results().contains("\"pars "), "{}", results());
+    done(folder, &["record", "coinrun", "--levels", "easy:0..0", "--noise", "0", "--out", "a.demo"]);
+    test("a.demo", 0);
+    write("bad.json", r#"{"easy:0": 0}"#);
+    for (par, words) in [("bad.json", "the par of easy:0 is 0"), ("none.json", "cannot read none.json")] {
+        assert!(test(par, 3).1.contains(words), "{par}");
+    }
+}

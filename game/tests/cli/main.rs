@@ -1,12 +1,16 @@
 //! The program as its users call it.
 
+mod calibrate;
 mod detectors;
 mod eval;
 mod explore;
 mod findings;
+mod merging;
 mod paths;
+mod planting;
 #[path = "../shared/program.rs"]
 mod program;
+mod pull_request;
 mod switches;
 mod testing;
 mod trace;

@@ -61,7 +61,58 @@ fn the_demonstrator_solves_levels_that_a_blind_bot_does_not() {
         junit.contains(&format!("failures=\"{}\"", failed.len())) && junit.contains("playbot test coinrun"),
         "{junit}"
     );
-    assert!(read(folder, "blind/summary.md").contains("| random |"));
+    let summary = read(folder, "blind/summary.md");
+    assert!(summary.contains("| random |") && summary.contains("of the open places were visited"), "{summary}");
+}
+
+#[test]
+fn results_say_where_bots_went_and_what_killed_them() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let output = test(folder, "out", &["--levels", "hard:0..19", "--bot", "right-jump,random", "--episodes", "2"]);
+    assert!([0, 1].contains(&code(&output)), "{}", errors(&output));
+    let found = results(folder, "out");
+    assert_eq!(found["maps"], "all");
+    let sum = |pairs: &Value| pairs.as_array().expect("pairs").iter().filter_map(|pair| pair[1].as_u64()).sum::<u64>();
+    let mut causes = Vec::new();
+    for row in found["levels"].as_array().expect("levels") {
+        let (maps, places) = (&row["maps"], &row["places"]);
+        assert!(sum(&maps["visits"]) >= 4 && sum(&maps["lost"]) <= sum(&maps["visits"]), "{row}");
+        let [visited, open] = ["visited", "open"].map(|name| places[name].as_u64().expect("a count"));
+        assert!(visited > 0 && visited <= open, "{row}");
+        for tester in row["testers"].as_array().expect("testers") {
+            assert!(tester["places"]["visited"].as_u64().is_some_and(|own| own > 0 && own <= visited), "{row}");
+        }
+        let failed = row["lost"].as_u64().unwrap_or(0) + row["timed_out"].as_u64().unwrap_or(0);
+        let told = row["causes"].as_object().cloned().unwrap_or_default();
+        assert_eq!(told.values().filter_map(Value::as_u64).sum::<u64>(), failed, "{row}");
+        assert!(failed == 0 || maps["failure"]["way"].is_array(), "{row}");
+        causes.extend(told.into_iter().map(|(cause, _)| cause));
+    }
+    let known = ["saw", "enemy", "lava", "left the map", "time"];
+    assert!(!causes.is_empty() && causes.iter().all(|cause| known.contains(&cause.as_str())), "{causes:?}");
+    let page = read(folder, "out/report.html");
+    assert!(page.contains("data-clip=\"iVBORw0KGgo") && page.contains("<form id=\"maps\""));
+    // Results from before there were maps.
+    let older: Vec<String> = read(folder, "out/results.json").lines().map(without_maps).collect();
+    fs::write(folder.join("out/results.json"), older.join("\n") + "\n").expect("writable");
+    done(folder, &["report", "html", "out"]);
+    let page = read(folder, "out/report.html");
+    assert!(page.contains("<figure><svg") && !page.contains("<form id=\"maps\""));
+}
+
+/// A line of results as it was before there were maps.
+fn without_maps(line: &str) -> String {
+    let line = line.replace("\"maps\":\"all\",", "");
+    if !line.starts_with("{\"level\":") {
+        return line;
+    }
+    let comma = if line.ends_with(',') { "," } else { "" };
+    let mut level: Value = serde_json::from_str(line.trim_end_matches(',')).expect("a level");
+    for name in ["maps", "places", "causes"] {
+        level.as_object_mut().expect("an object").remove(name);
+    }
+    format!("{level}{comma}")
 }
 
 #[test]
@@ -209,8 +260,8 @@ fn what_is_finished_outlives_a_full_disk() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let plan = "test coinrun --levels easy:0..63 --bot random --out out";
-    // Eight blocks of 512 bytes hold a few levels.
-    let output = crate::program::on_full_disk(folder, 8, plan);
+    // Forty blocks of 512 bytes hold a few levels.
+    let output = crate::program::on_full_disk(folder, 40, plan);
     assert_eq!(code(&output), 2, "{}", errors(&output));
     assert!(errors(&output).contains("--resume"), "{}", errors(&output));
     let kept = read(folder, "out/levels.jsonl");

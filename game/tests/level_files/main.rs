@@ -1,5 +1,6 @@
 //! Levels that are files: what games read, and what the program does with them.
 
+mod assertions;
 mod errors;
 mod held_out;
 #[path = "../shared/program.rs"]

@@ -6,7 +6,7 @@ use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::E
 use playbot_lab::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
 
 use crate::{
-    bench, config, demo, doctor,
+    bench, bugs, config, demo, doctor,
     error::{CliError, Outcome},
     eval, explore, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, replay,
     report, runs, study, test, trace, train, usage_error, view,
@@ -43,6 +43,7 @@ Examples:
   playbot study --experiment my.ron --out study
   playbot view GAME --seed 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
+  playbot bugs make --seed 1 --out runs/bugs   plant defects, to see who finds them
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
 130 stopped by Ctrl-C before it was done.";
@@ -71,6 +72,7 @@ enum Verb {
     Trace(trace::Args),
     View(view::Args),
     Bench(bench::Args),
+    Bugs(bugs::Args),
 }
 
 /// Whether the command line can be read: whoever writes commands into documentation asks it. `args` begin with the name of
@@ -193,5 +195,6 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Trace(args) => trace::run(args, games),
         Verb::View(args) => view::run(args, games),
         Verb::Bench(args) => bench::run(args, games),
+        Verb::Bugs(args) => bugs::run(args, games),
     }
 }

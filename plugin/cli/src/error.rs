@@ -10,6 +10,7 @@ use bevy_playbot::{
     vision::{UnknownObservation, VisionError},
 };
 use playbot_lab::{
+    bugs::BugError,
     demo::verify::VerifyError,
     eval::EvalError,
     findings::{FindingError, Unplayable},
@@ -134,6 +135,8 @@ pub enum CliError {
     #[error(transparent)]
     Finding(#[from] FindingError),
     #[error(transparent)]
+    Bugs(#[from] BugError),
+    #[error(transparent)]
     Unplayable(#[from] Unplayable),
     #[cfg(feature = "window")]
     #[error(transparent)]
@@ -175,6 +178,13 @@ impl CliError {
                 }
             }
             Self::Finding(error) => {
+                if error.is_usage() {
+                    3
+                } else {
+                    2
+                }
+            }
+            Self::Bugs(error) => {
                 if error.is_usage() {
                     3
                 } else {

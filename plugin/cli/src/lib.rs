@@ -5,6 +5,7 @@
 mod tell;
 
 mod bench;
+mod bugs;
 mod cloning;
 mod command_line;
 mod compute;

@@ -2,7 +2,10 @@
 
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_lab::{
-    eval::{EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, evaluate, evaluate_with_trails, summarize},
+    eval::{
+        EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, blind_bots, evaluate, evaluate_with_trails,
+        summarize,
+    },
     game::Game,
     report::ResultRow,
 };
@@ -13,7 +16,7 @@ use super::{
     progress,
 };
 
-/// The bot of a game with this name: one of its blind bots or its demonstrator.
+/// The bot of a game with this name: one of its blind bots, chaos, or its demonstrator.
 ///
 /// # Errors
 ///
@@ -22,7 +25,7 @@ pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
     if game.demonstrator() == Some(name) {
         return Ok(Player::Demonstrator);
     }
-    let bots = game.blind_bots();
+    let bots = blind_bots(game);
     match bots.iter().find(|(bot, _)| *bot == name) {
         Some((_, bot)) => Ok(Player::Blind(bot.clone())),
         None => Err(UnknownName::new("bot", name, &bot_names(game))),
@@ -31,7 +34,7 @@ pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
 
 /// Names of all bots of a game.
 pub fn bot_names(game: &dyn Game) -> Vec<&'static str> {
-    game.blind_bots().into_iter().map(|(name, _)| name).chain(game.demonstrator()).collect()
+    blind_bots(game).into_iter().map(|(name, _)| name).chain(game.demonstrator()).collect()
 }
 
 /// A measured player: its row of the result table, its episodes and its speed.

@@ -6,9 +6,11 @@ use bevy::prelude::*;
 use playbot_learner::{Policy, PolicyFile};
 use thiserror::Error;
 
+mod blind;
 mod summary;
 
 pub use bevy_playbot::episode::EpisodeResult;
+pub use blind::{CHAOS, blind_bots};
 pub use summary::{EvalSummary, error_over_levels, summarize};
 
 use crate::{

@@ -4,13 +4,18 @@ use std::sync::Arc;
 
 use bevy::{app::PluginGroupBuilder, prelude::*};
 
+mod drawn;
+
+pub use drawn::{level_designs, read_level_designs};
+
 use crate::{
     benchmark::Benchmark,
+    defect::DefectKind,
     detector::Detector,
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
-    level_files::{LevelDesign, LevelDesigns, LevelFileError, LevelTextError, is_level_files},
+    level_files::{LevelDesign, LevelTextError, is_level_files},
     mode::ModeError,
     proof::LevelProof,
 };
@@ -163,6 +168,12 @@ pub trait Game: Send + Sync {
         None
     }
 
+    /// Why the episode of an agent has just ended without the aim, for people, such as `saw` or `lava`: asked after its last
+    /// tick, before another one begins. By default nothing is said.
+    fn end_cause(&self, _world: &World, _agent: Entity) -> Option<&'static str> {
+        None
+    }
+
     /// The state of an agent in a few whole numbers, for an explorer to whom states with the same numbers are the same: see
     /// [`explore`](crate::explore). `None`, by default, for squares of the grid in which it [is](Self::whereabouts), or where
     /// that is not known, for its observation, downscaled.
@@ -177,9 +188,21 @@ pub trait Game: Send + Sync {
         LevelProof::Unknown
     }
 
+    /// What is known for certain of the state of an agent that plays: whether its aim can still be reached. Asked now and
+    /// then during an episode, so it takes a millisecond at most. By default nothing is known.
+    fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
+        LevelProof::Unknown
+    }
+
     /// The game's own detectors, which look for defects in tests beside [those that all games have](crate::detectors). One
     /// with the name of another takes its place.
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        Vec::new()
+    }
+
+    /// Defects that can be planted into this game, beside [those of all games](crate::bugs). One with the class of another
+    /// takes its place.
+    fn defects(&self) -> Vec<DefectKind> {
         Vec::new()
     }
 
@@ -265,22 +288,4 @@ pub trait Game: Send + Sync {
             has_picture: self.picture().is_some() || self.has_camera(),
         }
     }
-}
-
-/// The level files of a mode, as they were when they were read last: [`LevelDesigns::of`] this game.
-///
-/// # Errors
-///
-/// The mode names no files, or one of them cannot be read or is no level of this game.
-pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
-    LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text))
-}
-
-/// The level files of a mode, as they are on disk now: [`LevelDesigns::read`] for this game.
-///
-/// # Errors
-///
-/// As for [`level_designs`].
-pub fn read_level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
-    LevelDesigns::read(game.name(), mode, &|text| game.parse_level(text))
 }

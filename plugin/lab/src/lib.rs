@@ -6,9 +6,12 @@
 //! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
 //! - [`verdict`] says of each level whether bots solved it, failed, or nobody can; results of shards and of two states of a
 //!   game are joined and compared there. [`verdict_report`] makes a page of them that people read.
+//! - [`calibration`] holds results beside recordings of people on the same levels.
+//! - [`assertions`] are for a game's own `cargo test`: levels that must be solved, recordings that must play again.
 //! - [`findings`] keeps what was found with the actions that lead there, plays it again and makes it shorter.
 //! - [`detectors`] look for defects while bots play: agents that are stuck, leave their level or are no numbers any more,
 //!   and what a game adds with a [`detector`] of its own.
+//! - [`bugs`] plants defects into games and levels, to measure which testers notice.
 //! - [`explore`] finds its way through a level by itself, without training: what can be reached, and how.
 //! - [`doctor`] finds out whether a game plays the same when it is given the same actions, and what differs if not.
 //! - [`pipeline`] goes the whole road with five functions; [`policy_export`] makes the one file that a game ships with, for
@@ -17,7 +20,11 @@
 //! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.
 
 pub mod arrangement;
+pub mod assertions;
 pub mod benchmark;
+pub mod bugs;
+pub mod calibration;
+pub mod defect;
 pub mod demo;
 pub mod detector;
 pub mod detectors;

@@ -1,6 +1,14 @@
 //! Findings as files: replayed, made shorter, and looked for again.
 
-use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
 
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
@@ -9,7 +17,7 @@ use playbot_lab::{
     eval::Player,
     findings::{
         Budget, Check, Checks, Date, FINDINGS, FindingFiles, FindingHead, FindingStatus, Minimised, Moment, PINS,
-        Regress, Regression, StoredFinding, Watcher, list_findings, minimise, recheck, regress,
+        Regress, Regression, StoredFinding, Watcher, list_findings, minimise, recheck, regress, regress_until,
     },
     games::Games,
     prelude::*,
@@ -210,4 +218,23 @@ fn stored_findings_are_there_or_gone_or_pinned_for_a_while() {
     let cut = again(&BURNING, "2027-02-01");
     assert_eq!((cut.rows[0].status, cut.rows[0].game.as_deref()), (FindingStatus::Unplayable, None));
     assert!(cut.rows[0].message.contains("is cut off"), "{}", cut.rows[0].message);
+}
+
+#[test]
+fn whoever_stops_keeps_what_is_known_by_then() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    test(&Corridor, vec![tester("left", 0)], folder, 1);
+    let all: [&dyn Game; 1] = [&Corridor];
+    let games = Games::new(&all).expect("one game");
+    let today: Date = "2027-01-01".parse().expect("a day");
+    let request = Regress { folder, games: &games, checks: &|_| Checks::default(), today, threads: 1 };
+    let played = AtomicU64::new(0);
+    let count = |more: u64| {
+        played.fetch_add(more, Ordering::Relaxed);
+    };
+    let stopped = regress_until(&request, &count, &|| played.load(Ordering::Relaxed) >= 3).expect("findings");
+    assert_eq!((stopped.rows.len(), stopped.left), (3, 7));
+    let whole = regress(&request, &|_| {}).expect("findings");
+    assert_eq!((whole.left, &whole.rows[..3]), (0, &stopped.rows[..]));
 }

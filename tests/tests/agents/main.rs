@@ -1,11 +1,15 @@
 //! Agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
 
+mod assertions;
+mod calibration;
+mod corridor_defects;
 mod detectors;
 mod episodes;
 mod explore;
 mod faults;
 mod findings;
 mod lander;
+mod level_detectors;
 mod orders;
 mod pipeline;
 mod recording;
@@ -17,3 +21,4 @@ mod training;
 mod truncation;
 mod verdicts;
 mod vision;
+mod walks;

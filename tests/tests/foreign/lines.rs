@@ -26,14 +26,17 @@ fn files(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Lines that say something: not blank, no comment, no import, not closing brackets only.
+/// What the benchmark of testers plants into a game, which takes no part in playing or testing it.
+const DEFECTS: &str = "src/defects.rs";
+
+/// Lines that say something: not blank, no comment, no import, not closing brackets only, not the name of [`DEFECTS`].
 fn lines_that_count(source: &str) -> Vec<&str> {
     let mut in_use = false;
     let mut counted = Vec::new();
     for line in source.lines().map(str::trim) {
         in_use |= line.starts_with("use ");
         let closes = line.chars().all(|c| ")]};,".contains(c));
-        if !in_use && !closes && !line.starts_with("//") {
+        if !in_use && !closes && !line.starts_with("//") && line != "mod defects;" {
             counted.push(line);
         }
         in_use &= !line.ends_with(';');
@@ -43,7 +46,8 @@ fn lines_that_count(source: &str) -> Vec<&str> {
 
 #[test]
 fn blank_lines_comments_imports_and_closing_brackets_do_not_count() {
-    let source = "//! A game.\n\nuse std::{\n    fs,\n};\nfn main() {\n    play([\n        1, // one\n    ]);\n}\n";
+    let source = "//! A game.\nmod defects;\n\nuse std::{\n    fs,\n};\n\
+                  fn main() {\n    play([\n        1, // one\n    ]);\n}\n";
     assert_eq!(lines_that_count(source), ["fn main() {", "play([", "1, // one"]);
 }
 
@@ -64,8 +68,11 @@ fn all_of_an_adapter_is_in_its_main() {
     for game in GAMES {
         let folder = crate_of(game);
         let others = files(&folder).into_iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs"));
-        // Tests of its verbs are no part of an adapter.
-        for path in others.filter(|path| !path.ends_with("src/main.rs") && !path.starts_with(folder.join("tests"))) {
+        // Tests of its verbs are no part of an adapter, and neither are planted defects.
+        let is_apart = |path: &PathBuf| {
+            ["src/main.rs", DEFECTS].iter().any(|name| path.ends_with(name)) || path.starts_with(folder.join("tests"))
+        };
+        for path in others.filter(|path| !is_apart(path)) {
             assert!(!read(&path).contains("playbot"), "{} knows of the plugin", path.display());
         }
     }
@@ -88,7 +95,7 @@ fn nothing_of_the_examples_of_bevy_is_kept_here() {
         let folder = crate_of(game);
         for path in files(&folder).iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs")) {
             let name = path.strip_prefix(&folder).expect("it was found there").display().to_string();
-            let is_ours = ["src/main.rs", "tests/shell.rs"].contains(&name.as_str());
+            let is_ours = ["src/main.rs", DEFECTS, "tests/shell.rs"].contains(&name.as_str());
             assert!(is_ours || allowed.contains(&name.as_str()), "{game} has a file {name}");
         }
     }

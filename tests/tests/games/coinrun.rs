@@ -65,6 +65,7 @@ fn a_game_may_add_a_saw_and_a_crate() {
     world.spawn((Saw, ArenaBody(Body::block([1, 3])), InArena(arena)));
     world.tick().expect("sound");
     assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, Some(Outcome::Saw));
+    assert_eq!(CoinRun::default().end_cause(&world, agent), Some("saw"));
 }
 
 #[test]

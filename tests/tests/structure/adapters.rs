@@ -23,17 +23,30 @@ fn functions(tokens: &[Token]) -> BTreeSet<&str> {
     pairs.map(|pair| pair[1].text.as_str()).collect()
 }
 
-#[test]
-fn games_with_rays_hand_on_all_that_a_game_is_asked() {
-    let file = read(&workspace().join("plugin/lab/src/game.rs"));
-    let all = items(&file);
+/// What a game is asked, and what of it the functions of this file do not answer.
+fn unanswered(file: &str) -> (BTreeSet<String>, BTreeSet<String>) {
+    let tokens = read(&workspace().join("plugin/lab/src/game.rs"));
+    let all = items(&tokens);
     let game = all.iter().find(|item| item.keyword == "trait" && item.name == "Game").expect("the trait is there");
     let asked = functions(&game.body);
     assert!(asked.len() > 20, "only {asked:?} were found: does the reader still see them?");
-    let file = read(&workspace().join("game/src/with_rays.rs"));
-    let answered = functions(&file);
-    let missing: Vec<_> = asked.difference(&answered).filter(|name| !OWN.contains(*name)).collect();
+    let tokens = read(&workspace().join(file));
+    let answered = functions(&tokens);
+    let missing = asked.difference(&answered).map(|name| (*name).to_owned()).collect();
+    (asked.into_iter().map(str::to_owned).collect(), missing)
+}
+
+#[test]
+fn games_with_rays_hand_on_all_that_a_game_is_asked() {
+    let (asked, missing) = unanswered("game/src/with_rays.rs");
+    let missing: Vec<_> = missing.iter().filter(|name| !OWN.contains(&name.as_str())).collect();
     assert!(missing.is_empty(), "game/src/with_rays.rs lacks {missing:?}: hand them on in `as_without_rays!`");
-    let unknown: Vec<_> = OWN.iter().filter(|name| !asked.contains(*name)).collect();
+    let unknown: Vec<_> = OWN.iter().filter(|name| !asked.contains(**name)).collect();
     assert!(unknown.is_empty(), "no game is asked {unknown:?} any more");
+}
+
+#[test]
+fn games_with_planted_defects_hand_on_all_that_a_game_is_asked() {
+    let (_, missing) = unanswered("plugin/lab/src/bugs/mutant.rs");
+    assert!(missing.is_empty(), "plugin/lab/src/bugs/mutant.rs lacks {missing:?}: hand them on in `as_sound!`");
 }

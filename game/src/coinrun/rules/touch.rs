@@ -29,6 +29,18 @@ impl Outcome {
     pub const fn is_success(self) -> bool {
         matches!(self, Outcome::Coin)
     }
+
+    /// Why the coin was not reached, for people; `None` if it was.
+    pub const fn cause(self) -> Option<&'static str> {
+        match self {
+            Outcome::Coin => None,
+            Outcome::Saw => Some("saw"),
+            Outcome::Enemy => Some("enemy"),
+            Outcome::Lava => Some("lava"),
+            Outcome::LeftMap => Some("left the map"),
+            Outcome::Timeout => Some("time"),
+        }
+    }
 }
 
 /// How the episode ends after step number `step` (from 1), if it does. `saws` may be any subset

@@ -6,4 +6,5 @@ mod recorded;
 mod talents;
 mod verb;
 
+pub use talents::Talents;
 pub use verb::{Args, run};

@@ -8,6 +8,7 @@ use playbot_lab::{
     verdict_report::{HtmlReport, REPORT, write_html},
 };
 
+use super::failure;
 use crate::{
     error::{CliError, Outcome},
     output, program,
@@ -40,7 +41,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let comparison = args.against.as_ref().map(|before| Comparison::read(before, &args.results)).transpose()?;
     let game = games.get(&lines.record().game).ok();
     let report = HtmlReport { game, comparison: comparison.as_ref(), program: program::name() };
-    write_html(&args.results, &file, &report)?;
+    write_html(&args.results, &file, &report).map_err(|error| {
+        failure::told(error, "the results are unchanged: make room or rights there, or name another file with --out")
+    })?;
     tell!("{}", file.display());
     Ok(Outcome::Pass)
 }

@@ -1,12 +1,13 @@
 //! `playbot report merge`.
 
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 use playbot_lab::{
     games::Games,
-    verdict::{RESULTS, ResultLines, merge},
+    verdict::{Comparison, RESULTS, ResultLines, TestRecord, merge},
 };
 
+use super::failure;
 use crate::{
     error::{CliError, Outcome},
     test::{Results, tell_results},
@@ -38,19 +39,41 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
-    if !args.force && args.out.join(RESULTS).exists() {
-        return Err(CliError::Usage(format!(
-            "{} has results already: choose another --out, or replace them with --force",
-            args.out.display()
-        )));
-    }
-    let game = match args.shards.first() {
-        // Without the game there are no pictures, and all else is the same.
-        Some(shard) => games.get(&ResultLines::open(shard)?.record().game).ok(),
-        None => None,
+    check_out(args)?;
+    let Some(first) = args.shards.first() else {
+        return Err(CliError::Usage("name the folders of the shards".to_owned()));
     };
+    let record = TestRecord { shard: None, ..ResultLines::open(first)?.record().clone() };
+    // Without the game there are no pictures, and all else is the same.
+    let game = games.get(&record.game).ok();
     let results = Results { folder: &args.out, against: args.against.as_deref(), game, json: args.json };
     results.check_folders()?;
-    merge(&args.shards, &args.out)?;
+    // Nothing is written where it turns out that nothing can be compared.
+    if let Some(before) = results.against {
+        Comparison::check(before, &record)?;
+    }
+    merge(&args.shards, &args.out).map_err(|error| {
+        failure::told(error, "the shards are unchanged: make room or rights there and call this again")
+    })?;
     tell_results(&results)
+}
+
+/// Checks that the joined results take the place of nothing that is needed.
+fn check_out(args: &Args) -> Result<(), CliError> {
+    let out = args.out.display();
+    if args.out.is_file() {
+        return Err(CliError::Usage(format!("{out} is a file: name a folder to write into")));
+    }
+    // A path that is not there is no folder of a shard.
+    if let Ok(folder) = fs::canonicalize(&args.out)
+        && args.shards.iter().any(|shard| fs::canonicalize(shard).is_ok_and(|shard| shard == folder))
+    {
+        return Err(CliError::Usage(format!("--out {out} is the folder of a shard: choose another --out")));
+    }
+    if !args.force && args.out.join(RESULTS).exists() {
+        return Err(CliError::Usage(format!(
+            "{out} has results already: choose another --out, or replace them with --force"
+        )));
+    }
+    Ok(())
 }

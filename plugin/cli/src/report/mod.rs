@@ -1,5 +1,7 @@
 //! `playbot report`.
 
+mod calibrate;
+mod failure;
 mod html;
 mod merge;
 mod verb;

@@ -1,10 +1,12 @@
 //! What looks for defects, as the command line names it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use playbot_lab::{
-    detectors::{ALWAYS, DetectorChoice, DetectorInfo, Detectors, TIMING, forget_timing, list},
+    detectors::{ALWAYS, DetectorChoice, DetectorError, DetectorInfo, Detectors, Pars, TIMING, forget_timing, list},
+    findings::Checks,
     game::Game,
+    games::Games,
 };
 
 use crate::{
@@ -24,25 +26,68 @@ pub struct DetectorArgs {
     /// A setting of a detector; may be given several times.
     #[arg(long, value_name = "NAME.KEY=VALUE")]
     detector: Vec<String>,
+    /// Ticks that levels should take, for the detectors shortcut and too-long, which look then: a .json file with the ticks of
+    /// each level by its name, or recordings, whose fastest won episodes count.
+    #[arg(long, value_name = "FILE")]
+    par: Option<PathBuf>,
     /// List all detectors with their settings, and test nothing.
     #[arg(long = "detectors")]
     pub list_detectors: bool,
 }
+
+/// Detectors that ask for pars.
+const OF_PARS: [&str; 2] = ["shortcut", "too-long"];
 
 impl DetectorArgs {
     /// The detectors that were chosen.
     ///
     /// # Errors
     ///
-    /// There is no such detector or setting, or a number makes no sense.
+    /// There is no such detector or setting, a number makes no sense, or the pars cannot be read.
     pub fn choose(&self, game: &dyn Game) -> Result<Detectors, CliError> {
-        let choice = DetectorChoice {
-            with: self.detect.clone(),
-            without: self.no_detect.clone(),
-            settings: self.detector.clone(),
-        };
-        Detectors::choose(game, &choice).map_err(|error| CliError::Usage(error.to_string()))
+        let mut with = self.detect.clone();
+        if self.par.is_some() {
+            let is_wanted = |name: &&str| !self.no_detect.iter().any(|other| other == name);
+            with.extend(OF_PARS.into_iter().filter(is_wanted).map(str::to_owned));
+        }
+        let choice = DetectorChoice { with, without: self.no_detect.clone(), settings: self.detector.clone() };
+        let detectors = Detectors::choose(game, &choice).map_err(|error| usage(&error))?;
+        match &self.par {
+            Some(path) => Ok(detectors.with_pars(Pars::read(path, game).map_err(|error| usage(&error))?)),
+            None => Ok(detectors),
+        }
     }
+
+    /// All detectors of a game, with these settings: they look for findings again.
+    ///
+    /// # Errors
+    ///
+    /// The game has no such detector or setting, or a number makes no sense.
+    pub fn all(&self, game: &dyn Game) -> Result<Detectors, DetectorError> {
+        let (with, settings) = (vec!["all".to_owned()], self.detector.clone());
+        Detectors::choose(game, &DetectorChoice { with, without: Vec::new(), settings })
+    }
+
+    /// The checks of findings of a game. A game that lacks a detector which is set has its usual ones.
+    pub fn checks(&self, game: &dyn Game) -> Checks {
+        self.all(game).map_or_else(|_| Checks::of_game(game), |all| Checks::default().with_detectors(&all))
+    }
+
+    /// Checks that some game has the detectors that are set.
+    ///
+    /// # Errors
+    ///
+    /// None has: what the first one says.
+    pub fn check_settings(&self, games: &Games) -> Result<(), CliError> {
+        if games.iter().any(|game| self.all(game).is_ok()) {
+            return Ok(());
+        }
+        self.all(games.first()).map(drop).map_err(|error| usage(&error))
+    }
+}
+
+fn usage(error: &impl ToString) -> CliError {
+    CliError::Usage(error.to_string())
 }
 
 /// Lists what there is for a game, a detector to a line, with its settings below it.

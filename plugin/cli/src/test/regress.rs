@@ -3,13 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use playbot_lab::{
-    findings::{Checks, Date, FindingStatus, Regress, RegressRow, Regression, list_findings, regress},
+    findings::{Date, FindingStatus, Regress, RegressRow, Regression, list_findings, regress_until},
+    game::Game,
     games::Games,
     report::PlainTable,
 };
 
+use super::detectors::DetectorArgs;
 use crate::{
     error::{CliError, Outcome, print_line},
+    interrupt,
     number::counted,
     progress,
 };
@@ -19,13 +22,13 @@ use crate::{
 pub struct RegressArgs {
     /// Play the findings in this folder again instead, as a test or `playbot replay --minimise` has written them, and say
     /// which are still there. Exit code 1 if one is, or cannot be played; those that are pinned in DIR/pins.ron do not count
-    /// until the day after their last.
+    /// until the day after their last. Detectors look as --detector sets them. Ctrl-C ends it with what is known by then.
     #[arg(
         long,
         value_name = "DIR",
         conflicts_with_all = [
             "game", "levels", "bot", "policy", "run", "out", "against", "shard", "resume", "force", "minimise",
-            "keep_failures",
+            "keep_failures", "detect", "no_detect", "par",
         ]
     )]
     regress: Option<PathBuf>,
@@ -36,17 +39,33 @@ pub struct RegressArgs {
 
 impl RegressArgs {
     /// Plays the findings again; `None` if nobody asked for it.
-    pub fn run(&self, games: &Games, threads: usize, json: bool) -> Option<Result<Outcome, CliError>> {
+    pub fn run(
+        &self,
+        games: &Games,
+        detectors: &DetectorArgs,
+        threads: usize,
+        json: bool,
+    ) -> Option<Result<Outcome, CliError>> {
         let today = self.today.unwrap_or_else(Date::today);
-        self.regress.as_deref().map(|folder| play(folder, games, today, threads, json))
+        self.regress.as_deref().map(|folder| play(folder, games, detectors, today, threads, json))
     }
 }
 
-fn play(folder: &Path, games: &Games, today: Date, threads: usize, json: bool) -> Result<Outcome, CliError> {
+fn play(
+    folder: &Path,
+    games: &Games,
+    detectors: &DetectorArgs,
+    today: Date,
+    threads: usize,
+    json: bool,
+) -> Result<Outcome, CliError> {
+    detectors.check_settings(games)?;
     let total = list_findings(folder)?.len() as u64;
+    interrupt::listen();
     let bar = progress::bar("replay findings", total, "findings");
-    let request = Regress { folder, games, checks: &Checks::of_game, today, threads };
-    let played = regress(&request, &|count| bar.inc(count));
+    let checks = |game: &dyn Game| detectors.checks(game);
+    let request = Regress { folder, games, checks: &checks, today, threads };
+    let played = regress_until(&request, &|count| bar.inc(count), &interrupt::asked);
     bar.finish_and_clear();
     let regression = played?;
     if json {
@@ -59,6 +78,13 @@ fn play(folder: &Path, games: &Games, today: Date, threads: usize, json: bool) -
         print_line(table(folder, &regression).to_text().trim_end())?;
     }
     tell_all(&regression);
+    if regression.left > 0 {
+        tell!(
+            "stopped; {} of {total} were not played: the same command plays all of them",
+            counted(regression.left, "finding")
+        );
+        return Ok(Outcome::Stopped);
+    }
     Ok(if regression.has_alarms() { Outcome::Findings } else { Outcome::Pass })
 }
 

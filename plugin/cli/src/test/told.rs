@@ -6,7 +6,7 @@ use playbot_lab::{
     game::Game,
     report::{PlainTable, readable, whole},
     verdict::{
-        AGAINST, Comparison, JUNIT, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, Trials, wilson,
+        AGAINST, Comparison, JUNIT, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal, Trials, wilson,
         write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
@@ -17,6 +17,9 @@ use crate::{
     number::counted,
     program,
 };
+
+/// Most findings whose replay is named.
+const MOST_REPLAYS: usize = 3;
 
 /// Results, and how they are told.
 pub struct Results<'a> {
@@ -70,6 +73,7 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
         }
     }
     tell!("{}", counts(&overview));
+    replays(results.folder, &overview).iter().for_each(|command| tell!("{command}"));
     if let Some(comparison) = &comparison {
         tell_comparison(comparison);
     }
@@ -77,6 +81,13 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     tell!("{}: {}", results.folder.display(), names.collect::<Vec<_>>().join(", "));
     let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// How findings of the worst levels are seen.
+fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
+    let findings = overview.worst.iter().flat_map(|level| &level.findings);
+    let files = findings.filter_map(|finding| finding.file.as_ref()).take(MOST_REPLAYS);
+    files.map(|file| format!("see it: {} replay {}", program::name(), folder.join(file).display())).collect()
 }
 
 fn counts(overview: &Overview) -> String {
@@ -95,12 +106,13 @@ fn testers(overview: &Overview) -> PlainTable {
         let [low, high] = wilson(of.successes, of.trials).map(|share| 100.0 * share);
         format!("{} of {} ({low:.1} to {high:.1} %)", whole(of.successes as f64), whole(of.trials as f64))
     };
-    let rows =
-        overview.testers.iter().map(|tester| vec![tester.name.clone(), share(tester.levels), share(tester.episodes)]);
+    let row = |tester: &TesterTotal| {
+        vec![tester.name.clone(), share(tester.levels), share(tester.episodes), tester.places.describe()]
+    };
     PlainTable {
         caption: format!("{} {}", overview.record.game, overview.record.range),
-        columns: ["tester", "levels solved", "episodes solved"].map(str::to_owned).to_vec(),
-        rows: rows.collect(),
+        columns: ["tester", "levels solved", "episodes solved", "places visited"].map(str::to_owned).to_vec(),
+        rows: overview.testers.iter().map(row).collect(),
     }
 }
 
@@ -116,12 +128,15 @@ fn worst(overview: &Overview) -> PlainTable {
             readable(median),
             whole(score.lost as f64),
             whole(score.timed_out as f64),
+            level.places.unwrap_or_default().describe(),
             finding,
         ]
     };
     PlainTable {
         caption: "levels to look at".to_owned(),
-        columns: ["level", "outcome", "solved", "ticks", "lost", "timed out", "finding"].map(str::to_owned).to_vec(),
+        columns: ["level", "outcome", "solved", "ticks", "lost", "timed out", "visited", "finding"]
+            .map(str::to_owned)
+            .to_vec(),
         rows: overview.worst.iter().map(row).collect(),
     }
 }

@@ -45,6 +45,7 @@ use crate::{
   playbot test GAME --levels MODE:0..99 --policy bot.policy --out runs/test --resume
   playbot test GAME --levels MODE:0..99 --against runs/before --out runs/after
   playbot test GAME --levels MODE:0..99 --detect reward-loop --detector stuck.ticks=200 --out runs/test
+  playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test
   playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
 pub struct Args {
     /// Name of the game.
@@ -95,7 +96,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         let game = args.game.as_ref().map_or_else(|| Ok(games.first()), |name| games.get(name))?;
         return list_detectors(game, args.json);
     }
-    if let Some(outcome) = args.regress.run(games, args.compute.threads(), args.json) {
+    if let Some(outcome) = args.regress.run(games, &args.detectors, args.compute.threads(), args.json) {
         return outcome;
     }
     let (Some(name), Some(out)) = (&args.game, &args.out) else {

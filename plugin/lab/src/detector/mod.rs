@@ -19,9 +19,11 @@
 mod contract;
 mod each_tick;
 mod moment;
+mod proofs;
 mod setting;
 
 pub use contract::{Detector, LevelAhead, Watch, WorldWatch};
 pub use each_tick::EachTick;
 pub use moment::{Moment, WorldMoment};
+pub use proofs::{NoProofs, Proofs};
 pub use setting::Setting;

@@ -3,6 +3,8 @@
 use bevy::prelude::*;
 use bevy_playbot::{action::ActionValue, state_hash::StateHash};
 
+use super::proofs::Proofs;
+
 /// A tick of an episode that was just played, as it left the World.
 #[derive(Clone, Copy)]
 pub struct Moment<'a> {
@@ -26,6 +28,8 @@ pub struct Moment<'a> {
     pub place: Option<Vec2>,
     /// Whether the level's aim was reached, now or before.
     pub is_success: bool,
+    /// What the game can prove.
+    pub proofs: &'a dyn Proofs,
 }
 
 /// A tick of a World.

@@ -1,10 +1,12 @@
 //! All detectors that there are.
 
 use super::{
-    blank_picture::BlankPicture, determinism::Determinism, entity_leak::EntityLeak, error_log::ErrorLog,
-    explosion::PhysicsExplosion, fell_through::FellThrough, frozen::FrozenWorld, level_detector::LevelDetector,
-    out_of_bounds::OutOfBounds, reward_farm::RewardFarm, reward_loop::RewardLoop, runaway::Runaway, shortcut::Shortcut,
-    stuck::Stuck, tick_time::TickTime, unreachable_region::UnreachableRegion,
+    blank_picture::BlankPicture, clock_end::ClockEnd, determinism::Determinism, entity_leak::EntityLeak,
+    error_log::ErrorLog, explosion::PhysicsExplosion, far_goal::FarGoal, fell_through::FellThrough,
+    frozen::FrozenWorld, goal_ignored::GoalIgnored, level_detector::LevelDetector, out_of_bounds::OutOfBounds,
+    reward_farm::RewardFarm, reward_loop::RewardLoop, runaway::Runaway, short_time::ShortTime, shortcut::Shortcut,
+    soft_lock::SoftLock, stuck::Stuck, through_wall::ThroughWall, tick_time::TickTime, too_long::TooLong,
+    uneven_time::UnevenTime, unreachable_region::UnreachableRegion,
 };
 use crate::{
     detector::{Detector, Setting},
@@ -67,6 +69,8 @@ impl Known {
 pub(super) fn all(game: &dyn Game) -> Vec<Known> {
     let ticks: Vec<Box<dyn Detector>> = vec![
         Box::<Stuck>::default(),
+        Box::<SoftLock>::default(),
+        Box::<ThroughWall>::default(),
         Box::<OutOfBounds>::default(),
         Box::<FellThrough>::default(),
         Box::<Runaway>::default(),
@@ -75,10 +79,16 @@ pub(super) fn all(game: &dyn Game) -> Vec<Known> {
         Box::<PhysicsExplosion>::default(),
         Box::<BlankPicture>::default(),
         Box::<RewardLoop>::default(),
+        Box::<GoalIgnored>::default(),
+        Box::<FarGoal>::default(),
+        Box::<ShortTime>::default(),
     ];
     let levels: Vec<Box<dyn LevelDetector>> = vec![
         Box::<EntityLeak>::default(),
         Box::<Shortcut>::default(),
+        Box::<TooLong>::default(),
+        Box::<ClockEnd>::default(),
+        Box::<UnevenTime>::default(),
         Box::<UnreachableRegion>::default(),
         Box::<Determinism>::default(),
         Box::<RewardFarm>::default(),

@@ -7,10 +7,10 @@ use bevy_playbot::{
 };
 
 use super::{
-    level_detector::{LevelDefect, LevelDetector, TestedLevel},
+    level_detector::{LevelDefect, LevelDetector, ShownBy, TestedLevel},
     probe::Probe,
 };
-use crate::{detector::Setting, eval::Player};
+use crate::{detector::Setting, eval::Player, game::Game};
 
 /// Each episode of a level leaves entities behind. Some levels are played a few times anew, each time up to the same tick,
 /// and what is in the World is counted.
@@ -33,13 +33,13 @@ impl Default for EntityLeak {
 
 impl EntityLeak {
     /// How many entities there are after each episode; fewer numbers if the game breaks.
-    fn counts(&self, level: &TestedLevel<'_>) -> Vec<u32> {
+    fn counts(&self, game: &dyn Game, mode: &str, level: u64) -> Vec<u32> {
         let (episodes, ticks) = (self.episodes as usize, self.ticks as u32);
         let player = Player::Blind(BlindBot::Uniform);
         let seeds = vec![0; episodes];
         let mut counts = Vec::new();
         let config = ObservationConfig::default();
-        let Ok(mut probe) = Probe::new(level.game, level.mode, level.level, &player, &config, seeds) else {
+        let Ok(mut probe) = Probe::new(game, mode, level, &player, &config, seeds) else {
             return counts;
         };
         for _ in 0..episodes {
@@ -62,6 +62,15 @@ impl EntityLeak {
             }
         }
         counts
+    }
+
+    /// What a level leaks, in words.
+    fn leak(&self, game: &dyn Game, mode: &str, level: u64) -> Option<String> {
+        // A World that is built anew has forgotten everything.
+        if game.built_anew().is_some() {
+            return None;
+        }
+        grows(&self.counts(game, mode, level))
     }
 }
 
@@ -87,14 +96,19 @@ impl LevelDetector for EntityLeak {
     }
 
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
-        // A World that is built anew has forgotten everything.
-        if !level.is_sample(self.every) || level.game.built_anew().is_some() {
+        if !level.is_sample(self.every) {
             return Vec::new();
         }
-        grows(&self.counts(level))
-            .map(|message| LevelDefect { message, ..LevelDefect::default() })
-            .into_iter()
-            .collect()
+        let leak = self.leak(level.game, level.mode, level.level);
+        leak.map(|message| LevelDefect { message, ..LevelDefect::default() }).into_iter().collect()
+    }
+
+    fn shown_by(&self) -> ShownBy {
+        ShownBy::Level
+    }
+
+    fn is_in_level(&self, game: &dyn Game, mode: &str, level: u64) -> bool {
+        self.leak(game, mode, level).is_some()
     }
 }
 

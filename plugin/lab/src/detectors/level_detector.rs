@@ -1,5 +1,8 @@
 //! Detectors that look at a level after it was tested.
 
+use std::collections::BTreeMap;
+
+use bevy::math::Vec2;
 use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
 
 use crate::{detector::Setting, eval::Player, game::Game};
@@ -27,6 +30,33 @@ pub trait LevelDetector: Send + Sync {
 
     /// What is wrong with a level.
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect>;
+
+    /// Where a finding of it is looked for again.
+    fn shown_by(&self) -> ShownBy {
+        ShownBy::Nothing
+    }
+
+    /// Whether it finds something in a level in which nobody else has played: for [`ShownBy::Level`].
+    fn is_in_level(&self, _game: &dyn Game, _mode: &str, _level: u64) -> bool {
+        false
+    }
+
+    /// Whether an episode that ended so shows its finding: for [`ShownBy::Episode`]. `tick` is that of the finding, if it is
+    /// known already.
+    fn is_in_episode(&self, _result: &EpisodeResult, _tick: Option<u32>) -> bool {
+        false
+    }
+}
+
+/// What shows a finding again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShownBy {
+    /// Nothing that could be played again: such findings have no file.
+    Nothing,
+    /// The level, for which no tester has to play.
+    Level,
+    /// The end of the episode that the finding names.
+    Episode,
 }
 
 /// A level that was tested.
@@ -39,6 +69,8 @@ pub struct TestedLevel<'a> {
     pub level: u64,
     /// Its place in the range of the test, from 0; the same in all shards.
     pub place: u64,
+    /// Ticks that the level should take, if the designer or demonstrations say so.
+    pub par: Option<f64>,
     /// Who played it.
     pub testers: Vec<TestedBy<'a>>,
 }
@@ -55,6 +87,8 @@ pub struct TestedBy<'a> {
     pub seed: u64,
     /// Its episodes, each with its number; those in which the game broke are not among them.
     pub episodes: Vec<(u32, EpisodeResult)>,
+    /// Where the agent was at the end of these episodes, if the game says, by their numbers.
+    pub places: BTreeMap<u32, Vec2>,
 }
 
 /// Something that is wrong with a level.

@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::{
     catalogue::{Known, all},
     level_detector::LevelDetector,
+    par::Pars,
     tick_time::TickTime,
 };
 use crate::{detector::Detector, game::Game};
@@ -32,6 +33,7 @@ pub struct Detectors {
     pub(crate) ticks: Vec<Arc<dyn Detector>>,
     pub(crate) levels: Vec<Arc<dyn LevelDetector>>,
     clock: Option<Arc<TickTime>>,
+    pars: Pars,
     record: Vec<String>,
 }
 
@@ -105,7 +107,22 @@ impl Detectors {
         detectors
     }
 
-    /// What results depend on: each detector with its settings.
+    /// With pars of levels, for those detectors that ask for them.
+    #[must_use]
+    pub fn with_pars(mut self, pars: Pars) -> Self {
+        if !pars.is_empty() {
+            self.record.push(format!("pars {:016x}", pars.hash()));
+        }
+        self.pars = pars;
+        self
+    }
+
+    /// The par of the level with this name.
+    pub fn par(&self, level: &str) -> Option<f64> {
+        self.pars.of(level)
+    }
+
+    /// What results depend on: each detector with its settings, and a hash of the pars.
     pub fn record(&self) -> &[String] {
         &self.record
     }

@@ -2,15 +2,15 @@
 
 use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
 
-use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
+use super::level_detector::{LevelDefect, LevelDetector, ShownBy, TestedLevel};
 use crate::{
     detector::Setting,
     eval::{EvalPlan, Player, evaluate},
     split::LevelSplit,
 };
 
-/// A tester solves a level in far fewer ticks than it should take: the designer's par, or what the game's demonstrator
-/// needs.
+/// A tester solves a level in far fewer ticks than it should take: its par, by the designer or by demonstrations, or else what
+/// the game's demonstrator needs.
 pub struct Shortcut {
     factor: f64,
     par: f64,
@@ -27,6 +27,9 @@ impl Shortcut {
     fn par(&self, level: &TestedLevel<'_>) -> Option<f64> {
         if self.par > 0.0 {
             return Some(self.par);
+        }
+        if level.par.is_some() {
+            return level.par;
         }
         level.game.demonstrator()?;
         let split = LevelSplit { mode: level.mode.to_owned(), first: level.level, last: level.level };
@@ -57,7 +60,11 @@ impl LevelDetector for Shortcut {
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
             Setting::new("factor", &mut self.factor, "share of the par that is too fast"),
-            Setting::new("par", &mut self.par, "ticks that a level should take; 0 for those of the demonstrator"),
+            Setting::new(
+                "par",
+                &mut self.par,
+                "ticks that a level should take; 0 for those of --par, or of the demonstrator",
+            ),
         ]
     }
 
@@ -74,8 +81,40 @@ impl LevelDetector for Shortcut {
         let tick = fastest.ticks.checked_sub(1);
         vec![LevelDefect { tester: Some(tester.to_owned()), episode: Some(episode), tick, message }]
     }
+
+    fn shown_by(&self) -> ShownBy {
+        ShownBy::Episode
+    }
+
+    /// Whoever is faster still has found it, too.
+    fn is_in_episode(&self, result: &EpisodeResult, tick: Option<u32>) -> bool {
+        result.success && tick.is_none_or(|tick| result.ticks <= tick.saturating_add(1))
+    }
 }
 
 fn is_too_fast(result: &EpisodeResult, par: f64, factor: f64) -> bool {
     f64::from(result.ticks) < par * factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detectors::testing::{LOST, WON, inspected};
+
+    #[test]
+    fn a_level_that_is_solved_far_faster_than_its_par_has_a_shortcut() {
+        let episodes = [(WON, 90, [1.0; 2]), (WON, 40, [1.0; 2]), (LOST, 3, [1.0; 2])];
+        let found = inspected(&Shortcut::default(), &episodes, Some(100.0));
+        assert_eq!((found.len(), found[0].episode, found[0].tick), (1, Some(1), Some(39)));
+        assert!(inspected(&Shortcut::default(), &episodes, Some(80.0)).is_empty(), "half the par is no shortcut");
+        assert!(inspected(&Shortcut::default(), &episodes, None).is_empty(), "nobody demonstrates it");
+    }
+
+    #[test]
+    fn an_episode_that_is_as_fast_shows_it_again() {
+        let ended =
+            |end, ticks| EpisodeResult { level: 0, end, success: end == WON, ticks, clipped: 0, total_reward: 0.0 };
+        let shows = |end, ticks| Shortcut::default().is_in_episode(&ended(end, ticks), Some(39));
+        assert!(shows(WON, 40) && shows(WON, 12) && !shows(WON, 41) && !shows(LOST, 12));
+    }
 }

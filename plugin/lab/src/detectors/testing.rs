@@ -1,11 +1,18 @@
 //! Moments for tests.
 
 use bevy::prelude::*;
-use bevy_playbot::action::ActionValue;
+use bevy_playbot::{
+    action::ActionValue,
+    episode::{EpisodeEnd, EpisodeResult},
+    vision::ObservationConfig,
+};
 
+use super::level_detector::{LevelDefect, LevelDetector, TestedBy, TestedLevel};
 use crate::{
-    detector::{Detector, LevelAhead, Moment, WorldMoment},
+    detector::{Detector, LevelAhead, Moment, NoProofs, Proofs, WorldMoment},
+    eval::Player,
     floor_plan::FloorPlan,
+    foreign::ForeignGame,
 };
 
 /// What happens in a tick.
@@ -39,6 +46,36 @@ pub fn room() -> LevelAhead {
 
 /// What a detector says of an episode on a level, and in which tick.
 pub fn found(detector: &dyn Detector, level: &LevelAhead, steps: &[Step]) -> Option<(u32, String)> {
+    found_proving(detector, level, steps, &NoProofs)
+}
+
+/// The same in a game that can prove something.
+pub fn found_proving(
+    detector: &dyn Detector,
+    level: &LevelAhead,
+    steps: &[Step],
+    proofs: &dyn Proofs,
+) -> Option<(u32, String)> {
+    play(detector, level, steps, proofs, false)
+}
+
+/// The same of an episode in which time is up after its last tick.
+pub fn timed_out_proving(
+    detector: &dyn Detector,
+    level: &LevelAhead,
+    steps: &[Step],
+    proofs: &dyn Proofs,
+) -> Option<(u32, String)> {
+    play(detector, level, steps, proofs, true)
+}
+
+fn play(
+    detector: &dyn Detector,
+    level: &LevelAhead,
+    steps: &[Step],
+    proofs: &dyn Proofs,
+    is_timed_out: bool,
+) -> Option<(u32, String)> {
     let mut world = World::new();
     let agent = world.spawn_empty().id();
     let mut watch = detector.watch(level)?;
@@ -56,12 +93,57 @@ pub fn found(detector: &dyn Detector, level: &LevelAhead, steps: &[Step]) -> Opt
             reward: step.reward,
             place: step.place,
             is_success: step.is_success,
+            proofs,
         };
-        watch.tick(&moment).map(|message| (tick, message))
+        let is_end = is_timed_out && tick as usize + 1 == steps.len();
+        let result = EpisodeResult {
+            level: level.level,
+            end: EpisodeEnd::Truncated,
+            success: step.is_success,
+            ticks: tick + 1,
+            clipped: 0,
+            total_reward: 0.0,
+        };
+        let now = watch.tick(&moment);
+        let message = now.or_else(|| if is_end { watch.end(&moment, &result) } else { None });
+        message.map(|message| (tick, message))
     })
 }
 
 /// What a detector says of a World.
 pub fn found_in(detector: &dyn Detector, world: &World) -> Option<String> {
     detector.watch_world()?.tick(&WorldMoment { world, errors: &[] })
+}
+
+/// How an episode ended.
+pub const WON: EpisodeEnd = EpisodeEnd::Terminated { success: true };
+/// Another way.
+pub const LOST: EpisodeEnd = EpisodeEnd::Terminated { success: false };
+/// And the third one.
+pub const TIMED_OUT: EpisodeEnd = EpisodeEnd::Truncated;
+
+/// What a detector says of a level without plan after these episodes of one tester: how each ended, its ticks, and where.
+pub fn inspected(
+    detector: &dyn LevelDetector,
+    episodes: &[(EpisodeEnd, u32, [f32; 2])],
+    par: Option<f64>,
+) -> Vec<LevelDefect> {
+    let game = ForeignGame::new("garden", 1, |_: &mut App| {});
+    let result = |&(end, ticks, _): &(EpisodeEnd, u32, [f32; 2])| EpisodeResult {
+        level: 0,
+        end,
+        success: end.is_success(),
+        ticks,
+        clipped: 0,
+        total_reward: 0.0,
+    };
+    let tester = TestedBy {
+        name: "random",
+        player: &Player::Demonstrator,
+        observation_config: ObservationConfig::default(),
+        seed: 0,
+        episodes: (0..).zip(episodes.iter().map(result)).collect(),
+        places: (0..).zip(episodes.iter().map(|(_, _, place)| Vec2::from_array(*place))).collect(),
+    };
+    detector.inspect(&TestedLevel { game: &game, mode: "plain", level: 0, place: 0, par, testers: vec![tester] })
 }

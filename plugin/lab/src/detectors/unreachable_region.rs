@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
+use super::level_detector::{LevelDefect, LevelDetector, ShownBy, TestedLevel};
 use crate::{
     detector::Setting,
     explore::{ExplorePlan, explore},
+    game::Game,
 };
 
 /// An explorer does not get to tiles that no wall cuts off from the start. It is no proof, and takes some seconds for each
@@ -22,6 +23,24 @@ const NAMED: usize = 4;
 impl Default for UnreachableRegion {
     fn default() -> Self {
         Self { steps: 100_000.0, share: 0.05, every: 1.0 }
+    }
+}
+
+impl UnreachableRegion {
+    /// What an explorer does not get to, in words.
+    fn missed(&self, game: &dyn Game, mode: &str, level: u64) -> Option<String> {
+        let plan =
+            ExplorePlan { steps: self.steps as u64, arenas: 8, worlds: 1, threads: 1, ..ExplorePlan::new(mode, level) };
+        // A game that breaks or does not replay is found by others.
+        let found = explore(game, &plan, |_| {}, |_| ControlFlow::Continue(())).ok()?;
+        let coverage = found.coverage().filter(|coverage| 1.0 - coverage > self.share)?;
+        let missed: Vec<String> = found.missed().take(NAMED).map(ToString::to_string).collect();
+        Some(format!(
+            "an explorer of {} steps reached {:.0} % of the open tiles, and not {}",
+            found.steps,
+            100.0 * coverage,
+            missed.join(" or ")
+        ))
     }
 }
 
@@ -46,23 +65,15 @@ impl LevelDetector for UnreachableRegion {
         if !level.is_sample(self.every) {
             return Vec::new();
         }
-        let plan = ExplorePlan {
-            steps: self.steps as u64,
-            arenas: 8,
-            worlds: 1,
-            threads: 1,
-            ..ExplorePlan::new(level.mode, level.level)
-        };
-        // A game that breaks or does not replay is found by others.
-        let Ok(found) = explore(level.game, &plan, |_| {}, |_| ControlFlow::Continue(())) else { return Vec::new() };
-        let Some(coverage) = found.coverage().filter(|coverage| 1.0 - coverage > self.share) else { return Vec::new() };
-        let missed: Vec<String> = found.missed().take(NAMED).map(ToString::to_string).collect();
-        let message = format!(
-            "an explorer of {} steps reached {:.0} % of the open tiles, and not {}",
-            found.steps,
-            100.0 * coverage,
-            missed.join(" or ")
-        );
-        vec![LevelDefect { message, ..LevelDefect::default() }]
+        let missed = self.missed(level.game, level.mode, level.level);
+        missed.map(|message| LevelDefect { message, ..LevelDefect::default() }).into_iter().collect()
+    }
+
+    fn shown_by(&self) -> ShownBy {
+        ShownBy::Level
+    }
+
+    fn is_in_level(&self, game: &dyn Game, mode: &str, level: u64) -> bool {
+        self.missed(game, mode, level).is_some()
     }
 }

@@ -38,6 +38,8 @@ pub struct ExplorePlan {
     pub worlds: u32,
     /// Threads: not part of the result.
     pub threads: usize,
+    /// Whether the actions before a panic of the game are kept in a file.
+    pub keeps_panics: bool,
 }
 
 impl ExplorePlan {
@@ -58,6 +60,7 @@ impl ExplorePlan {
             arenas: 16,
             worlds: 4,
             threads: default_threads(),
+            keeps_panics: true,
         }
     }
 

@@ -1,7 +1,7 @@
 //! A World in which agents make visits.
 
 use bevy::prelude::*;
-use bevy_playbot::{control::Control, headless::tick_world, vision::VisionError};
+use bevy_playbot::{control::Control, headless::tick_world, panics::PanicReports, vision::VisionError};
 use playbot_learner::Streams;
 
 use super::{
@@ -40,6 +40,9 @@ impl<'a> ExploreWorld<'a> {
     ) -> Result<Self, VisionError> {
         let (mut world, agents) = build_observing_world(game, &plan.mode, &plan.observation_config, 0, first, count)?;
         EndedEpisodes::note_in(&mut world);
+        if let Some(mut reports) = world.get_resource_mut::<PanicReports>().filter(|_| !plan.keeps_panics) {
+            reports.keep_no_files();
+        }
         plan.explorer.install(&mut world);
         let draws = Draws {
             streams: Streams::new(plan.seed),

@@ -4,11 +4,13 @@ use bevy_playbot::fault::Fault;
 
 /// How a game's panic is told, behind where it was.
 const PANICKED: &str = "the game panicked: ";
+/// How an agent is told whose eye has never seen anything.
+const BLANK: &str = "each picture of an episode of ";
 
 /// The game broke: it panicked, broke its contract, or the episode never ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Breakage {
-    /// `panic`, `fault` or `endless`.
+    /// `panic`, `fault`, `blank-picture` or `endless`.
     pub detector: &'static str,
     /// Tick of the episode, from 0.
     pub tick: u32,
@@ -18,11 +20,11 @@ pub struct Breakage {
 
 impl Breakage {
     /// What a fault in this tick means.
-    pub(super) fn of_fault(fault: &Fault, tick: u32) -> Self {
+    pub(crate) fn of_fault(fault: &Fault, tick: u32) -> Self {
         let Fault(message) = fault;
         match message.split_once(PANICKED) {
             Some((_, words)) => Self { detector: "panic", tick, message: words.to_owned() },
-            None => Self { detector: "fault", tick, message: without_moment(message).to_owned() },
+            None => Self { detector: detector_of(message), tick, message: without_moment(message).to_owned() },
         }
     }
 
@@ -30,6 +32,17 @@ impl Breakage {
     pub(super) fn endless(tick: u32) -> Self {
         let message = format!("the episode has not ended after {tick} ticks: give the game a time limit");
         Self { detector: "endless", tick, message }
+    }
+}
+
+/// What finds a fault with these words.
+pub(crate) fn detector_of(message: &str) -> &'static str {
+    if message.contains(PANICKED) {
+        "panic"
+    } else if message.contains(BLANK) {
+        "blank-picture"
+    } else {
+        "fault"
     }
 }
 
@@ -63,6 +76,9 @@ mod tests {
         let fault = of("agent 0, level 3, tick 7: the reward is NaN: why");
         assert_eq!((fault.detector, fault.message.as_str(), fault.tick), ("fault", "the reward is NaN: why", 7));
         assert_eq!(of("no camera: none").message, "no camera: none");
+        let blank =
+            of("agent 0, level 3: each picture of an episode of 9 ticks was of a single colour; point it elsewhere");
+        assert!(blank.detector == "blank-picture" && blank.message.starts_with("each picture"), "{blank:?}");
     }
 
     #[test]

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use super::{head::FindingHead, moment::Watcher, play::Replayed};
-use crate::game::Game;
+use crate::{
+    detectors::{LevelDetector, ShownBy},
+    game::Game,
+};
 
 /// How a detector's findings are looked for again.
 #[derive(Clone)]
@@ -14,4 +17,18 @@ pub enum Check {
     Episode(fn(&FindingHead, &Replayed) -> Option<u32>),
     /// In the World, tick by tick; each replay gets a watcher of its own.
     Ticks(Arc<dyn Fn(&FindingHead) -> Watcher + Send + Sync>),
+    /// By a detector that looks at whole levels: in the level itself, or in what came of the episode, as it
+    /// [says](LevelDetector::shown_by).
+    WholeLevel(Arc<dyn LevelDetector>),
+}
+
+impl Check {
+    /// Whether somebody has to play.
+    pub fn needs_play(&self) -> bool {
+        match self {
+            Self::Level(_) => false,
+            Self::Episode(_) | Self::Ticks(_) => true,
+            Self::WholeLevel(detector) => detector.shown_by() == ShownBy::Episode,
+        }
+    }
 }

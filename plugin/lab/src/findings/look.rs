@@ -8,7 +8,11 @@ use super::{
     play::{Replayed, play_actions},
     solo::Setting,
 };
-use crate::{game::level_designs, level_files::is_level_files};
+use crate::{
+    detectors::ShownBy,
+    game::{Game, level_designs},
+    level_files::is_level_files,
+};
 
 /// What was seen.
 pub(super) struct Look {
@@ -23,22 +27,36 @@ pub(super) struct Look {
 /// Plays the actions, unless the check needs nobody to play, and asks the check.
 pub(super) fn look(setting: Setting, head: &FindingHead, actions: &[ActionValue], check: &Check) -> Look {
     match check {
-        Check::Level(is_there) => {
-            let Setting { game, mode, level, .. } = setting;
-            let designs = is_level_files(mode).then(|| level_designs(game, mode).ok());
-            let level_file = designs.flatten().and_then(|designs| designs.files().of(level).cloned());
-            let replayed = Replayed { level_file, ..Replayed::default() };
-            Look { is_there: is_there(game, mode, level), tick: None, replayed }
-        }
-        Check::Episode(check) => {
-            let replayed = play_actions(setting, actions, None);
-            let tick = check(head, &replayed);
-            Look { is_there: tick.is_some(), tick, replayed }
-        }
+        Check::Level(is_there) => in_level(setting, *is_there),
+        Check::Episode(check) => in_episode(setting, actions, |replayed| check(head, replayed)),
         Check::Ticks(watcher) => {
             let replayed = play_actions(setting, actions, Some(watcher(head)));
             let tick = replayed.noticed;
             Look { is_there: tick.is_some(), tick, replayed }
         }
+        Check::WholeLevel(detector) => match detector.shown_by() {
+            ShownBy::Nothing => Look { is_there: false, tick: None, replayed: Replayed::default() },
+            ShownBy::Level => in_level(setting, |game, mode, level| detector.is_in_level(game, mode, level)),
+            ShownBy::Episode => in_episode(setting, actions, |replayed| {
+                let end = replayed.end.filter(|end| detector.is_in_episode(end, head.tick))?;
+                end.ticks.checked_sub(1)
+            }),
+        },
     }
+}
+
+/// Asks about the level; nobody plays.
+fn in_level(setting: Setting, is_there: impl Fn(&dyn Game, &str, u64) -> bool) -> Look {
+    let Setting { game, mode, level, .. } = setting;
+    let designs = is_level_files(mode).then(|| level_designs(game, mode).ok());
+    let level_file = designs.flatten().and_then(|designs| designs.files().of(level).cloned());
+    let replayed = Replayed { level_file, ..Replayed::default() };
+    Look { is_there: is_there(game, mode, level), tick: None, replayed }
+}
+
+/// Plays, and asks in which tick of the episode it was.
+fn in_episode(setting: Setting, actions: &[ActionValue], tick: impl Fn(&Replayed) -> Option<u32>) -> Look {
+    let replayed = play_actions(setting, actions, None);
+    let tick = tick(&replayed);
+    Look { is_there: tick.is_some(), tick, replayed }
 }

@@ -20,6 +20,8 @@ pub struct Moment<'a> {
     pub tick: u32,
     /// What came of the episode, if it ended in this tick.
     pub end: Option<EpisodeResult>,
+    /// What was logged as an error since the tick before, by anybody but the engine.
+    pub errors: &'a [String],
 }
 
 /// Hears every tick of an episode in their order, and says in which tick the finding was seen, once it was.

@@ -54,6 +54,9 @@ pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], mut watche
     // The watcher looks at the World, not at what agents see.
     let built = Solo::new(setting, &ObservationConfig::default());
     let mut solo = built.expect("nothing can be wrong with a vector");
+    if watcher.is_some() {
+        solo.listen();
+    }
     let mut replayed = Replayed { level_file: solo.level_file(), ..Replayed::default() };
     while let Some(action) = actions.get(solo.ticks() as usize) {
         solo.act(action.clone());

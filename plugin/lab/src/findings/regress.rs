@@ -70,6 +70,8 @@ pub struct Regression {
     pub rows: Vec<RegressRow>,
     /// Names of pins that no finding has.
     pub unknown_pins: Vec<String>,
+    /// Findings that were not played, since somebody asked to stop.
+    pub left: u64,
 }
 
 impl Regression {
@@ -85,19 +87,36 @@ impl Regression {
 ///
 /// There are none, or the pins cannot be understood. What is wrong with a single finding is told in its row.
 pub fn regress(request: &Regress, progress: &(dyn Fn(u64) + Sync)) -> Result<Regression, FindingError> {
+    regress_until(request, progress, &|| false)
+}
+
+/// [`regress`], until somebody asks to stop: then the rows are those of the findings that were played by then.
+///
+/// # Errors
+///
+/// As for [`regress`].
+pub fn regress_until(
+    request: &Regress,
+    progress: &(dyn Fn(u64) + Sync),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Regression, FindingError> {
     let pins = Pins::read(request.folder)?;
     let mut found = list_findings(request.folder)?;
-    let mut rows = on_threads(&mut found, request.threads, |(name, path)| {
+    let played = on_threads(&mut found, request.threads, |(name, path)| {
+        if stop() {
+            return None;
+        }
         let row = row(request, name, path);
         progress(1);
-        row
+        Some(row)
     });
+    let mut rows: Vec<RegressRow> = played.into_iter().flatten().collect();
     for row in &mut rows {
         row.pin = pins.of(&row.finding, request.today);
     }
-    let names: Vec<&str> = rows.iter().map(|row| row.finding.as_str()).collect();
-    let unknown_pins = pins.unknown(&names);
-    Ok(Regression { rows, unknown_pins })
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    let (unknown_pins, left) = (pins.unknown(&names), (found.len() - rows.len()) as u64);
+    Ok(Regression { rows, unknown_pins, left })
 }
 
 fn row(request: &Regress, name: &str, path: &Path) -> RegressRow {

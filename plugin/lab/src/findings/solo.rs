@@ -16,7 +16,7 @@ use bevy_playbot::{
 };
 
 use super::{breakage::Breakage, moment::Moment};
-use crate::{ended_episodes::EndedEpisodes, eval::Player, game::Game, worlds::build_observing_world};
+use crate::{detectors::Ear, ended_episodes::EndedEpisodes, eval::Player, game::Game, worlds::build_observing_world};
 
 /// Ticks after which an episode counts as one that never ends, as in tests of levels.
 const MOST_TICKS: u32 = 1_000_000;
@@ -42,6 +42,12 @@ pub(super) struct Solo<'a> {
     ticks: u32,
     /// Ticks and frames of the World: a level need not ever be ready.
     runs: u32,
+    /// Hears what is logged, if somebody wants to know.
+    ear: Option<Ear>,
+    /// What it heard in the last tick, and while the level was made ready before it.
+    errors: Vec<String>,
+    /// Whether the last run was a tick of the episode.
+    was_tick: bool,
 }
 
 impl<'a> Solo<'a> {
@@ -57,7 +63,13 @@ impl<'a> Solo<'a> {
         let agent = agents[0];
         let queue = LevelQueue::list([level]);
         world.entity_mut(agent).insert((Control::Bot, queue, EpisodeSeeds::new([seed])));
-        Ok(Self { game, mode, level, world, agent, ticks: 0, runs: 0 })
+        let (ear, errors) = (None, Vec::new());
+        Ok(Self { game, mode, level, world, agent, ticks: 0, runs: 0, ear, errors, was_tick: false })
+    }
+
+    /// From here on hears what is logged as an error.
+    pub fn listen(&mut self) {
+        self.ear = Some(Ear::new());
     }
 
     /// Hands the agent over to a player.
@@ -78,13 +90,22 @@ impl<'a> Solo<'a> {
             return Err(endless);
         }
         self.runs += 1;
-        tick_world(&mut self.world).map_err(|fault| Breakage::of_fault(&fault, self.ticks))?;
+        if std::mem::take(&mut self.was_tick) {
+            self.errors.clear();
+        }
+        let ticked = match &self.ear {
+            Some(ear) => ear.listen(|| tick_world(&mut self.world)),
+            None => tick_world(&mut self.world),
+        };
+        self.errors.extend(self.ear.as_ref().map(Ear::take).unwrap_or_default());
+        ticked.map_err(|fault| Breakage::of_fault(&fault, self.ticks))?;
         let played = match self.end() {
             Some(end) => end.ticks,
             None => self.world.get::<Episode>(self.agent).map_or(0, |episode| episode.tick),
         };
         let is_tick = played != self.ticks;
         self.ticks = played;
+        self.was_tick = is_tick;
         Ok(is_tick)
     }
 
@@ -122,7 +143,8 @@ impl<'a> Solo<'a> {
 
     /// The World after its last tick.
     pub fn moment(&self) -> Moment<'_> {
-        let tick = self.ticks.saturating_sub(1);
-        Moment { game: self.game, mode: self.mode, world: &self.world, agent: self.agent, tick, end: self.end() }
+        let (tick, end) = (self.ticks.saturating_sub(1), self.end());
+        let (game, mode, world, agent) = (self.game, self.mode, &self.world, self.agent);
+        Moment { game, mode, world, agent, tick, end, errors: &self.errors }
     }
 }

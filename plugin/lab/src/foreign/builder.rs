@@ -11,7 +11,7 @@ use super::{
     input::Input,
     restart_kind::Restart,
 };
-use crate::detector::Detector;
+use crate::{defect::DefectKind, detector::Detector};
 use bevy_playbot::{
     action::ActionSpace,
     episode::EpisodeEnd,
@@ -54,6 +54,7 @@ impl ForeignGame {
             hash: None,
             plugins: None,
             detectors: Vec::new(),
+            defects: Vec::new(),
         };
         Self { description: Arc::new(description) }
     }
@@ -160,6 +161,11 @@ impl ForeignGame {
     pub fn detector<D: Detector + 'static>(self, make: impl Fn() -> D + Send + Sync + 'static) -> Self {
         let make = move || -> Box<dyn Detector> { Box::new(make()) };
         self.with(|description| description.detectors.push(Arc::new(make)))
+    }
+
+    /// Adds a defect that can be planted into the game: see [`bugs`](crate::bugs).
+    pub fn defect(self, kind: DefectKind) -> Self {
+        self.with(|description| description.defects.push(kind))
     }
 
     /// Names of the actions, for people. Those of keys name themselves.

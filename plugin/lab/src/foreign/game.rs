@@ -8,7 +8,7 @@ use super::{
     demonstrator::ForeignBot, factory::SystemFactory, input::Input, install::ForeignPlugin, paths::ObservedPath,
     restart_kind::Restart, runtime::Sensor,
 };
-use crate::{detector::Detector, game::Game};
+use crate::{defect::DefectKind, detector::Detector, game::Game};
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
@@ -63,6 +63,8 @@ pub(super) struct Description {
     pub(super) plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
     /// What makes the game's own detectors.
     pub(super) detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
+    /// What can be planted into it.
+    pub(super) defects: Vec<DefectKind>,
 }
 
 impl Description {
@@ -202,6 +204,10 @@ impl Game for ForeignGame {
 
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
         self.description.detectors.iter().map(|make| make()).collect()
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        self.description.defects.clone()
     }
 
     fn demonstrator(&self) -> Option<&'static str> {

@@ -157,10 +157,14 @@ mod tests {
             designs.get::<u32>(1).expect_err("one file").contains("level 1 does not exist: there are 1 level files")
         );
         assert!(designs.get::<String>(0).expect_err("a number").contains("another game"));
-        fs::write(folder.path().join("c"), [0xff, 0xfe]).expect("writable");
+        fs::write(folder.path().join("c"), b"1\n 2\xff").expect("writable");
         let path = folder.path().join("c").to_string_lossy().into_owned();
         let error = LevelDesigns::of_file(&path, &number).expect_err("no text").to_string();
-        assert!(error.starts_with("cannot read ") && error.contains("/c: "), "{error}");
+        assert!(error.contains("/c, line 2: byte 3 of the line is no text"), "{error}");
+        let path = folder.path().join("d").to_string_lossy().into_owned();
+        fs::File::create(&path).and_then(|file| file.set_len((32 << 20) + 1)).expect("writable");
+        let error = LevelDesigns::of_file(&path, &number).expect_err("too large").to_string();
+        assert!(error.contains("/d has 33554433 bytes, but no level file has more than 33554432"), "{error}");
         let missing = LevelDesigns::of_file("no/such/file", &number).expect_err("missing");
         assert!(matches!(missing, LevelFileError::Unreadable { .. }));
     }

@@ -61,6 +61,18 @@ pub enum LevelFileError {
         /// The answer of the operating system.
         why: String,
     },
+    /// It holds no letters.
+    #[error(
+        "{path}, line {line}: byte {byte} of the line is no text in UTF-8: save the level as UTF-8, or is it another file?"
+    )]
+    NoText {
+        /// The file.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// Byte of the line, from 1.
+        byte: usize,
+    },
     /// No level takes so much room.
     #[error("{path} has {bytes} bytes, but no level file has more than {most}: is it another file?")]
     TooLarge {

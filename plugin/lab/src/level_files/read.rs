@@ -87,7 +87,16 @@ fn read_text(path: &str) -> Result<String, LevelFileError> {
     if bytes > MOST_BYTES {
         return Err(LevelFileError::TooLarge { path: path.to_owned(), bytes, most: MOST_BYTES });
     }
-    let mut text = String::new();
-    file.take(MOST_BYTES).read_to_string(&mut text).map_err(unreadable)?;
-    Ok(text)
+    let mut read = Vec::new();
+    // Some files do not know how long they are.
+    file.take(MOST_BYTES + 1).read_to_end(&mut read).map_err(unreadable)?;
+    if read.len() as u64 > MOST_BYTES {
+        return Err(LevelFileError::TooLarge { path: path.to_owned(), bytes: read.len() as u64, most: MOST_BYTES });
+    }
+    String::from_utf8(read).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        let byte = 1 + before.iter().rev().take_while(|&&byte| byte != b'\n').count();
+        LevelFileError::NoText { path: path.to_owned(), line, byte }
+    })
 }

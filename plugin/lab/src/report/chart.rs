@@ -12,12 +12,19 @@ pub struct Curve {
     /// Lower and upper end of a band around the line, one pair for each point: the range over the seeds,
     /// or mean ± standard deviation. Pairs that are not finite are left out.
     pub band: Option<Vec<(f64, f64)>>,
+    /// Whether its points are dots that nothing joins.
+    pub is_scatter: bool,
 }
 
 impl Curve {
     /// A line without a band.
     pub fn new(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), points, band: None }
+        Self { label: label.into(), points, ..Self::default() }
+    }
+
+    /// Dots that nothing joins.
+    pub fn scatter(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self { is_scatter: true, ..Self::new(label, points) }
     }
 
     /// Adds a band of `(low, high)`, one pair for each point.

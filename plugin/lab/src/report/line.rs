@@ -13,8 +13,12 @@ pub(super) struct Dot {
     pub band: Option<(f64, f64)>,
 }
 
-/// The stretches of a curve without gaps, in pixels, thinned to what the eye can tell apart.
+/// The stretches of a curve without gaps, in pixels, thinned to what the eye can tell apart. Of a scatter every point is one.
 pub(super) fn stretches(curve: &Curve, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> Vec<Vec<Dot>> {
+    if curve.is_scatter {
+        let dots = curve.points.iter().filter(|point| is_point(point));
+        return dots.map(|point| vec![Dot { x: x(point.0), y: y(point.1), band: None }]).collect();
+    }
     let band = |i: usize| curve.band.as_ref()?.get(i).copied().filter(is_point);
     let mut stretches = vec![Vec::new()];
     for (i, point) in curve.points.iter().enumerate() {

@@ -106,7 +106,9 @@ impl Layout {
 
         let drawn = || chart.curves.iter().filter(|c| !c.is_blank() && !c.label.is_empty());
         let label = drawn().map(|c| text_width(&c.label, SIZE)).fold(0.0, f64::max);
-        let direct = label <= 170.0 && drawn().count() as f64 * LINE <= PLOT_HEIGHT;
+        // A scatter ends nowhere, so that no label can stand where it ends.
+        let has_ends = !chart.curves.iter().any(|curve| curve.is_scatter);
+        let direct = has_ends && label <= 170.0 && drawn().count() as f64 * LINE <= PLOT_HEIGHT;
         let ticks = tick_labels(&y.ticks, y.step).iter().map(|t| text_width(t, SIZE)).fold(0.0, f64::max);
         let left = ticks + 12.0;
         let right = if direct && label > 0.0 { WIDTH - label - KEY - 12.0 } else { WIDTH - 16.0 };

@@ -163,3 +163,11 @@ fn a_report_is_written_whole_or_not_at_all() {
     assert!(report.write(&blocked).is_err(), "a folder is in the way");
     assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 2, "no temporary file is left");
 }
+
+#[test]
+fn a_scatter_is_dots_that_nothing_joins_with_its_name_below() {
+    let points = vec![(0.0, 1.0), (5.0, 3.0), (f64::NAN, 2.0), (2.0, 9.0)];
+    let svg = chart(vec![Curve::scatter("bot", points)]).to_svg();
+    assert_eq!(svg.matches("<circle class=\"dot c0 d0\"").count(), 3, "{svg}");
+    assert!(!svg.contains("<path class=\"line") && !svg.contains("class=\"leader") && svg.contains(">bot</text>"), "{svg}");
+}

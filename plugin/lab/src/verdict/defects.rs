@@ -1,9 +1,9 @@
 //! What detectors found, as findings of a level.
 
+use bevy::math::Vec2;
 use bevy_playbot::episode::EpisodeResult;
 
 use super::{
-    level_name::level_name,
     level_verdict::Finding,
     plan::TestPlan,
     played::{Played, PlayedEnd},
@@ -38,20 +38,21 @@ pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
 }
 
 /// What those find that look at a level after it was tested.
-pub(super) fn inspect(game: &dyn Game, plan: &TestPlan, index: u64, played: &[&[Played]]) -> Vec<Finding> {
+pub(super) fn inspect(game: &dyn Game, plan: &TestPlan, index: u64, name: &str, played: &[&[Played]]) -> Vec<Finding> {
     if plan.detectors.levels.is_empty() {
         return Vec::new();
     }
     let level = plan.split.first + index;
-    let name = level_name(game, &plan.split, level);
     let testers = plan.testers.iter().zip(played).map(|(tester, episodes)| TestedBy {
         name: &tester.record.name,
         player: &tester.player,
         observation_config: tester.observation_config,
-        seed: plan.episode_seed(&tester.record, &name, 0),
+        seed: plan.episode_seed(&tester.record, name, 0),
         episodes: (0..).zip(episodes.iter()).filter_map(ended).collect(),
+        places: (0..).zip(episodes.iter()).filter_map(ended_at).collect(),
     });
-    let tested = TestedLevel { game, mode: &plan.split.mode, level, place: index, testers: testers.collect() };
+    let (mode, par) = (plan.split.mode.as_str(), plan.detectors.par(name));
+    let tested = TestedLevel { game, mode, level, place: index, par, testers: testers.collect() };
     let mut findings = Vec::new();
     for detector in &plan.detectors.levels {
         findings.extend(detector.inspect(&tested).into_iter().map(|defect| Finding {
@@ -69,6 +70,13 @@ pub(super) fn inspect(game: &dyn Game, plan: &TestPlan, index: u64, played: &[&[
 fn ended((number, episode): (u32, &Played)) -> Option<(u32, EpisodeResult)> {
     match &episode.end {
         PlayedEnd::Ended { result, .. } => Some((number, *result)),
+        PlayedEnd::Broken { .. } => None,
+    }
+}
+
+fn ended_at((number, episode): (u32, &Played)) -> Option<(u32, Vec2)> {
+    match &episode.end {
+        PlayedEnd::Ended { place, .. } => place.map(|place| (number, place)),
         PlayedEnd::Broken { .. } => None,
     }
 }

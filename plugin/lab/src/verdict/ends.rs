@@ -1,4 +1,4 @@
-//! Where episodes ended without the aim.
+//! Where episodes ended without the aim, and why.
 
 use std::collections::BTreeMap;
 
@@ -9,38 +9,78 @@ use super::level_verdict::EndPlace;
 /// Squares along the longer side of a floor plan to which [`EndPlace`]s are rounded.
 pub const END_SQUARES: f32 = 32.0;
 
-/// The squares of a floor plan in which something ended, row by row from below. `ended` has places, and whether time was up
-/// there. Places outside the plan belong to squares outside; what is no number is left out.
-pub(super) fn end_places(bounds: Rect, ended: &[(Vec2, bool)]) -> Vec<EndPlace> {
+/// How an episode ended without the aim.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FailedEnd {
+    /// Where, if the game says.
+    pub place: Option<Vec2>,
+    /// Whether time was up.
+    pub is_timed_out: bool,
+    /// What ended it, if the game says.
+    pub cause: Option<&'static str>,
+}
+
+/// The squares of a floor plan in which something ended, row by row from below. Places outside the plan belong to squares
+/// outside; what is no place is left out.
+pub(super) fn end_places(bounds: Rect, ended: &[FailedEnd]) -> Vec<EndPlace> {
     let side = bounds.width().max(bounds.height()) / END_SQUARES;
     if !(side.is_finite() && side > 0.0) {
         return Vec::new();
     }
-    let mut counts: BTreeMap<(i32, i32), (u64, u64)> = BTreeMap::new();
-    for (place, is_timed_out) in ended.iter().filter(|(place, _)| place.is_finite()) {
-        let square = ((*place - bounds.min) / side).floor();
-        let (lost, timed_out) = counts.entry((square.y as i32, square.x as i32)).or_default();
-        *(if *is_timed_out { timed_out } else { lost }) += 1;
+    let mut counts: BTreeMap<(i32, i32), EndPlace> = BTreeMap::new();
+    for end in ended {
+        let Some(place) = end.place.filter(|place| place.is_finite()) else { continue };
+        let square = ((place - bounds.min) / side).floor();
+        let (column, row) = (square.x as i32, square.y as i32);
+        let counted = counts.entry((row, column)).or_insert_with(|| EndPlace {
+            x: bounds.min.x + (column as f32 + 0.5) * side,
+            y: bounds.min.y + (row as f32 + 0.5) * side,
+            ..EndPlace::default()
+        });
+        *(if end.is_timed_out { &mut counted.timed_out } else { &mut counted.lost }) += 1;
+        add_cause(&mut counted.causes, end.cause);
     }
-    let place = |((row, column), (lost, timed_out)): ((i32, i32), (u64, u64))| EndPlace {
-        x: bounds.min.x + (column as f32 + 0.5) * side,
-        y: bounds.min.y + (row as f32 + 0.5) * side,
-        lost,
-        timed_out,
-    };
-    counts.into_iter().map(place).collect()
+    counts.into_values().collect()
 }
+
+/// How often each cause ended an episode, wherever that was.
+pub(super) fn causes(ended: &[FailedEnd]) -> BTreeMap<String, u64> {
+    let mut causes = BTreeMap::new();
+    ended.iter().for_each(|end| add_cause(&mut causes, end.cause));
+    causes
+}
+
+fn add_cause(causes: &mut BTreeMap<String, u64>, cause: Option<&'static str>) {
+    if let Some(cause) = cause {
+        *causes.entry(cause.to_owned()).or_default() += 1;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn ends_are_counted_by_square_and_kind() {
+    fn ends_are_counted_by_square_kind_and_cause() {
         let bounds = Rect::new(-1.0, 0.0, 63.0, 10.0);
-        let at = |x: f32, y: f32, is_timed_out| (Vec2::new(x, y), is_timed_out);
-        let ended = [at(-0.5, 3.0, false), at(0.9, 2.5, true), at(5.0, 0.0, false), at(f32::NAN, 0.0, false)];
-        let place = |x, y, lost, timed_out| EndPlace { x, y, lost, timed_out };
-        assert_eq!(end_places(bounds, &ended), [place(6.0, 1.0, 1, 0), place(0.0, 3.0, 1, 1)]);
+        let at = |x: f32, y: f32, is_timed_out, cause| FailedEnd { place: Some(Vec2::new(x, y)), is_timed_out, cause };
+        let nowhere = FailedEnd { place: None, is_timed_out: false, cause: Some("saw") };
+        let ended = [
+            at(-0.5, 3.0, false, Some("saw")),
+            at(0.9, 2.5, true, None),
+            at(5.0, 0.0, false, Some("lava")),
+            at(f32::NAN, 0.0, false, None),
+            nowhere,
+        ];
+        let place = |x, y, lost, timed_out, cause: &str| EndPlace {
+            x,
+            y,
+            lost,
+            timed_out,
+            causes: BTreeMap::from([(cause.to_owned(), 1)]),
+        };
+        assert_eq!(end_places(bounds, &ended), [place(6.0, 1.0, 1, 0, "lava"), place(0.0, 3.0, 1, 1, "saw")]);
         assert!(end_places(Rect::new(0.0, 0.0, 0.0, 0.0), &ended).is_empty());
+        assert_eq!(causes(&ended), BTreeMap::from([("lava".to_owned(), 1), ("saw".to_owned(), 2)]));
     }
 }

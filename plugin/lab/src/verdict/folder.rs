@@ -141,7 +141,7 @@ fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), Tes
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{TesterRecord, results::ResultLines, testing::verdict};
+    use crate::verdict::{MapScope, TesterRecord, results::ResultLines, testing::verdict};
 
     fn record() -> TestRecord {
         TestRecord {
@@ -153,6 +153,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 1,
             detectors: Vec::new(),
+            maps: MapScope::default(),
             shard: None,
         }
     }

@@ -1,37 +1,37 @@
 //! From episodes to what they say of a level.
 
-use bevy::math::Vec2;
 use bevy_playbot::episode::EpisodeEnd;
 
 use super::{
     defects::{inspect, seen},
-    ends::end_places,
+    ends::{FailedEnd, causes, end_places},
     finish_time::FinishTime,
     interval::wilson,
-    level_name::level_name,
     level_verdict::{Finding, LevelOutcome, LevelVerdict, Score, TesterVerdict},
     plan::TestPlan,
     played::{Played, PlayedEnd},
+    walked::Walked,
 };
 use crate::{game::Game, proof::LevelProof};
 
-/// What the testers say of the level at this place in the range. `played` has the episodes of each tester, in the order of
-/// the plan.
-pub(super) fn judge(game: &dyn Game, plan: &TestPlan, index: u64, played: &[&[Played]]) -> LevelVerdict {
+/// What the testers say of the level at this place in the range, which has this name in results. `played` has the episodes
+/// of each tester, in the order of the plan.
+pub(super) fn judge(game: &dyn Game, plan: &TestPlan, index: u64, name: String, played: &[&[Played]]) -> LevelVerdict {
     let level = plan.split.first + index;
     let mode = &plan.split.mode;
     let testers = plan.testers.iter().zip(played).map(|(tester, episodes)| TesterVerdict {
         tester: tester.record.name.clone(),
-        score: score(episodes),
+        score: score(episodes.iter()),
         exact: episodes.iter().all(|episode| episode.exact),
+        places: None,
     });
-    let all: Vec<Played> = played.iter().flat_map(|episodes| episodes.iter().cloned()).collect();
-    let score = score(&all);
+    let all = || played.iter().flat_map(|episodes| episodes.iter());
+    let score = score(all());
     // Whoever reached the aim has proved that it can be reached.
     let proof = if score.solved > 0 { LevelProof::Solvable } else { game.prove(mode, level) };
     let mut findings = broken(plan, played);
     findings.extend(seen(plan, played));
-    findings.extend(inspect(game, plan, index, played));
+    findings.extend(inspect(game, plan, index, &name, played));
     let outcome = match proof.why_unsolvable() {
         _ if score.solved > 0 => LevelOutcome::Solved,
         None => LevelOutcome::BotFailed,
@@ -42,23 +42,41 @@ pub(super) fn judge(game: &dyn Game, plan: &TestPlan, index: u64, played: &[&[Pl
             LevelOutcome::ProvedUnsolvable
         }
     };
-    let places = all.iter().filter_map(failed_at).collect::<Vec<_>>();
-    let bounds = (!places.is_empty()).then(|| game.floor_plan(mode, level)).flatten().map(|plan| plan.bounds);
-    LevelVerdict {
-        level: level_name(game, &plan.split, level),
+    let failed: Vec<FailedEnd> = all().filter_map(failed_end).collect();
+    let mut verdict = LevelVerdict {
+        level: name,
         index,
         outcome,
         proof,
         score,
-        ends: bounds.map_or_else(Vec::new, |bounds| end_places(bounds, &places)),
+        ends: Vec::new(),
+        causes: causes(&failed),
+        places: None,
+        maps: None,
         testers: testers.collect(),
         findings,
+    };
+    let has_maps = plan.maps().wants(verdict.is_perfect());
+    let has_places = failed.iter().any(|end| end.place.is_some());
+    let Some(floor) = (has_maps || has_places).then(|| game.floor_plan(mode, level)).flatten() else { return verdict };
+    verdict.ends = end_places(floor.bounds, &failed);
+    if has_maps {
+        let names: Vec<&str> = plan.testers.iter().map(|tester| tester.record.name.as_str()).collect();
+        if let Some(walked) = Walked::of(&floor, &names, played, &verdict.findings) {
+            verdict.places = walked.places;
+            verdict.maps = Some(walked.maps);
+            for (tester, places) in verdict.testers.iter_mut().zip(walked.testers) {
+                tester.places = places;
+            }
+        }
     }
+    verdict
 }
 
-fn score(episodes: &[Played]) -> Score {
-    let (mut solved, mut ticks, mut lost, mut timed_out, mut broken) = (0, Vec::new(), 0, 0, 0);
+fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> Score {
+    let (mut count, mut solved, mut ticks, mut lost, mut timed_out, mut broken) = (0, 0, Vec::new(), 0, 0, 0);
     for episode in episodes {
+        count += 1;
         match &episode.end {
             PlayedEnd::Broken { .. } => broken += 1,
             PlayedEnd::Ended { result, .. } if result.success => {
@@ -69,16 +87,16 @@ fn score(episodes: &[Played]) -> Score {
             PlayedEnd::Ended { .. } => lost += 1,
         }
     }
-    let count = episodes.len() as u64;
     let interval = wilson(solved, count);
     Score { solved, episodes: count, interval, ticks: FinishTime::of(ticks), lost, timed_out, broken }
 }
 
-/// Where an episode ended without the aim, and whether its time was up.
-fn failed_at(episode: &Played) -> Option<(Vec2, bool)> {
+/// How an episode ended without the aim.
+fn failed_end(episode: &Played) -> Option<FailedEnd> {
     match &episode.end {
-        PlayedEnd::Ended { result, place } if !result.success => {
-            place.map(|place| (place, result.end == EpisodeEnd::Truncated))
+        PlayedEnd::Ended { result, place, cause } if !result.success => {
+            let is_timed_out = result.end == EpisodeEnd::Truncated;
+            Some(FailedEnd { place: *place, is_timed_out, cause: *cause })
         }
         _ => None,
     }

@@ -1,8 +1,10 @@
 //! What the testers say of one level.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
-use super::{finish_time::FinishTime, fisher::Trials};
+use super::{finish_time::FinishTime, fisher::Trials, level_maps::LevelMaps, places::Places};
 use crate::proof::LevelProof;
 
 /// What became of a level.
@@ -55,7 +57,7 @@ impl Score {
 }
 
 /// Where episodes ended without the aim, rounded to a square of the level's floor plan.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EndPlace {
     /// Middle of the square, in the units of the floor plan.
     pub x: f32,
@@ -65,6 +67,9 @@ pub struct EndPlace {
     pub lost: u64,
     /// Episodes whose time was up there.
     pub timed_out: u64,
+    /// How often each cause ended one there, if the game says.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub causes: BTreeMap<String, u64>,
 }
 
 /// How a tester did on a level.
@@ -77,6 +82,9 @@ pub struct TesterVerdict {
     pub score: Score,
     /// Whether it drew no random number in any of them: it does the same each time, whatever the seed.
     pub exact: bool,
+    /// What it visited in all its episodes, for levels with maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub places: Option<Places>,
 }
 
 /// Something that is wrong with a level or with the game in it.
@@ -113,6 +121,15 @@ pub struct LevelVerdict {
     pub score: Score,
     /// Where episodes ended without the aim, if the game says.
     pub ends: Vec<EndPlace>,
+    /// How often each cause ended an episode without the aim, if the game says.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub causes: BTreeMap<String, u64>,
+    /// What all testers together visited, for levels with maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub places: Option<Places>,
+    /// Where agents went, for levels with maps: see [`MapScope`](super::MapScope).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub maps: Option<LevelMaps>,
     /// Each tester, in the order of the plan.
     pub testers: Vec<TesterVerdict>,
     /// What is wrong, if anything.
@@ -123,5 +140,29 @@ impl LevelVerdict {
     /// Whether it was solved and nothing was found.
     pub fn is_sound(&self) -> bool {
         self.outcome == LevelOutcome::Solved && self.findings.is_empty()
+    }
+
+    /// Whether it is sound and was solved in every episode.
+    pub fn is_perfect(&self) -> bool {
+        self.is_sound() && self.score.solved == self.score.episodes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::verdict::{LevelMaps, LevelVerdict, Places, testing::verdict};
+
+    #[test]
+    fn older_results_are_read_and_newer_ones_read_back() {
+        let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
+        for name in ["maps", "places", "causes"] {
+            assert!(!old.contains(name), "{old}");
+        }
+        assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
+        let places = Some(Places { visited: 3, open: 9 });
+        let maps = Some(LevelMaps { x: -0.1, side: 0.3, visits: vec![[4, 70]], ..LevelMaps::default() });
+        let new = LevelVerdict { places, maps, causes: [("saw".to_owned(), 1)].into(), ..verdict(3, 1, 2) };
+        let text = serde_json::to_string(&new).expect("serialises");
+        assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }
 }

@@ -90,7 +90,7 @@ mod tests {
 
     use super::*;
     use crate::verdict::{
-        TesterRecord,
+        MapScope, TesterRecord,
         folder::{Earlier, TestFolder},
         testing::verdict,
     };
@@ -105,6 +105,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 1,
             detectors: Vec::new(),
+            maps: MapScope::default(),
             shard: shard.map(|shard| shard.parse().expect("a shard")),
         }
     }

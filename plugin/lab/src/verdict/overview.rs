@@ -6,6 +6,7 @@ use super::{
     error::TestError,
     fisher::Trials,
     level_verdict::{LevelOutcome, LevelVerdict},
+    places::Places,
     plan::TestRecord,
     results::ResultLines,
 };
@@ -22,6 +23,8 @@ pub struct TesterTotal {
     pub levels: Trials,
     /// Episodes that it solved, among all.
     pub episodes: Trials,
+    /// Places that it visited, of all levels with maps.
+    pub places: Places,
 }
 
 /// Numbers of all results, and the worst levels.
@@ -39,6 +42,8 @@ pub struct Overview {
     pub proved_unsolvable: u64,
     /// Findings of all levels.
     pub findings: u64,
+    /// Places that were visited by any tester, of all levels with maps.
+    pub places: Places,
     /// The testers, in the order of the test.
     pub testers: Vec<TesterTotal>,
     /// At most 20 levels that were not solved each time, or of which something was found, the worst ones first.
@@ -61,16 +66,22 @@ impl Overview {
     }
 
     fn empty(record: TestRecord) -> Self {
-        let total =
-            |name: &String| TesterTotal { name: name.clone(), levels: Trials::default(), episodes: Trials::default() };
+        let places = Places::default();
+        let total = |name: &String| TesterTotal {
+            name: name.clone(),
+            levels: Trials::default(),
+            episodes: Trials::default(),
+            places,
+        };
         let testers = record.testers.iter().map(|tester| total(&tester.name)).collect();
         let worst = Vec::new();
-        Self { record, levels: 0, solved: 0, bot_failed: 0, proved_unsolvable: 0, findings: 0, testers, worst }
+        Self { record, levels: 0, solved: 0, bot_failed: 0, proved_unsolvable: 0, findings: 0, places, testers, worst }
     }
 
     fn add(&mut self, level: LevelVerdict) {
         self.levels += 1;
         self.findings += level.findings.len() as u64;
+        self.places.add(level.places);
         *match level.outcome {
             LevelOutcome::Solved => &mut self.solved,
             LevelOutcome::BotFailed => &mut self.bot_failed,
@@ -81,9 +92,9 @@ impl Overview {
             total.levels.successes += u64::from(tester.score.solved > 0);
             total.episodes.trials += tester.score.episodes;
             total.episodes.successes += tester.score.solved;
+            total.places.add(tester.places);
         }
-        let is_perfect = level.is_sound() && level.score.solved == level.score.episodes;
-        if !is_perfect {
+        if !level.is_perfect() {
             let place = self.worst.partition_point(|other| is_worse(other, &level));
             if place < MOST_WORST {
                 self.worst.insert(place, level);
@@ -112,7 +123,7 @@ mod tests {
     use super::*;
     use crate::{
         proof::LevelProof,
-        verdict::{Finding, TesterRecord, testing::verdict},
+        verdict::{Finding, MapScope, TesterRecord, testing::verdict},
     };
 
     #[test]
@@ -126,11 +137,15 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 4,
             detectors: Vec::new(),
+            maps: MapScope::default(),
             shard: None,
         };
         let mut overview = Overview::empty(record);
         for (index, solved) in [4, 3, 0, 1, 0].into_iter().enumerate() {
-            overview.add(verdict(index as u64, solved, 4));
+            let mut level =
+                LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(index as u64, solved, 4) };
+            level.testers[0].places = Some(Places { visited: 1, open: 4 });
+            overview.add(level);
         }
         let why = "walled in".to_owned();
         let finding = Finding {
@@ -153,6 +168,8 @@ mod tests {
         assert_eq!((overview.solved, overview.bot_failed, overview.proved_unsolvable), (3, 2, 1));
         assert_eq!(overview.testers[0].levels, Trials { successes: 3, trials: 6 });
         assert_eq!(overview.testers[0].episodes, Trials { successes: 8, trials: 24 });
+        assert_eq!(overview.places, Places { visited: 15, open: 20 }, "the sixth level has no maps");
+        assert_eq!(overview.testers[0].places.percent(), Some(25.0));
         assert!(!overview.is_sound());
         for index in 6..60 {
             overview.add(verdict(index, 0, 4));

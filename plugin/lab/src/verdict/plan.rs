@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     error::TestError,
     level_name::hash_of_files,
+    map_scope::MapScope,
     shard::Shard,
     tester::{Tester, TesterRecord},
 };
@@ -51,6 +52,9 @@ pub struct TestRecord {
     /// What looked for defects, each detector with its settings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detectors: Vec<String>,
+    /// Of which levels results say where agents went.
+    #[serde(default, skip_serializing_if = "MapScope::is_none")]
+    pub maps: MapScope,
     /// Which of the levels; all of them if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
@@ -90,8 +94,14 @@ impl TestPlan {
             testers: self.testers.iter().map(|tester| tester.record.clone()).collect(),
             episodes: self.episodes.max(1),
             detectors: self.detectors.record().to_vec(),
+            maps: self.maps(),
             shard: self.shard,
         }
+    }
+
+    /// Of which levels results say where agents went. The whole range decides, not the shard.
+    pub fn maps(&self) -> MapScope {
+        MapScope::of(self.split.len())
     }
 
     /// Places in the range of the levels that are tested.
@@ -104,7 +114,7 @@ impl TestPlan {
 
     /// Seed of an episode: from the plan's seed, the tester's and the level's names and the number of the episode alone. So
     /// the same episode is played whatever other levels and testers there are, and wherever it is played.
-    pub(super) fn episode_seed(&self, tester: &TesterRecord, level: &str, episode: u32) -> u64 {
+    pub(crate) fn episode_seed(&self, tester: &TesterRecord, level: &str, episode: u32) -> u64 {
         let bytes = |text: &str| text.bytes().map(u64::from).chain([u64::from(u8::MAX) + 1]).collect::<Vec<_>>();
         let names = bytes(&tester.name).into_iter().chain(bytes(level));
         StateHash::of([self.seed].into_iter().chain(names).chain([u64::from(episode)])).0
@@ -127,6 +137,7 @@ impl TestRecord {
         compare("episodes per level", self.episodes.to_string(), other.episodes.to_string());
         compare("testers", self.describe_testers(), other.describe_testers());
         compare("detectors", self.describe_detectors(), other.describe_detectors());
+        compare("levels with maps", self.maps.name().to_owned(), other.maps.name().to_owned());
         found
     }
 
@@ -179,7 +190,10 @@ mod tests {
         assert!(matches!(plan(&["a", "b", "a"], None).check(), Err(TestError::SameName(name)) if name == "a"));
         let error = plan(&["a"], Some("5/6")).check().expect_err("five levels").to_string();
         assert!(error.contains("5/6") && error.contains("hard:5..9 has only 5"), "{error}");
-        assert_eq!(plan(&["a"], Some("1/2")).places(), [1, 3]);
+        let shard = plan(&["a"], Some("1/2"));
+        assert_eq!((shard.places(), shard.maps()), (vec![1, 3], MapScope::All));
+        let many = TestPlan { split: "hard:0..4001".parse().expect("a split"), ..shard };
+        assert_eq!((many.places().len(), many.maps()), (2001, MapScope::Failed));
     }
 
     #[test]
@@ -207,6 +221,7 @@ mod tests {
             testers: vec![TesterRecord::bot("search")],
             episodes: 1,
             detectors: Vec::new(),
+            maps: MapScope::default(),
             shard: None,
         };
         let trained = TesterRecord { checksum: Some("0f".to_owned()), greedy: true, ..TesterRecord::bot("ppo") };
@@ -215,5 +230,7 @@ mod tests {
         assert_eq!(record.differences(&other), expected);
         assert_eq!(record.differences(&TestRecord { game: "b".to_owned(), ..record.clone() }), ["games `a` and `b`"]);
         assert!(record.differences(&record).is_empty());
+        let mapped = TestRecord { maps: MapScope::All, ..record.clone() };
+        assert_eq!(record.differences(&mapped), ["levels with maps none and all"]);
     }
 }

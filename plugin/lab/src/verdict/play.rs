@@ -27,7 +27,7 @@ pub(super) fn play_tasks(
     let mut played: Vec<Option<Played>> = vec![None; tasks.len()];
     let mut waiting: Vec<usize> = (0..tasks.len()).collect();
     while !waiting.is_empty() {
-        let mut test_world = TestWorld::build(game, mode, tester, tasks, &waiting)?;
+        let mut test_world = TestWorld::build(game, mode, tester, tasks, &waiting, watch.arenas)?;
         match test_world.play_out(game, &mut played, watch) {
             Ok(()) => {}
             Err(Interruption::Stopped) => return Ok(None),
@@ -51,7 +51,7 @@ fn play_alone(
     task: Task,
     watch: &Watch,
 ) -> Result<Option<Played>, VisionError> {
-    let mut test_world = TestWorld::build(game, mode, tester, &[task], &[0])?;
+    let mut test_world = TestWorld::build(game, mode, tester, &[task], &[0], 1)?;
     let mut played = [None];
     let end = match test_world.play_out(game, &mut played, watch) {
         Ok(()) => return Ok(played[0].take()),
@@ -63,5 +63,6 @@ fn play_alone(
         }
     };
     let found = std::mem::take(&mut test_world.found);
-    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found }))
+    let walk = test_world.take_walk(0);
+    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found, walk }))
 }

@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 
+use super::walk::Walk;
 use crate::detectors::Detectors;
 
 /// An episode to be played.
@@ -23,6 +24,8 @@ pub(super) struct Played {
     pub exact: bool,
     /// What detectors found in it.
     pub found: Vec<EpisodeFinding>,
+    /// Where its agent went, if the game says.
+    pub walk: Option<Walk>,
 }
 
 /// What a detector found in an episode.
@@ -45,6 +48,8 @@ pub(super) enum PlayedEnd {
         result: EpisodeResult,
         /// Where the agent was then, if the game says.
         place: Option<Vec2>,
+        /// Why it ended without the aim, if the game says.
+        cause: Option<&'static str>,
     },
     /// The game broke.
     Broken {
@@ -82,4 +87,6 @@ pub(super) struct Watch<'a> {
     pub mode: &'a str,
     /// Name of who plays.
     pub tester: &'a str,
+    /// Most arenas of a World. It changes no result of a game that keeps nothing from one episode to the next.
+    pub arenas: usize,
 }

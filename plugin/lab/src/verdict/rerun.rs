@@ -2,8 +2,20 @@
 
 use super::{level_name::level_argument, level_verdict::LevelVerdict, plan::TestRecord};
 
-/// The commands that play a level's failed episodes again, and show them: for people, of the program with this name.
+/// Most findings that are shown by their files.
+const MOST_FILES: usize = 3;
+
+/// The commands that show a level's findings in the folder of the results, play its failed episodes again, and show them: for
+/// people, of the program with this name.
 pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
+    let files = level.findings.iter().filter_map(|finding| finding.file.as_ref());
+    let mut commands: Vec<String> = files.take(MOST_FILES).map(|file| format!("{program} replay {file}")).collect();
+    commands.extend(played_again(program, record, level));
+    commands
+}
+
+/// The episodes of a tester that failed, if one did.
+fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
     let found = level.findings.iter().find_map(|finding| finding.tester.as_ref());
     let failed = || level.testers.iter().find(|tester| tester.score.solved < tester.score.episodes);
     let Some(name) = found.or_else(|| failed().map(|tester| &tester.tester)) else { return Vec::new() };
@@ -25,7 +37,7 @@ pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) 
 mod tests {
     use super::*;
     use crate::verdict::{
-        TesterRecord,
+        Finding, MapScope, TesterRecord,
         testing::{tester, verdict},
     };
 
@@ -41,6 +53,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random"), trained],
             episodes: 2,
             detectors: Vec::new(),
+            maps: MapScope::default(),
             shard: None,
         };
         let testers = vec![tester("random", 2, 2, false), tester("ppo.policy", 1, 2, false)];
@@ -50,5 +63,17 @@ mod tests {
         assert_eq!(rerun_commands("jump", &record, &level), [again, shown]);
         let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
         assert!(rerun_commands("jump", &record, &perfect).is_empty());
+        let finding = |name: &str| Finding {
+            detector: "unreachable-goal".to_owned(),
+            tester: None,
+            episode: None,
+            tick: None,
+            message: "walled in".to_owned(),
+            file: Some(format!("findings/{name}.finding")),
+        };
+        let findings = ["a", "b", "c", "d"].map(finding).to_vec();
+        let walled = LevelVerdict { findings, ..perfect };
+        let shown = ["a", "b", "c"].map(|name| format!("jump replay findings/{name}.finding"));
+        assert_eq!(rerun_commands("jump", &record, &walled), shown, "three of them");
     }
 }

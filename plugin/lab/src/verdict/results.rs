@@ -150,7 +150,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::verdict::TesterRecord;
+    use crate::verdict::{MapScope, TesterRecord};
 
     fn record() -> TestRecord {
         TestRecord {
@@ -162,6 +162,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 2,
             detectors: Vec::new(),
+            maps: MapScope::default(),
             shard: Some("0/2".parse().expect("a shard")),
         }
     }

@@ -22,6 +22,8 @@ use bevy_playbot::fault::Fault;
 const PORTIONS: usize = 64;
 /// Most episodes of a portion, so that little is in memory and little is lost when somebody stops.
 const MOST_EPISODES: usize = 128;
+/// Most arenas of a World.
+const MOST_ARENAS: usize = 16;
 
 /// Whether a test came to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,7 +182,8 @@ fn play_portion(
         tasks.extend((0..plan.episodes.max(1)).map(|episode| Task { level, seed: seed(episode) }));
     }
     let (detectors, name) = (&plan.detectors, tester.record.name.as_str());
-    let watch = Watch { progress: watch.progress, stop: watch.stop, detectors, mode, tester: name };
+    let arenas = MOST_ARENAS;
+    let watch = Watch { progress: watch.progress, stop: watch.stop, detectors, mode, tester: name, arenas };
     play_tasks(game, mode, tester, &tasks, &watch).map_err(|error| EvalError::from(error).into())
 }
 
@@ -206,7 +209,8 @@ fn judge_portion(game: &dyn Game, plan: &TestPlan, places: &[u64], complete: &[V
     let verdict = |(number, place): (usize, &u64)| {
         let own = number * episodes..(number + 1) * episodes;
         let played: Vec<&[Played]> = complete.iter().map(|episodes| &episodes[own.clone()]).collect();
-        judge(game, plan, *place, &played)
+        let name = level_name(game, &plan.split, plan.split.first + place);
+        judge(game, plan, *place, name, &played)
     };
     places.iter().enumerate().map(verdict).collect()
 }

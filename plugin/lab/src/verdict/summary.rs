@@ -23,10 +23,15 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         overview.proved_unsolvable,
         overview.findings
     ));
-    lines.extend(["", "| tester | levels solved | episodes solved |", "|---|---:|---:|"].map(str::to_owned));
+    if overview.places.percent().is_some() {
+        lines.push(format!("{} of the open places were visited.", overview.places.describe()));
+    }
+    let head = ["", "| tester | levels solved | episodes solved | places visited |", "|---|---:|---:|---:|"];
+    lines.extend(head.map(str::to_owned));
     for tester in &overview.testers {
         let share = |of: Trials| format!("{} of {}{}", of.successes, of.trials, interval(of));
-        lines.push(format!("| {} | {} | {} |", cell(&tester.name), share(tester.levels), share(tester.episodes)));
+        let (levels, episodes, places) = (share(tester.levels), share(tester.episodes), tester.places.describe());
+        lines.push(format!("| {} | {levels} | {episodes} | {places} |", cell(&tester.name)));
     }
     if let Some(comparison) = comparison {
         lines.extend(compared(comparison));
@@ -95,4 +100,44 @@ fn cell(text: &str) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::{
+        LevelVerdict, MapScope, Places, TestRecord, TesterRecord,
+        folder::{Earlier, TestFolder},
+        testing::verdict,
+    };
+
+    #[test]
+    fn the_share_of_visited_places_is_told_where_it_is_known() {
+        let record = TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: "hard:0..0".parse().expect("a split"),
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 2,
+            detectors: Vec::new(),
+            maps: MapScope::default(),
+            shard: None,
+        };
+        let said = |level: &LevelVerdict| {
+            let parent = tempfile::tempdir().expect("a folder");
+            let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
+            folder.keep(level).expect("writable");
+            folder.finish().expect("writable");
+            summary(&Overview::read(parent.path()).expect("results"), None, "playbot")
+        };
+        let plain = said(&verdict(0, 2, 2));
+        assert!(plain.contains("| random | 1 of 1") && plain.contains(" | – |"), "{plain}");
+        assert!(!plain.contains("open places"), "{plain}");
+        let mut level = LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(0, 2, 2) };
+        level.testers[0].places = Some(Places { visited: 1, open: 4 });
+        let mapped = said(&level);
+        assert!(mapped.contains("75.0 % of the open places") && mapped.contains(" | 25.0 % |"), "{mapped}");
+    }
 }

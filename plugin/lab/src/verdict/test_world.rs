@@ -15,14 +15,14 @@ use bevy_playbot::{
 use super::{
     played::{EpisodeFinding, Interruption, Played, PlayedEnd, Task, Watch},
     tester::Tester,
+    walk::{Walk, WalkCounter},
     watched::Watched,
 };
 use crate::{
-    arrangement::at_most, ended_episodes::EndedEpisodes, eval::Player, game::Game, worlds::build_observing_world,
+    arrangement::at_most, ended_episodes::EndedEpisodes, eval::Player, findings::detector_of, game::Game,
+    worlds::build_observing_world,
 };
 
-/// Most arenas of a World. It changes no result.
-const MOST_ARENAS: usize = 16;
 /// Ticks after which an episode counts as one that never ends: more than four hours at 60 a second.
 const MOST_TICKS: u32 = 1_000_000;
 /// How a game's panic is told, behind where it was.
@@ -34,6 +34,8 @@ struct Seat {
     /// Which tasks, with the seeds of their episodes.
     tasks: Vec<(usize, u64)>,
     done: usize,
+    /// Where the agent goes.
+    walk: WalkCounter,
 }
 
 /// The World and who plays in it.
@@ -45,18 +47,19 @@ pub(super) struct TestWorld {
 }
 
 impl TestWorld {
-    /// A World for the tasks that wait, shared out evenly over its agents.
+    /// A World for the tasks that wait, shared out evenly over its agents, of whom there are at most so many.
     pub fn build(
         game: &dyn Game,
         mode: &str,
         tester: &Tester,
         tasks: &[Task],
         waiting: &[usize],
+        arenas: usize,
     ) -> Result<Self, VisionError> {
         let player = &tester.player;
         let sees = matches!(player, Player::Policy { .. });
         let observation_config = if sees { tester.observation_config } else { ObservationConfig::default() };
-        let count = at_most(game, MOST_ARENAS.min(waiting.len()));
+        let count = at_most(game, arenas.min(waiting.len()));
         // Agents have the seeds of their episodes; that of the World is left to the game, and always the same.
         let (mut world, agents) = build_observing_world(game, mode, &observation_config, 0, 0, count as u32)?;
         EndedEpisodes::note_in(&mut world);
@@ -73,7 +76,7 @@ impl TestWorld {
             world.entity_mut(agent).insert((LevelQueue::list(levels), EpisodeSeeds::new(seeds)));
             let control = player.seat(game, &mut world, agent);
             world.entity_mut(agent).insert(control);
-            seats.push(Seat { agent, tasks: own, done: 0 });
+            seats.push(Seat { agent, tasks: own, done: 0, walk: WalkCounter::new(agent, game.tick_hz()) });
         }
         player.install(&mut world);
         Ok(Self { world, seats, found: Vec::new() })
@@ -94,7 +97,7 @@ impl TestWorld {
             }
             if let Err(fault) = watched.tick(&mut self.world, tick_world) {
                 let message = fault.to_string();
-                let detector = if message.contains(PANICKED) { "panic" } else { "fault" };
+                let detector = detector_of(&message);
                 self.found = watched.take_found(0);
                 return Err(Interruption::Broken { detector, message });
             }
@@ -102,6 +105,7 @@ impl TestWorld {
             if let Some((detector, message)) = watched.look(&self.world, EndedEpisodes::of(&self.world)) {
                 return Err(Interruption::Broken { detector, message });
             }
+            self.count_places(game, watch);
             self.note_ends(game, played, watch, &mut watched);
             if self.longest() >= MOST_TICKS {
                 self.found = watched.take_found(0);
@@ -112,15 +116,32 @@ impl TestWorld {
         Ok(())
     }
 
+    /// Counts where the agents are after this tick.
+    fn count_places(&mut self, game: &dyn Game, watch: &Watch) {
+        let ended = EndedEpisodes::of(&self.world);
+        for seat in &mut self.seats {
+            let has_ended = ended.iter().any(|(agent, _)| *agent == seat.agent);
+            seat.walk.tick(game, watch.mode, &self.world, has_ended);
+        }
+    }
+
+    /// Where an agent went in the episode that is over.
+    pub fn take_walk(&mut self, seat: usize) -> Option<Walk> {
+        self.seats.get_mut(seat)?.walk.take()
+    }
+
     fn note_ends(&mut self, game: &dyn Game, played: &mut [Option<Played>], watch: &Watch, watched: &mut Watched) {
         let ended = EndedEpisodes::take(&mut self.world);
         for (agent, result) in ended {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
+            let walk = self.take_walk(seat);
             let Some(&(task, seed)) = self.seats[seat].tasks.get(self.seats[seat].done) else { continue };
             let place = game.whereabouts(&self.world, agent);
+            let cause = if result.success { None } else { game.end_cause(&self.world, agent) };
             let exact = self.is_untouched(seat, seed);
             let found = watched.take_found(seat);
-            played[task] = Some(Played { end: PlayedEnd::Ended { result, place }, exact, found });
+            let end = PlayedEnd::Ended { result, place, cause };
+            played[task] = Some(Played { end, exact, found, walk });
             self.seats[seat].done += 1;
             (watch.progress)(1);
         }

@@ -1,5 +1,7 @@
 //! Verdicts for tests.
 
+use std::collections::BTreeMap;
+
 use super::{
     finish_time::FinishTime,
     interval::wilson,
@@ -30,6 +32,9 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
         score: score(solved, episodes),
         ends: Vec::new(),
+        causes: BTreeMap::new(),
+        places: None,
+        maps: None,
         testers: vec![tester("random", solved, episodes, false)],
         findings: Vec::new(),
     }
@@ -37,5 +42,5 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
 
 /// How a tester did.
 pub(super) fn tester(name: &str, solved: u64, episodes: u64, exact: bool) -> TesterVerdict {
-    TesterVerdict { tester: name.to_owned(), score: score(solved, episodes), exact }
+    TesterVerdict { tester: name.to_owned(), score: score(solved, episodes), exact, places: None }
 }

@@ -15,7 +15,7 @@ use bevy_playbot::{
 use super::played::{EpisodeFinding, Watch as WatchOfTest};
 use crate::{
     detector::{Detector, LevelAhead, Moment, Watch, WorldMoment, WorldWatch},
-    detectors::{Ear, SlowTick, TickTime},
+    detectors::{Ear, GameProofs, SlowTick, TickTime},
     game::Game,
 };
 
@@ -132,6 +132,7 @@ impl WatchedSeat {
         }
         let watches = self.watches.get_or_insert_with(|| begin(game, watch, episode.level));
         let observation = world.get::<Observation>(self.agent);
+        let proofs = GameProofs { game, mode: watch.mode, level: episode.level, world, agent: self.agent };
         let moment = Moment {
             world,
             agent: self.agent,
@@ -143,6 +144,7 @@ impl WatchedSeat {
             reward: reward.get(),
             place: if watches.is_empty() { None } else { game.whereabouts(world, self.agent) },
             is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
+            proofs: &proofs,
         };
         watches.retain_mut(|(detector, watch)| {
             let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));

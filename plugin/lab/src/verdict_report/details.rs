@@ -2,7 +2,11 @@
 
 use std::fmt::Write;
 
-use super::words::{interval, text};
+use super::{
+    drawn::Drawn,
+    walks::walks,
+    words::{interval, text},
+};
 use crate::{
     escape::escape,
     report::readable,
@@ -13,7 +17,7 @@ use crate::{
 const MOST_LISTED: usize = 10;
 
 /// Everything about a level, with its picture if it has one.
-pub fn details(record: &TestRecord, level: &LevelVerdict, program: &str, picture: Option<&str>) -> String {
+pub fn details(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
     let mut out = String::new();
     if !level.findings.is_empty() {
         let more = level.findings.len().saturating_sub(MOST_LISTED);
@@ -21,9 +25,13 @@ pub fn details(record: &TestRecord, level: &LevelVerdict, program: &str, picture
         let more = if more > 0 { format!("<li>and {more} more</li>\n") } else { String::new() };
         let _ = write!(out, "<ul class=\"findings\">\n{listed}{more}</ul>\n");
     }
-    if let Some(picture) = picture {
-        let _ = writeln!(out, "<figure>{picture}</figure>");
+    if let Some(Drawn { picture, clip }) = drawn {
+        let clip = clip.as_ref().map_or_else(String::new, |clip| {
+            format!("<button type=\"button\" class=\"clip\" data-clip=\"{clip}\" hidden>Play the failure</button>")
+        });
+        let _ = writeln!(out, "<figure>{picture}{clip}</figure>");
     }
+    out += &walks(level);
     out += &testers(&level.testers);
     let commands = rerun_commands(program, record, level);
     if !commands.is_empty() {

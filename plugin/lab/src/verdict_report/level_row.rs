@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::{
     details::details,
+    drawn::Drawn,
     words::{interval, text, what},
 };
 use crate::{
@@ -12,21 +13,24 @@ use crate::{
     verdict::{LevelVerdict, TestRecord},
 };
 
+/// Stands for a share that nobody knows when levels are sorted: before all others.
+const UNKNOWN: f64 = -1.0;
 /// Stands for a finish time that nobody has when levels are sorted: after all others.
 const NEVER: f64 = 1e12;
 
 /// The rows of a level: its numbers, and below them what is wrong and all about it, if anything is or it has a picture.
 /// `data-v` is what columns are sorted by, `data-k` what levels are filtered by.
-pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, picture: Option<&str>) -> String {
+pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
     let LevelVerdict { score, findings, .. } = level;
     let outcome = level.outcome.name();
     let kinds = if findings.is_empty() { outcome.to_owned() } else { format!("{outcome} findings") };
     let share = score.solved as f64 / score.episodes.max(1) as f64;
     let median = score.ticks.map(|ticks| ticks.median);
+    let places = level.places.unwrap_or_default();
     let mut out = format!(
         "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th><td data-v=\"{}\" class=\"{outcome}\">\
          {outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
-         <td data-v=\"{}\">{}</td></tr>\n",
+         <td data-v=\"{:.1}\">{}</td><td data-v=\"{}\">{}</td></tr>\n",
         level.index,
         text(&level.level),
         level.outcome as u8,
@@ -36,16 +40,17 @@ pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, pictu
         interval(score.interval),
         median.unwrap_or(NEVER),
         median.map_or_else(|| "–".to_owned(), readable),
+        places.percent().unwrap_or(UNKNOWN),
+        places.describe(),
         findings.len(),
         detectors(level),
     );
-    let is_perfect = level.is_sound() && score.solved == score.episodes;
-    if !is_perfect || picture.is_some() {
+    if !level.is_perfect() || drawn.is_some() {
         let _ = writeln!(
             out,
-            "<tr><td colspan=\"6\"><details><summary>{}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
+            "<tr><td colspan=\"7\"><details><summary>{}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
             what(level),
-            details(record, level, program, picture)
+            details(record, level, program, drawn)
         );
     }
     out + "</tbody>\n"

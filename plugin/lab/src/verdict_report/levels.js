@@ -37,5 +37,33 @@
   form.addEventListener("input", filter);
   form.addEventListener("submit", (event) => event.preventDefault());
   form.hidden = false;
+  const maps = document.getElementById("maps");
+  if (maps) {
+    const show = () => { table.dataset.map = maps.elements.map.value; };
+    maps.addEventListener("change", show);
+    maps.hidden = false;
+    show();
+  }
+  // Nothing moves before somebody asks for it, and then once. Another click ends it.
+  let plays = 0;
+  for (const button of table.querySelectorAll("button.clip")) {
+    const words = button.textContent;
+    button.hidden = false;
+    button.addEventListener("click", () => {
+      const shown = button.nextElementSibling;
+      if (shown) {
+        shown.remove();
+        button.textContent = words;
+        return;
+      }
+      const clip = document.createElement("img");
+      clip.alt = "The plan of the level, with a dot that goes the way of the failure";
+      // A new address each time: else a clip that was played would be at its end.
+      plays += 1;
+      clip.src = `data:image/png;base64,${button.dataset.clip}#${plays}`;
+      button.after(clip);
+      button.textContent = "Stop";
+    });
+  }
   filter();
 })();

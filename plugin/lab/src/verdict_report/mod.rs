@@ -6,10 +6,16 @@
 //! The page is a function of the results, of what they are compared with and of the game, which draws the pictures: the
 //! results of a whole range and those joined from shards give the same bytes.
 
+mod base64;
+mod canvas;
+mod clip;
 mod compared;
 mod details;
+mod drawn;
+mod heat;
 mod level_row;
 mod level_table;
+mod map_legend;
 mod numbers;
 mod page;
 mod picture;
@@ -20,6 +26,7 @@ mod shapes;
 mod testing;
 #[cfg(test)]
 mod tests;
+mod walks;
 mod words;
 mod write;
 

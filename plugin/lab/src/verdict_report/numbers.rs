@@ -25,17 +25,24 @@ pub fn numbers(overview: &Overview) -> String {
         number(class, what, count, &interval_of(Trials { successes: count, trials: levels }));
     }
     number("found", "findings", overview.findings, "");
+    if overview.places.percent().is_some() {
+        let [visited, open] = [overview.places.visited, overview.places.open].map(|count| whole(count as f64));
+        let (share, note) = (overview.places.describe(), format!("{visited} of {open}"));
+        let _ =
+            writeln!(out, "<div><dt>open places visited</dt><dd class=\"places\">{share}</dd><dd>{note}</dd></div>");
+    }
     out += "</dl>\n</section>\n<section>\n<h2>Testers</h2>\n<div class=\"table\" role=\"region\" \
             aria-label=\"Testers\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">tester</th>\
             <th scope=\"col\">levels solved</th><th scope=\"col\">95 % interval</th><th scope=\"col\">episodes solved</th>\
-            <th scope=\"col\">95 % interval</th></tr></thead>\n<tbody>\n";
+            <th scope=\"col\">95 % interval</th><th scope=\"col\">open places visited</th></tr></thead>\n<tbody>\n";
     for (record, total) in overview.record.testers.iter().zip(&overview.testers) {
         let cells = |of: Trials| {
             let [successes, trials] = [of.successes, of.trials].map(|count| whole(count as f64));
             format!("<td>{successes} of {trials}</td><td>{}</td>", interval_of(of))
         };
         let name = text(&record.describe());
-        let _ = writeln!(out, "<tr><th scope=\"row\">{name}</th>{}{}</tr>", cells(total.levels), cells(total.episodes));
+        let (levels, episodes, places) = (cells(total.levels), cells(total.episodes), total.places.describe());
+        let _ = writeln!(out, "<tr><th scope=\"row\">{name}</th>{levels}{episodes}<td>{places}</td></tr>");
     }
     out + "</tbody></table></div>\n<p class=\"key\">Intervals are 95 % Wilson intervals.</p>\n</section>\n"
 }

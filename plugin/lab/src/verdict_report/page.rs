@@ -46,7 +46,7 @@ impl Page<'_> {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
-             script-src 'unsafe-inline'\">\n\
+             script-src 'unsafe-inline'; img-src data:\">\n\
              <title>{title}</title>\n<style>\n{PAGE_STYLE}{STYLE}</style>\n</head>\n<body>\n<main>\n<header>\n\
              <h1>{title}</h1>\n<p class=\"subtitle\">{subtitle}</p>\n</header>\n{body}</main>\n\
              <script>\n{SCRIPT}</script>\n</body>\n</html>\n"

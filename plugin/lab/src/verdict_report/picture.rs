@@ -1,11 +1,12 @@
-//! A level as a small drawing: its floor plan, and where episodes ended.
+//! A level as a small drawing: its floor plan, where episodes ended, and where agents were.
 
 use std::{cmp::Reverse, fmt::Write};
 
 use bevy::math::{Rect, Vec2};
 
 use super::{
-    shapes::{Block, Grid, path, stacked},
+    heat::layers,
+    shapes::{Block, Grid, path, shape, stacked},
     words::ends,
 };
 use crate::{
@@ -14,7 +15,7 @@ use crate::{
     verdict::{END_SQUARES, EndPlace, LevelVerdict},
 };
 
-/// Largest drawing: a page has up to 200 of them.
+/// Largest drawing without the maps: a page has up to 200 of them.
 const MOST_BYTES: usize = 8_000;
 /// Most squares with ends, those where most episodes ended.
 const MOST_SQUARES: usize = 40;
@@ -41,9 +42,13 @@ pub fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> {
         level.ends.iter().filter_map(|end| Some((square(&grid, extent, side, end)?, end))).collect();
     squares.sort_by_key(|(_, end)| Reverse(end.lost.saturating_add(end.timed_out)));
     squares.truncate(MOST_SQUARES);
+    svg += "<g class=\"map ends\">";
     heat("lost", squares.iter().map(|(block, end)| (*block, end.lost)), &mut svg);
     heat("late", squares.iter().map(|(block, end)| (*block, end.timed_out)), &mut svg);
     marks(&squares, &mut svg);
+    svg += "</g>";
+    let maps = level.maps.as_ref().map_or_else(String::new, |maps| layers(&grid, maps));
+    svg += &maps;
     if let Some([x, y]) = grid.place(plan.start) {
         let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
     }
@@ -51,7 +56,7 @@ pub fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> {
         shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
     }
     svg += "</svg>";
-    (svg.len() <= MOST_BYTES).then_some(svg)
+    (svg.len() - maps.len() <= MOST_BYTES).then_some(svg)
 }
 
 /// What is drawn: the bounds of the plan, with room for those who fell out of it.
@@ -99,14 +104,6 @@ fn marks(squares: &[(Block, &EndPlace)], svg: &mut String) {
     shape("mark", None, &bars, svg);
 }
 
-fn shape(class: &str, strength: Option<&str>, path: &str, svg: &mut String) {
-    if path.is_empty() {
-        return;
-    }
-    let opacity = strength.map_or_else(String::new, |strength| format!(" opacity=\"{strength}\""));
-    let _ = write!(svg, "<path class=\"{class}\"{opacity} d=\"{path}\"/>");
-}
-
 fn is_finite(area: &Rect) -> bool {
     area.min.is_finite() && area.max.is_finite()
 }
@@ -114,10 +111,14 @@ fn is_finite(area: &Rect) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict_report::testing::{garden, level};
+    use crate::{
+        verdict::LevelMaps,
+        verdict_report::testing::{garden, level},
+    };
 
     fn drawn(ends: &[(f32, f32, u64, u64)]) -> String {
-        let end = |&(x, y, lost, timed_out): &(f32, f32, u64, u64)| EndPlace { x, y, lost, timed_out };
+        let end =
+            |&(x, y, lost, timed_out): &(f32, f32, u64, u64)| EndPlace { x, y, lost, timed_out, ..EndPlace::default() };
         let level = LevelVerdict { ends: ends.iter().map(end).collect(), ..level(0, 0, 9, 0) };
         picture(&garden(), &level).expect("small")
     }
@@ -134,6 +135,22 @@ mod tests {
         assert!(svg.contains("d=\"M305 110h10\""), "{svg}");
         assert!(svg.contains("class=\"wall\"") && svg.contains("class=\"hazard\""), "{svg}");
         assert!(!svg.contains("class=\"platform\""), "there are none: {svg}");
+    }
+
+    #[test]
+    fn ends_and_maps_are_groups_of_which_one_is_shown() {
+        let plain = drawn(&[(11.0, 3.0, 8, 0)]);
+        assert!(
+            plain.contains("<g class=\"map ends\"><path class=\"lost\"") && !plain.contains("map visits"),
+            "{plain}"
+        );
+        let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[70, 9]], ..LevelMaps::default() };
+        let level = LevelVerdict { maps: Some(maps), ..level(0, 0, 9, 0) };
+        let svg = picture(&garden(), &level).expect("small");
+        for class in ["ends", "visits", "lost-time", "skills"] {
+            assert_eq!(svg.matches(&format!("<g class=\"map {class}\">")).count(), 1, "{class} in {svg}");
+        }
+        assert!(svg.contains("<path class=\"visit\" opacity=\".85\" d=\"M60 140h10v10h-10z\"/>"), "{svg}");
     }
 
     #[test]

@@ -40,6 +40,14 @@ impl<'a> Plans<'a> {
         game.floor_plan(&range.mode, number)
     }
 
+    /// Ticks per second of the game; `None` where there are no plans.
+    pub fn tick_hz(&self) -> Option<f64> {
+        match self {
+            Self::Known { game, .. } => Some(game.tick_hz()),
+            Self::Missing(_) => None,
+        }
+    }
+
     /// Why there are none.
     pub fn problem(&self) -> Option<&str> {
         match self {

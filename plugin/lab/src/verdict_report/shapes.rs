@@ -82,6 +82,15 @@ pub fn path(blocks: &[Block]) -> String {
     path
 }
 
+/// Adds a path in the colour of a class, so strong; nothing for a path that is empty.
+pub fn shape(class: &str, strength: Option<&str>, path: &str, svg: &mut String) {
+    if path.is_empty() {
+        return;
+    }
+    let opacity = strength.map_or_else(String::new, |strength| format!(" opacity=\"{strength}\""));
+    let _ = write!(svg, "<path class=\"{class}\"{opacity} d=\"{path}\"/>");
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,9 @@
 //! Levels, results and a game for tests.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use bevy::prelude::*;
 use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
@@ -10,8 +13,8 @@ use crate::{
     game::Game,
     proof::LevelProof,
     verdict::{
-        Earlier, Finding, FinishTime, LevelOutcome, LevelVerdict, Score, TestFolder, TestRecord, TesterRecord,
-        TesterVerdict, wilson,
+        Earlier, Finding, FinishTime, LevelOutcome, LevelVerdict, MapScope, Score, TestFolder, TestRecord,
+        TesterRecord, TesterVerdict, wilson,
     },
 };
 
@@ -73,6 +76,7 @@ pub fn record(range: &str, shard: Option<&str>) -> TestRecord {
         testers: vec![TesterRecord::bot("random")],
         episodes: 9,
         detectors: Vec::new(),
+        maps: MapScope::default(),
         shard: shard.map(|shard| shard.parse().expect("a shard")),
     }
 }
@@ -95,7 +99,10 @@ pub fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> LevelVerdict
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
         score: score.clone(),
         ends: Vec::new(),
-        testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false }],
+        causes: BTreeMap::new(),
+        places: None,
+        maps: None,
+        testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false, places: None }],
         findings: Vec::new(),
     }
 }

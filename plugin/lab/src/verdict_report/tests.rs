@@ -8,7 +8,10 @@ use super::{
     testing::{Garden, finding, level, record, tested},
     write_html,
 };
-use crate::verdict::{Comparison, EndPlace, FindingChange, LevelVerdict, Shard, TestError, TesterVerdict, merge};
+use crate::verdict::{
+    Comparison, EndPlace, FailureWay, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
+    TestError, TestRecord, TesterVerdict, merge,
+};
 
 const PLAIN: HtmlReport<'static> = HtmlReport { game: Some(&Garden), comparison: None, program: "playbot" };
 
@@ -19,13 +22,40 @@ fn page(levels: &[LevelVerdict], report: &HtmlReport) -> String {
     html(&tested(parent.path(), "whole", &record(&range, None), levels), report).expect("results")
 }
 
+/// Maps of a level with agents everywhere, and the way of a failure all over it.
+fn full_maps() -> LevelMaps {
+    let often = |square: u64| [square, 1 + square * square * 7919 % 997];
+    let way = (0..200).map(|step| [step * 389 % 1024, 40]).collect();
+    LevelMaps {
+        side: 1.0,
+        columns: 64,
+        rows: 16,
+        visits: (0..1024).map(often).collect(),
+        lost: (0..1024).map(|square| often(square + 3)).map(|[square, ticks]| [square - 3, ticks]).collect(),
+        skills: (1..9).map(|number| SkillTicks { skill: format!("z{number}+"), ticks: 7 }).collect(),
+        skill_at: (0..1024).map(|square| [square, often(square)[1] % 8]).collect(),
+        failure: Some(FailureWay { tester: "random".to_owned(), episode: 3, way }),
+        ..LevelMaps::default()
+    }
+}
+
 /// A level with all that makes a page long.
 fn long(index: u64) -> LevelVerdict {
-    let end = |number: u16| EndPlace { x: f32::from(2 * number) + 1.0, y: 3.0, lost: 3, timed_out: 2 };
+    let end = |number: u16| EndPlace {
+        x: f32::from(2 * number) + 1.0,
+        y: 3.0,
+        lost: 3,
+        timed_out: 2,
+        causes: [("saw".to_owned(), 3), ("time".to_owned(), 2)].into(),
+    };
     let short = level(index, 1, 9, 1234);
     let tester = |number: u32| TesterVerdict { tester: format!("tester-{number}"), ..short.testers[0].clone() };
     LevelVerdict {
         ends: (0..32).map(end).collect(),
+        causes: [("saw".to_owned(), 96), ("time".to_owned(), 64)].into(),
+        places: Some(Places { visited: 800, open: 1_000 }),
+        // Those of more levels would not be drawn.
+        maps: (index < 200).then(full_maps),
         testers: (0..40).map(tester).collect(),
         findings: (0..3).map(|_| finding("panic", &"index out of bounds ".repeat(100))).collect(),
         ..short
@@ -40,6 +70,9 @@ fn a_thousand_long_levels_are_less_than_ten_megabytes() {
     assert_eq!(html.matches("<tbody data-k=").count(), 1000);
     assert_eq!(html.matches("viewBox=\"0 0 640 160\"").count(), 200, "the worst ones have pictures");
     assert_eq!(html.matches("playbot test garden --levels hard:").count(), 1000, "all say how to see them");
+    assert_eq!(html.matches("<g class=\"map visits\"><path").count(), 200, "and maps");
+    let clips = html.matches("data-clip=\"iVBORw0KGgo").count();
+    assert!((20..=60).contains(&clips), "{clips} clips");
     assert!(html.contains(" 200 of them have a picture.") && html.contains("and 30 more in results.json"));
 }
 
@@ -75,7 +108,7 @@ fn nothing_of_what_files_and_games_say_becomes_markup() {
         level: "levels/<b>.json".to_owned(),
         findings: vec![finding("<u>", "</details></script><script>alert('x')</script>")],
         testers: vec![TesterVerdict { tester: "<i>".to_owned(), ..level(0, 0, 9, 0).testers[0].clone() }],
-        ends: vec![EndPlace { x: 1.0, y: 1.0, lost: 9, timed_out: 0 }],
+        ends: vec![EndPlace { x: 1.0, y: 1.0, lost: 9, ..EndPlace::default() }],
         ..level(0, 0, 9, 0)
     };
     let changed = FindingChange { level: "<em>".to_owned(), detector: "panic".to_owned(), tester: None };
@@ -94,7 +127,8 @@ fn the_page_loads_nothing() {
     for words in ["http:", "https:", "src=\"", "href=", "url(", "@import", "import("] {
         assert!(!html.contains(words), "{words}");
     }
-    assert!(html.contains("default-src 'none'"));
+    // Clips are in the page, and shown by the script.
+    assert!(html.contains("default-src 'none'") && html.contains("img-src data:") && html.contains("data-clip=\""));
 }
 
 #[test]
@@ -107,7 +141,7 @@ fn a_level_has_its_numbers_in_cells_that_can_be_sorted() {
     let html = page(&levels, &PLAIN);
     let row = "<tr><th scope=\"row\" data-v=\"1\">hard:1</th><td data-v=\"2\" class=\"solved\">solved</td>\
                <td data-v=\"0.3333\">3 of 9</td><td data-v=\"0.1206\">12.1 to 64.6 %</td><td data-v=\"50\">50.00</td>\
-               <td data-v=\"0\">–</td></tr>";
+               <td data-v=\"-1.0\">–</td><td data-v=\"0\">–</td></tr>";
     assert!(html.contains(row), "{html}");
     let place = |words: &str| html.find(words).unwrap_or_else(|| panic!("{words} in {html}"));
     assert!(place(">hard:2</th>") < place(">hard:1</th>") && place(">hard:1</th>") < place(">hard:0</th>"));
@@ -118,6 +152,41 @@ fn a_level_has_its_numbers_in_cells_that_can_be_sorted() {
     let without = page(&levels, &HtmlReport { game: None, ..PLAIN });
     assert!(without.contains("There are no pictures: this program does not have the game `garden`."), "{without}");
     assert!(!without.contains("<svg") && !without.contains("<summary>solved each time"));
+}
+
+#[test]
+fn maps_are_switched_and_explained_in_words() {
+    let html = page(&[long(0), level(1, 9, 9, 5)], &PLAIN);
+    for words in [
+        "<form id=\"maps\"",
+        "<li><b>lost time</b>: ticks more than two seconds after",
+        "<g class=\"map ends\">",
+        "<g class=\"map lost-time\">",
+        "<p>Ended by saw 96 (at ",
+        "<p>Visited 80.0 % of the open places",
+        "<td data-v=\"80.0\">80.0 %</td>",
+        "<dt>open places visited</dt><dd class=\"places\">80.0 %</dd><dd>800 of 1,000</dd>",
+    ] {
+        assert!(html.contains(words), "{words}");
+    }
+    for kind in ["ends", "visits", "lost-time", "skills"] {
+        assert!(html.contains(&format!("name=\"map\" value=\"{kind}\"")), "{kind}");
+        assert!(STYLE.contains(&format!("#levels[data-map=\"{kind}\"] .map.{kind}")), "{kind}");
+    }
+    let without = page(&[level(0, 1, 9, 5)], &PLAIN);
+    assert!(without.contains("<g class=\"map ends\">") && !without.contains("<form id=\"maps\""), "{without}");
+    assert!(without.contains("<summary>lost 8</summary>") && !without.contains("Where agents went is known"));
+}
+
+#[test]
+fn the_page_says_of_which_levels_there_are_maps() {
+    let parent = tempfile::tempdir().expect("a folder");
+    for (maps, words) in [(MapScope::All, "known of all levels."), (MapScope::Failed, "since there are many levels.")] {
+        let folder = tested(parent.path(), maps.name(), &TestRecord { maps, ..record("hard:0..0", None) }, &[long(0)]);
+        let results = fs::read_to_string(folder.join("results.json")).expect("results");
+        assert!(results.contains(&format!("\"maps\":\"{}\"", maps.name())), "{}", maps.name());
+        assert!(html(&folder, &PLAIN).expect("results").contains(words), "{words}");
+    }
 }
 
 /// The colours of a style sheet by name.

@@ -1,5 +1,7 @@
 //! Words and numbers as the page has them.
 
+use std::{cmp::Reverse, collections::BTreeMap};
+
 use crate::{
     escape::escape,
     verdict::{LevelVerdict, Score, Trials, wilson},
@@ -7,6 +9,8 @@ use crate::{
 
 /// Most letters of a text that somebody else wrote, such as what a game said when it broke.
 const MOST_LETTERS: usize = 400;
+/// Most causes that are named.
+const MOST_CAUSES: usize = 8;
 
 /// Text for the page; of a long one the beginning.
 pub fn text(words: &str) -> String {
@@ -28,7 +32,11 @@ pub fn interval_of(share: Trials) -> String {
 
 /// What went wrong on a level, in one line that needs no escaping any more.
 pub fn what(level: &LevelVerdict) -> String {
-    let Some(finding) = level.findings.first() else { return ends(&level.score) };
+    let Some(finding) = level.findings.first() else {
+        let causes = causes(level);
+        let causes = if causes.is_empty() { String::new() } else { format!(" ({causes})") };
+        return format!("{}{causes}", ends(&level.score));
+    };
     let more = level.findings.len() - 1;
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
     format!("{}: {}{more}", escape(&finding.detector), text(&finding.message))
@@ -40,4 +48,19 @@ pub fn ends(score: &Score) -> String {
     let told = counts.iter().filter(|(_, count)| *count > 0).map(|(what, count)| format!("{what} {count}"));
     let told: Vec<String> = told.collect();
     if told.is_empty() { "solved each time".to_owned() } else { told.join(", ") }
+}
+
+/// How often each cause ended an episode, in a few words that need no escaping any more.
+pub fn causes(level: &LevelVerdict) -> String {
+    let told: Vec<String> =
+        most_frequent(&level.causes).map(|(cause, count)| format!("{} {count}", text(cause))).collect();
+    told.join(", ")
+}
+
+/// Causes and how often each ended an episode, the most frequent ones first.
+pub fn most_frequent(causes: &BTreeMap<String, u64>) -> impl Iterator<Item = (&str, u64)> {
+    let mut sorted: Vec<(&str, u64)> = causes.iter().map(|(cause, count)| (cause.as_str(), *count)).collect();
+    // Of equally frequent ones the order of their names stays.
+    sorted.sort_by_key(|(_, count)| Reverse(*count));
+    sorted.into_iter().take(MOST_CAUSES)
 }

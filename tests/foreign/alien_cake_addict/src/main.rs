@@ -4,6 +4,8 @@
 
 include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
+mod defects;
+
 use std::process::ExitCode;
 
 use KeyCode::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp};
@@ -13,7 +15,7 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&ForeignGame::new("alien_cake_addict", 1, game)
+    playbot_cli::main(&[&defects::add_to(ForeignGame::new("alien_cake_addict", 1, game))
         .hz(20.0)
         .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
         .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {

@@ -1,5 +1,6 @@
 //! Gem Hop, a small platformer that knows nothing of playbot, with every verb of it.
 
+mod defects;
 mod game;
 
 use std::process::ExitCode;
@@ -15,7 +16,7 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&ForeignGame::new("gem_hop", 1, game::game)
+    playbot_cli::main(&[&defects::add_to(ForeignGame::new("gem_hop", 1, game::game))
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe("x y vx vy coyote".split(' ').map(String::from).chain((0..24).map(|i| format!("ahead {i}"))), see)
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)

@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     proof::LevelProof,
     verdict::{
-        Finding, LevelOutcome, TesterRecord,
+        Finding, LevelOutcome, MapScope, TesterRecord,
         folder::{Earlier, TestFolder},
         testing::{tester, verdict},
     },
@@ -18,6 +18,7 @@ fn record(testers: &[&str]) -> TestRecord {
         testers: testers.iter().map(|name| TesterRecord::bot(*name)).collect(),
         episodes: 1,
         detectors: Vec::new(),
+        maps: MapScope::default(),
         shard: None,
     }
 }

@@ -1,0 +1,46 @@
+//! Levels whose ground ends.
+
+use playbot_lab::defect::DefectKind;
+use playbot_learner::rng::{ChaCha8Rng, below};
+
+use super::edit::{between, dig, of_levels, summit};
+use crate::coinrun::{level::LevelParts, tile::Tile};
+
+pub(super) fn defects() -> Vec<DefectKind> {
+    vec![
+        of_levels("wide-pit", "a pit on the only way is wider than any jump", wide_pit),
+        of_levels("missing-floor", "the ground of the start or of the way's end is missing", missing_floor),
+    ]
+}
+
+/// Columns that no jump crosses. It is back at its height after 16 ticks; from there it falls by 1.5 tiles in each, and by
+/// no more than the highest place there is. A tick moves half a tile. Half a player hangs over on either side, and the rest
+/// is to spare.
+fn too_wide(parts: &LevelParts) -> i32 {
+    8 + summit(parts) / 3 + 5
+}
+
+fn wide_pit(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
+    let width = too_wide(parts);
+    let left = between(rng, 4, parts.coin[0] - width - 1)?;
+    dig(parts, left, width);
+    Some(())
+}
+
+/// Under the start, where the first tick ends in the lava; or from somewhere on up to the coin, which then hangs farther
+/// away than a jump leads.
+fn missing_floor(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
+    let [x, y] = parts.coin;
+    let wanted = below(rng, 2);
+    match between(rng, 4, x - too_wide(parts)).filter(|_| wanted == 0) {
+        Some(left) => {
+            dig(parts, left, x - left + 1);
+            parts.tiles.set(x, y, Tile::Coin);
+        }
+        None => {
+            let width = between(rng, 3, (x - 3).min(6))?;
+            dig(parts, 1, width);
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,98 @@
+//! Episodes under the detectors, for tests.
+
+use std::{
+    ops::Range,
+    sync::{Arc, Mutex},
+};
+
+use bevy::prelude::*;
+use bevy_playbot::episode::EpisodeResult;
+use playbot_lab::{
+    defect::{ChangeRules, Plant},
+    detector::{LevelAhead, Moment, NoProofs, Watch},
+    prelude::*,
+};
+
+use super::detectors;
+use crate::coinrun::{CoinRun, DemonstratorBot, defects::defects, game::spawn_agent};
+
+/// Who plays.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Bot {
+    Search,
+    Random,
+    RightJump,
+}
+
+/// What is wrong with the rules, if anything.
+pub(super) type Rules = Option<(Arc<ChangeRules>, u32)>;
+
+/// The game as it is.
+pub(super) fn sound() -> Rules {
+    None
+}
+
+/// A variant of a defect of the rules.
+pub(super) fn planted(class: &str, variant: u32) -> Rules {
+    let kind = defects().into_iter().find(|kind| kind.class == class).expect("there is such a defect");
+    match kind.plant {
+        Plant::Rules { plant, .. } => Some((plant, variant)),
+        Plant::Level(_) => panic!("`{class}` is a defect of levels"),
+    }
+}
+
+/// What is found in the first episode on a hard level, or in its first ticks: names of detectors and ticks.
+pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(&'static str, u32)> {
+    let mut app = bevy_playbot::prelude::headless_app();
+    CoinRun::default().build(&mut app, "hard");
+    if let Some((plant, variant)) = rules {
+        plant(&mut app, *variant);
+    }
+    let agent = spawn_agent(app.world_mut(), 0);
+    let mut entity = app.world_mut().entity_mut(agent);
+    entity.insert((Control::Bot, LevelQueue::list([level])));
+    match bot {
+        Bot::Search => entity.insert(DemonstratorBot::new(0.0)),
+        Bot::Random => entity.insert(BlindBot::Uniform),
+        Bot::RightJump => entity.insert(BlindBot::Constant(ActionValue::Discrete(8))),
+    };
+    let ended = Arc::new(Mutex::new(None::<EpisodeResult>));
+    let heard = ended.clone();
+    app.add_observer(move |event: On<EpisodeEnded>| *heard.lock().expect("nobody panics") = Some(event.result));
+    let ahead = LevelAhead { level, plan: None };
+    let all = detectors();
+    let mut watches: Vec<(&'static str, Box<dyn Watch>)> =
+        all.iter().filter_map(|detector| detector.watch(&ahead).map(|watch| (detector.name(), watch))).collect();
+    let mut found = Vec::new();
+    for tick in 0..ticks {
+        app.tick().expect("sound");
+        let world = app.world();
+        let result = *ended.lock().expect("nobody panics");
+        let moment = Moment {
+            world,
+            agent,
+            level,
+            tick,
+            action: &ActionValue::Discrete(0),
+            observation: &[],
+            state_hash: 0,
+            reward: 0.0,
+            place: None,
+            is_success: false,
+            proofs: &NoProofs,
+        };
+        for (name, watch) in &mut watches {
+            let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));
+            found.extend(message.map(|_| (*name, tick)));
+        }
+        if result.is_some() {
+            break;
+        }
+    }
+    found
+}
+
+/// The first of these levels on which a detector finds something.
+pub(super) fn first_named(name: &str, rules: &Rules, bot: Bot, levels: Range<u64>) -> Option<u64> {
+    levels.into_iter().find(|&level| findings(rules, level, bot, 200).iter().any(|(found, _)| *found == name))
+}

@@ -1,0 +1,19 @@
+//! What the variants of a defect are: places along the way first, and then strengths.
+
+/// Places: at the start, further on and late.
+pub(crate) const PLACES: u32 = 3;
+
+/// The place of a variant, from 0.
+pub(crate) fn place(variant: u32) -> usize {
+    (variant % PLACES) as usize
+}
+
+/// The strength of a variant.
+pub(crate) fn pick<T: Copy>(strengths: &[T], variant: u32) -> T {
+    strengths[(variant / PLACES) as usize % strengths.len()]
+}
+
+/// The variants of a defect that comes in so many strengths.
+pub(crate) const fn variants(strengths: usize) -> u32 {
+    PLACES * strengths as u32
+}

@@ -1,0 +1,8 @@
+//! Defects that can be planted into Maze2D, to measure which testers notice: see [`bugs`](playbot_lab::bugs).
+
+mod catalogue;
+mod goal;
+mod motion;
+mod walls;
+
+pub(super) use catalogue::defects;

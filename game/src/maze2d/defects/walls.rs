@@ -1,0 +1,78 @@
+//! Walls that the rules know and pictures do not, and the other way round.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use playbot_lab::defect::DefectKind;
+
+use crate::{
+    maze::{
+        Cell, Maze,
+        defects::{PLACES, wall_gone_beside_the_way, walled_on_the_way},
+    },
+    maze2d::{
+        components::MazeArena, level::Maze2dLevel, mode::Contact, physics::MazePhysics, plugin::Maze2dSystems,
+        walls::Walls,
+    },
+};
+
+/// Another maze for the rules, by start, goal and variant; `None` where there is no place for the defect.
+type Change = fn(&Maze, Cell, Cell, u32) -> Option<Maze>;
+
+pub(super) fn defects() -> Vec<DefectKind> {
+    let kind = |class, about, change: Change| {
+        DefectKind::rules(class, about, PLACES, move |app: &mut App, variant: u32| stand(app, variant, change))
+    };
+    vec![
+        kind("invisible-wall", "nobody gets past where nothing is", walled_on_the_way),
+        kind("missing-collider", "a wall can be gone through", wall_gone_beside_the_way),
+    ]
+}
+
+/// Gives the rules other walls as soon as a level has been built.
+fn stand(app: &mut App, variant: u32, change: Change) {
+    let exchange = move |mut arenas: Query<(&mut MazeArena, Option<&mut MazePhysics>), Changed<MazeArena>>| {
+        for (mut arena, physics) in &mut arenas {
+            let arena = arena.bypass_change_detection();
+            let Maze2dLevel { maze, start_cell, goal_cell, start, .. } = &*arena.level;
+            let Some(maze) = change(maze, *start_cell, *goal_cell, variant) else { continue };
+            let walls = Walls::new(&maze, arena.rules.wall_offset());
+            if let Some(mut physics) = physics {
+                let solves = arena.rules.contact == Contact::Rapier;
+                let stand = if solves { MazePhysics::solving } else { MazePhysics::following };
+                *physics = stand(&walls, start);
+            }
+            arena.level = Arc::new(Maze2dLevel { walls, ..Maze2dLevel::clone(&arena.level) });
+        }
+    };
+    app.add_systems(FixedUpdate, exchange.before(Maze2dSystems));
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_playbot::test_app::test_app;
+    use playbot_lab::{defect::Plant, prelude::*};
+
+    use super::*;
+    use crate::maze2d::{Maze2d, components::PlaysIn, game::spawn_agent};
+
+    #[test]
+    fn the_ball_meets_one_wall_more_or_less_than_its_level_has() {
+        for (kind, more) in defects().into_iter().zip([1, -1]) {
+            let Plant::Rules { plant, variants } = kind.plant else { panic!("`{}` is one of rules", kind.class) };
+            for variant in 0..variants {
+                let mut app = test_app();
+                Maze2d::default().build(&mut app, "medium+fixed-start");
+                plant(&mut app, variant);
+                let agent = spawn_agent(app.world_mut(), 0);
+                let still = Action(ActionValue::Continuous(vec![0.0; 2]));
+                app.world_mut().entity_mut(agent).insert((Control::Human, still, LevelQueue::Always(0)));
+                app.tick().expect("sound");
+                let arena = app.world().get::<PlaysIn>(agent).expect("it plays").0;
+                let level = &app.world().get::<MazeArena>(arena).expect("it plays").level;
+                let walls = [level.walls.cells().count(), level.maze.wall_cells().count()].map(|count| count as i64);
+                assert_eq!(walls[0] - walls[1], more, "{} {variant}", kind.class);
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! `playbot bugs make`.
+
+use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
+
+use playbot_lab::{
+    bugs::{BugError, BugSet, MakePlan, NoPlace, PlantedPart, Source, make_bugs},
+    game::Game,
+    games::Games,
+    split::LevelSplit,
+};
+use serde_json::json;
+
+use crate::{
+    compute::Threads,
+    defaults::{usual_experiment, usual_mode},
+    error::{CliError, Outcome, print_line},
+    output, progress,
+};
+
+/// Where levels are taken from that nobody has named: far from those that bots are trained on.
+const FIRST: u64 = 1_000_000;
+const LAST: u64 = 1_999_999;
+
+/// Plant defects: make a set of broken games and levels, and name sound levels beside them.
+///
+/// Every kind of defect that the games have, their own ones and those of all games, is planted a few times, each time into
+/// another level that the game's own bot solves, or with another variant. The same seed makes the same files.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot bugs make --seed 1 --out runs/bugs
+  playbot bugs make GAME --per-kind 6 --sound 200 --out runs/bugs
+  playbot bugs make GAME --levels GAME=MODE:1000..1999 --out runs/bugs --force")]
+pub struct Args {
+    /// Names of the games; all games of the program if none is named.
+    #[arg(value_name = "GAME")]
+    games: Vec<String>,
+    /// Seed of all that is drawn.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Mutants of each kind and game.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
+    per_kind: u32,
+    /// Sound levels of all games together.
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(..=1_000_000))]
+    sound: u64,
+    /// Levels of a game to plant defects into, and to name as sound ones; numbers from 1000000 on, in the mode of its held-out
+    /// levels, if none are named. May be given once for each game.
+    #[arg(long, value_name = "GAME=MODE:FIRST..LAST")]
+    levels: Vec<LevelsOf>,
+    #[command(flatten)]
+    threads: Threads,
+    /// Folder for the set.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Replace a set that is there.
+    #[arg(long)]
+    force: bool,
+    /// One line of JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The levels of a game.
+#[derive(Clone, Debug)]
+struct LevelsOf {
+    game: String,
+    levels: LevelSplit,
+}
+
+impl FromStr for LevelsOf {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (game, levels) = text
+            .split_once('=')
+            .filter(|(game, _)| !game.is_empty() && !game.contains(':'))
+            .ok_or("write the name of a game in front, as in GAME=MODE:1000..1999")?;
+        let levels = levels.parse::<LevelSplit>().map_err(|error| error.to_string())?;
+        Ok(Self { game: game.to_owned(), levels })
+    }
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    if !args.force && BugSet::is_in(&args.out) {
+        return Err(BugError::Exists(args.out.clone()).into());
+    }
+    let sources = sources(args, games)?;
+    output::make_folder(&args.out)?;
+    let plan = MakePlan { seed: args.seed, per_kind: args.per_kind, sound: args.sound, threads: args.threads.threads };
+    let bar = progress::bar("bugs make", plan.levels(sources.len()), "sound levels");
+    let made = make_bugs(&sources, &plan, &|levels| bar.inc(levels));
+    bar.finish_and_clear();
+    let made = made?;
+    made.set.write(&args.out, &made.levels, args.force)?;
+    for NoPlace { game, class, planted, wanted } in &made.without_place {
+        tell!("warning: {game}: only {planted} of {wanted} levels with the defect {class} were found");
+    }
+    print(&made.set, &made.without_place, args.json)?;
+    tell!("planted: {}", args.out.display());
+    Ok(Outcome::Pass)
+}
+
+/// The games that are asked for, each once, with their levels.
+fn sources<'a>(args: &Args, games: &Games<'a>) -> Result<Vec<Source<'a>>, CliError> {
+    let mut chosen: Vec<&'a dyn Game> = Vec::new();
+    for name in &args.games {
+        let game = games.get(name)?;
+        if chosen.iter().any(|other| other.name() == game.name()) {
+            return Err(CliError::Usage(format!("the game `{name}` is named twice: name it once")));
+        }
+        chosen.push(game);
+    }
+    if chosen.is_empty() {
+        chosen = games.iter().collect();
+    }
+    for LevelsOf { game, .. } in &args.levels {
+        games.get(game)?;
+        let is_chosen = chosen.iter().any(|other| other.name() == game);
+        if !is_chosen || args.levels.iter().filter(|other| other.game == *game).count() > 1 {
+            return Err(CliError::Usage(format!(
+                "--levels {game}=… must be given once at most, and for a game that defects are planted into"
+            )));
+        }
+    }
+    chosen.into_iter().map(|game| source(args, game)).collect()
+}
+
+fn source<'a>(args: &Args, game: &'a dyn Game) -> Result<Source<'a>, CliError> {
+    let named = args.levels.iter().find(|levels| levels.game == game.name());
+    let usual = usual_experiment(game).map(|usual| usual.experiment);
+    let is_mode = |split: &LevelSplit| game.check_mode(&split.mode).is_ok();
+    let levels = match named {
+        Some(named) => named.levels.clone(),
+        None => {
+            let held_out = usual.as_ref().map(|usual| &usual.test).filter(|split| is_mode(split));
+            let mode = held_out.map_or_else(|| usual_mode(game).to_owned(), |split| split.mode.clone());
+            LevelSplit { mode, first: FIRST, last: LAST }
+        }
+    };
+    levels.check(game)?;
+    Ok(Source { game, levels, trained: usual.map(|usual| usual.train).filter(is_mode) })
+}
+
+/// How much was planted of each class.
+fn print(set: &BugSet, without_place: &[NoPlace], json: bool) -> Result<(), CliError> {
+    let mut classes: BTreeMap<(&str, &str), (u64, u64)> = BTreeMap::new();
+    for bug in &set.mutants {
+        let (levels, rules) = classes.entry((bug.game.as_str(), bug.class.as_str())).or_default();
+        match bug.planted {
+            PlantedPart::Level(_) => *levels += 1,
+            PlantedPart::Rules { .. } => *rules += 1,
+        }
+    }
+    let sound: u64 = set.sound.iter().map(|sound| sound.range.len()).sum();
+    if json {
+        let class = |(&(game, class), &(levels, rules)): (&(&str, &str), &(u64, u64))| json!({ "game": game, "class": class, "levels": levels, "rules": rules });
+        let missing = |missing: &NoPlace| {
+            let NoPlace { game, class, planted, wanted } = missing;
+            json!({ "game": game, "class": class, "planted": planted, "wanted": wanted })
+        };
+        return print_line(json!({
+            "seed": set.seed,
+            "mutants": set.mutants.len(),
+            "sound": sound,
+            "classes": classes.iter().map(class).collect::<Vec<_>>(),
+            "without_place": without_place.iter().map(missing).collect::<Vec<_>>(),
+        }));
+    }
+    let width = classes.keys().map(|(game, _)| game.len()).max().unwrap_or(0).max("game".len());
+    print_line(format!("{:<width$}  {:<24}  {:>6}  {:>5}", "game", "defect", "levels", "rules"))?;
+    for ((game, class), (levels, rules)) in &classes {
+        print_line(format!("{game:<width$}  {class:<24}  {levels:>6}  {rules:>5}"))?;
+    }
+    print_line(format!("{} mutants, {sound} sound levels", set.mutants.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_named_for_a_game() {
+        let levels: LevelsOf = "maze=random+size=9x9:5..9".parse().expect("levels of a game");
+        assert_eq!((levels.game.as_str(), levels.levels.to_string().as_str()), ("maze", "random+size=9x9:5..9"));
+        for wrong in ["hard:0..9", "=hard:0..9", "runner=hard"] {
+            assert!(wrong.parse::<LevelsOf>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! `playbot bugs`.
+
+mod make;
+mod score;
+mod table;
+mod testers;
+mod verb;
+
+pub use verb::{Args, run};

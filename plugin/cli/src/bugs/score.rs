@@ -1,0 +1,246 @@
+//! `playbot bugs score`.
+
+use std::path::{Path, PathBuf};
+
+use playbot_lab::{
+    bugs::{
+        BugSet,
+        score::{
+            ClockKind, Score, ScoreBudget, ScoreError, ScoreJournal, ScorePlan, ScoreRun, ScoreTable, ScoreWatch,
+            TestedGame,
+        },
+    },
+    detectors::{DetectorChoice, Detectors},
+    game::Game,
+    games::Games,
+    verdict::Earlier,
+};
+
+use super::testers::ContestantArgs;
+use crate::{
+    compute::Compute,
+    error::{CliError, Outcome, print_line},
+    experiment::quoted,
+    interrupt, output, program, progress,
+};
+
+/// Detectors that do not look unless they are named: what the clock says is no finding that comes again, and the other one is
+/// an explorer of its own, beside those that are scored.
+const LEFT_OUT: [&str; 2] = ["tick-time", "unreachable-region"];
+
+/// Measure which testers find planted defects: in how many mutants, with how many false findings, and how soon.
+///
+/// Every tester is set on every mutant of this program's games and on every sound level of the set, at equal budgets and
+/// under all detectors but tick-time and unreachable-region. A mutant is found if a detector finds something or the game
+/// breaks, if it is proved that nobody can solve it, or if a tester fails that solves at least 99 % of the sound levels; on
+/// a sound level the same is a false finding. Beside that, results are compared with those of the same tester on the sound
+/// level that the mutant was made of.
+///
+/// All but the times is the same on any number of threads.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot bugs score runs/bugs --out runs/score.json
+  playbot bugs score runs/bugs --tester random,chaos,explore --steps 20000 --out runs/score.json
+  playbot bugs score runs/bugs --policy ppo=bot.policy --skills skills.safetensors --out runs/score.json --resume")]
+pub struct Args {
+    /// Folder of the set, as written by `playbot bugs make`.
+    #[arg(value_name = "DIR")]
+    set: PathBuf,
+    /// Games of the set that are tested, separated by commas; all that this program has if none is named.
+    #[arg(long = "game", value_name = "NAME", value_delimiter = ',')]
+    names: Vec<String>,
+    #[command(flatten)]
+    testers: ContestantArgs,
+    /// Episodes of whoever plays, on each mutant and sound level.
+    #[arg(long, default_value_t = ScoreBudget::default().episodes, value_parser = clap::value_parser!(u32).range(1..))]
+    episodes: u32,
+    /// Environment steps of whoever explores, on each mutant and sound level.
+    #[arg(long, default_value_t = ScoreBudget::default().steps, value_parser = clap::value_parser!(u64).range(1..))]
+    steps: u64,
+    /// Ways of whoever explores that are played again under the detectors.
+    #[arg(long, default_value_t = ScoreBudget::default().routes)]
+    routes: u32,
+    /// Replays in which the first finding of each tester on each mutant is made shorter; 0 for none.
+    #[arg(long, default_value_t = ScoreBudget::default().replays)]
+    replays: u32,
+    /// Seed of all that is drawn.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Detectors that look, too, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    detect: Vec<String>,
+    /// Detectors that do not look, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    no_detect: Vec<String>,
+    /// A setting of a detector; may be given several times.
+    #[arg(long, value_name = "NAME.KEY=VALUE")]
+    detector: Vec<String>,
+    /// File for the score.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Go on with a score that was stopped or killed; begin it if there is none.
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Replace a score that is there.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    compute: Compute,
+    /// One line of JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let set = BugSet::read(&args.set)?;
+    let plan = ScorePlan {
+        set: &set,
+        folder: &args.set,
+        games: tested(&args, &set, games)?,
+        budget: ScoreBudget {
+            episodes: args.episodes,
+            steps: args.steps,
+            routes: args.routes,
+            replays: args.replays,
+            seed: args.seed,
+        },
+        clock: ClockKind::here(),
+        threads: args.compute.threads(),
+    };
+    let score_run = ScoreRun::new(&plan).map_err(failed)?;
+    output::make_folder_of(&args.out)?;
+    if args.resume && args.out.exists() && !ScoreJournal::is_begun(&args.out) {
+        let score = done_before(&args.out, &plan)?;
+        tell!("{} is done already", args.out.display());
+        return tell_score(&args.out, score, args.json);
+    }
+    let earlier = match (args.resume, args.force) {
+        (true, _) => Earlier::Resume,
+        (false, true) => Earlier::Replace,
+        (false, false) => Earlier::Keep,
+    };
+    let opened = ScoreJournal::open(&args.out, &command(), &plan.record(), earlier);
+    let (mut journal, cut) = opened.map_err(failed)?;
+    if cut > 0 {
+        tell!("warning: the last {cut} bytes of what was finished are damaged, and are done again");
+    }
+    let total = score_run.jobs();
+    let finished = journal.finished().len() as u64;
+    interrupt::listen();
+    let bar = progress::bar("bugs score", total.saturating_sub(finished), "jobs");
+    let progress = |jobs: u64| bar.inc(jobs);
+    let watch = ScoreWatch { progress: &progress, stop: &interrupt::asked };
+    let scored = score_run.run(&mut journal, &watch);
+    bar.finish_and_clear();
+    let Some(score) = scored.map_err(failed)? else {
+        let finished = journal.finished().len();
+        tell!("stopped; {finished} of {total} jobs are finished: go on with the same command and --resume");
+        return Ok(Outcome::Stopped);
+    };
+    score.write(&args.out).map_err(failed)?;
+    journal.close().map_err(failed)?;
+    tell_score(&args.out, score, args.json)
+}
+
+/// The games of the set that this program has, each with its testers.
+fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<TestedGame<'a>>, CliError> {
+    let mut chosen: Vec<&'a dyn Game> = Vec::new();
+    for name in &args.names {
+        let game = games.get(name)?;
+        if !chosen.iter().any(|known| known.name() == game.name()) {
+            chosen.push(game);
+        }
+    }
+    if chosen.is_empty() {
+        let is_in_set = |game: &&dyn Game| set.games.iter().any(|known| known.name == game.name());
+        chosen = games.iter().filter(is_in_set).collect();
+        let is_left_out = |name: &&str| !chosen.iter().any(|game| game.name() == *name);
+        let left_out: Vec<&str> = set.games.iter().map(|game| game.name.as_str()).filter(is_left_out).collect();
+        if !left_out.is_empty() {
+            tell!("left out, since this program does not have them: {}", left_out.join(", "));
+        }
+    }
+    let contestants = args.testers.load(&chosen, games, args.compute.device())?;
+    let choice = DetectorChoice {
+        with: [vec!["all".to_owned()], args.detect.clone()].concat(),
+        without: [LEFT_OUT.map(str::to_owned).to_vec(), args.no_detect.clone()].concat(),
+        settings: args.detector.clone(),
+    };
+    let mut tested = Vec::new();
+    for (game, contestants) in chosen.into_iter().zip(contestants) {
+        if contestants.is_empty() {
+            tell!("left out, since it has none of the testers: {}", game.name());
+            continue;
+        }
+        let detectors = Detectors::choose(game, &choice).map_err(|error| CliError::Usage(error.to_string()))?;
+        tested.push(TestedGame { game, contestants, detectors });
+    }
+    Ok(tested)
+}
+
+/// A score that needs nothing more.
+fn done_before(path: &Path, plan: &ScorePlan) -> Result<Score, CliError> {
+    let score = Score::read(path).map_err(failed)?;
+    let differences = score.record.differences(&plan.record());
+    if differences.is_empty() {
+        Ok(score)
+    } else {
+        Err(failed(ScoreError::OtherScore { path: path.into(), differences }))
+    }
+}
+
+fn tell_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError> {
+    let table = ScoreTable::join(&[(path.to_owned(), score)]).map_err(failed)?;
+    if json {
+        print_line(as_json(&table)?)?;
+    } else {
+        print_line(table.class_table().to_text())?;
+        print_line(table.tester_table().to_text())?;
+        table.headlines().into_iter().try_for_each(print_line)?;
+    }
+    tell!("score: {}", path.display());
+    Ok(Outcome::Pass)
+}
+
+/// A table as a line of JSON.
+///
+/// # Errors
+///
+/// It cannot be written so.
+pub fn as_json(table: &ScoreTable) -> Result<String, CliError> {
+    serde_json::to_string(table).map_err(|error| CliError::Io(format!("the table cannot be written as JSON: {error}")))
+}
+
+/// What was called, as people would call it for the first time.
+fn command() -> String {
+    let words = std::env::args().skip(1).filter(|word| !["--resume", "--force", "--json"].contains(&word.as_str()));
+    [program::name().to_owned()].into_iter().chain(words.map(|word| quoted(&word))).collect::<Vec<_>>().join(" ")
+}
+
+/// An error of the score, with its exit code.
+pub fn failed(error: ScoreError) -> CliError {
+    if error.is_usage() { CliError::Usage(error.to_string()) } else { CliError::Io(error.to_string()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command_line::check_usage;
+
+    #[test]
+    fn a_score_is_asked_for_in_one_line() {
+        let sound =
+            ["playbot", "bugs", "score", "set", "--tester", "random,hold", "--policy", "ppo=a", "--out", "a.json"];
+        assert_eq!(check_usage(sound), Ok(()));
+        let unnamed = ["playbot", "bugs", "score", "set", "--policy", "a.policy", "--out", "a.json"];
+        assert!(check_usage(unnamed).expect_err("no name").contains("write a name in front of the file"));
+        assert!(check_usage(["playbot", "bugs", "score", "set"]).is_err(), "it is written somewhere");
+    }
+
+    #[test]
+    fn what_the_caller_can_mend_is_told_from_what_failed() {
+        assert_eq!(failed(ScoreError::Nothing).exit_code(), 3);
+        let source = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        assert_eq!(failed(ScoreError::Io { action: "write", path: "a".into(), source }).exit_code(), 2);
+    }
+}

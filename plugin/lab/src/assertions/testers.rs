@@ -1,0 +1,87 @@
+//! Who plays the levels of an assertion.
+
+use std::path::{Path, PathBuf};
+
+use bevy_playbot::{
+    policy::ActionDraw,
+    policy_file::{check_policy, policy_observation},
+    unknown_name::UnknownName,
+    vision::ObservationConfig,
+};
+use playbot_learner::{DeviceKind, PolicyFile};
+
+use super::error::LevelTestError;
+use crate::{
+    eval::{Player, blind_bots},
+    game::Game,
+    sensors::GameSensors,
+    train::checksum::file_checksum,
+    verdict::{Tester, TesterRecord},
+};
+
+/// Somebody who is named.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "a few per test")]
+pub(super) enum Named {
+    /// A bot of the game.
+    Bot(String),
+    /// A policy file.
+    Policy { path: PathBuf, draw: ActionDraw },
+    /// A player that the command line does not know.
+    Player { name: String, player: Player },
+}
+
+impl Named {
+    /// Prepares it for the game.
+    pub fn tester(&self, game: &dyn Game) -> Result<Tester, LevelTestError> {
+        match self {
+            Self::Bot(name) => Ok(of_player(name, bot(game, name)?)),
+            Self::Policy { path, draw } => policy(game, path, *draw),
+            Self::Player { name, player } => Ok(of_player(name, player.clone())),
+        }
+    }
+
+    /// Its name, if the command line does not know it.
+    pub fn own_name(&self) -> Option<&str> {
+        match self {
+            Self::Player { name, .. } => Some(name),
+            Self::Bot(_) | Self::Policy { .. } => None,
+        }
+    }
+}
+
+/// Names of all bots of a game, the demonstrator first.
+pub(super) fn bot_names(game: &dyn Game) -> Vec<&'static str> {
+    let blind = blind_bots(game).into_iter().map(|(name, _)| name);
+    game.demonstrator().into_iter().chain(blind).collect()
+}
+
+fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
+    if game.demonstrator() == Some(name) {
+        return Ok(Player::Demonstrator);
+    }
+    let found = blind_bots(game).into_iter().find(|(bot, _)| *bot == name);
+    match found {
+        Some((_, bot)) => Ok(Player::Blind(bot)),
+        None => Err(UnknownName::new("bot", name, &bot_names(game))),
+    }
+}
+
+fn of_player(name: &str, player: Player) -> Tester {
+    Tester { record: TesterRecord::bot(name), player, observation_config: ObservationConfig::default() }
+}
+
+fn policy(game: &dyn Game, path: &Path, draw: ActionDraw) -> Result<Tester, LevelTestError> {
+    let file = PolicyFile::load(path, DeviceKind::default())?;
+    check_policy(&game.card(), &file)
+        .map_err(|misfit| LevelTestError::Misfit { path: path.into(), misfit: Box::new(misfit) })?;
+    let observation_config = policy_observation(&file)?;
+    observation_config.check(game)?;
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    let (checksum, greedy) = (Some(file_checksum(path)?), matches!(draw, ActionDraw::Greedy));
+    Ok(Tester {
+        record: TesterRecord { name, checksum, greedy },
+        player: Player::of_file(&file, draw),
+        observation_config,
+    })
+}

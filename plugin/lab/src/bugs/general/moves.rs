@@ -1,0 +1,108 @@
+//! What agents of a game can do, and what of it matters.
+
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    bot::BlindBot,
+};
+
+use crate::game::Game;
+
+/// First words of the names of actions that do nothing.
+const IDLE: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay", "wait", "stand"];
+
+/// What agents can do.
+#[derive(Clone, Debug)]
+pub(super) struct Moves {
+    space: ActionSpace,
+    /// The choice that does nothing; the last one where no name says so.
+    idle: u32,
+    /// The other choices: first what the game's blind bots hold, then from the last to the first.
+    choices: Vec<u32>,
+}
+
+impl Moves {
+    /// Those of a game.
+    pub(super) fn of(game: &dyn Game) -> Self {
+        let space = game.actions();
+        let ActionSpace::Discrete(count) = space else { return Self { space, idle: 0, choices: Vec::new() } };
+        let names = game.action_names();
+        let is_named_idle = |choice: &u32| {
+            let name = names.get(*choice as usize).map_or("", |name| name.split_whitespace().next().unwrap_or(""));
+            IDLE.contains(&name.to_lowercase().as_str())
+        };
+        let last = (count as u32).saturating_sub(1);
+        let idle = (0..=last).find(is_named_idle).unwrap_or(last);
+        let bots = game.blind_bots().into_iter().filter_map(|(_, bot)| match bot {
+            BlindBot::Constant(ActionValue::Discrete(choice)) => Some(choice),
+            _ => None,
+        });
+        let mut choices: Vec<u32> = Vec::new();
+        for choice in bots.chain((0..=last).rev()) {
+            if choice != idle && !is_named_idle(&choice) && !choices.contains(&choice) {
+                choices.push(choice);
+            }
+        }
+        Self { space, idle, choices }
+    }
+
+    /// Doing nothing.
+    pub(super) fn idle(&self) -> ActionValue {
+        match self.space {
+            ActionSpace::Discrete(_) => ActionValue::Discrete(self.idle),
+            ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; count]),
+        }
+    }
+
+    /// The action if the n-th choice that matters, or the n-th value, does nothing; `None` if that changes nothing.
+    pub(super) fn without(&self, n: usize, action: &ActionValue) -> Option<ActionValue> {
+        match action {
+            ActionValue::Discrete(choice) => {
+                let dead = self.choices.get(n % self.choices.len().max(1))?;
+                (choice == dead).then(|| self.idle())
+            }
+            ActionValue::Continuous(values) => {
+                let mut values = values.clone();
+                let at = n % values.len().max(1);
+                *values.get_mut(at)? = 0.0;
+                Some(ActionValue::Continuous(values))
+            }
+        }
+    }
+
+    /// Whether an action is the one that pays where one can be farmed: doing nothing, or with continuous actions the first
+    /// value far up, since nobody draws zeros.
+    pub(super) fn is_farming(&self, action: &ActionValue) -> bool {
+        match action {
+            ActionValue::Discrete(choice) => *choice == self.idle,
+            ActionValue::Continuous(values) => values.first().is_some_and(|value| *value > 0.5),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::App;
+
+    use super::*;
+    use crate::{bugs::general::testing::Track, foreign::ForeignGame};
+
+    #[test]
+    fn the_choice_that_does_nothing_is_known_by_its_name_and_held_ones_come_first() {
+        let game =
+            ForeignGame::new("keys", 1, |_: &mut App| {}).keys_by_name([vec!["ArrowUp"], vec![], vec!["ArrowLeft"]]);
+        let moves = Moves::of(&game);
+        assert_eq!((moves.idle, moves.choices.as_slice()), (1, &[2, 0][..]));
+        let moves = Moves::of(&Track);
+        assert_eq!((moves.idle(), moves.choices.as_slice()), (ActionValue::Discrete(0), &[1, 2][..]));
+        assert_eq!(moves.without(0, &ActionValue::Discrete(1)), Some(ActionValue::Discrete(0)));
+        assert_eq!(moves.without(0, &ActionValue::Discrete(2)), None);
+    }
+
+    #[test]
+    fn a_value_of_continuous_actions_can_be_dead() {
+        let moves = Moves { space: ActionSpace::Continuous(2), idle: 0, choices: Vec::new() };
+        let action = ActionValue::Continuous(vec![1.0, -1.0]);
+        assert_eq!(moves.without(3, &action), Some(ActionValue::Continuous(vec![1.0, 0.0])));
+        assert_eq!(moves.idle(), ActionValue::Continuous(vec![0.0; 2]));
+    }
+}

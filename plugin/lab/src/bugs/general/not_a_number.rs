@@ -1,0 +1,86 @@
+//! Numbers that are none.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    control::Control,
+    episode::Episode,
+    observation::{Observation, check_observations},
+    placement::{TickSchedules, is_tick},
+    reward::Reward,
+    systems::{PlaybotSystems, run_observe_schedule},
+};
+
+use super::{
+    history::{History, remember},
+    when::{When, one_of},
+};
+use crate::defect::DefectKind;
+
+/// What is no number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    /// The first value that an agent sees; its reward where it sees none.
+    Observation,
+    /// What it is paid.
+    Reward,
+}
+
+const VARIANTS: [(When, Place); 4] = [
+    (When::Tick(25), Place::Observation),
+    (When::Held(7), Place::Reward),
+    (When::Later { episode: 2, tick: 10 }, Place::Observation),
+    (When::Tick(60), Place::Reward),
+];
+
+/// What an agent sees, or is paid, is not a number.
+pub(super) fn nan() -> DefectKind {
+    let about = "a value that an agent sees, or what it is paid, is not a number";
+    DefectKind::rules("nan", about, VARIANTS.len() as u32, |app, variant| {
+        remember(app);
+        let (when, place) = one_of(&VARIANTS, variant);
+        let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
+        let spoil_observation = move |mut agents: Query<(&Control, &Episode, &History, &mut Observation)>| {
+            for (control, episode, history, mut seen) in &mut agents {
+                if control.is_active() && episode.is_running() && when.is_now(history, episode) {
+                    seen.vector.iter_mut().take(1).for_each(|value| *value = f32::NAN);
+                }
+            }
+        };
+        let spoil_reward = move |mut agents: Query<(&Control, &Episode, &History, &Observation, &mut Reward)>| {
+            for (control, episode, history, seen, mut reward) in &mut agents {
+                let is_here = place == Place::Reward || seen.vector.is_empty();
+                if is_here && control.is_active() && episode.is_running() && when.is_now(history, episode) {
+                    reward.add(f32::NAN);
+                }
+            }
+        };
+        if place == Place::Observation {
+            // Behind the game's sensors, and before anybody looks.
+            let behind = spoil_observation.in_set(PlaybotSystems::Observe).after(run_observe_schedule);
+            app.add_systems(decide, behind.before(check_observations));
+        }
+        app.add_systems(judge, spoil_reward.before(PlaybotSystems::Judge).run_if(is_tick));
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bugs::general::testing::play;
+
+    #[test]
+    fn what_is_no_number_is_a_fault_of_its_tick() {
+        for (variant, tick, words) in [
+            (0, 25, "observation `place` is NaN"),
+            (1, 6, "the reward is NaN"),
+            (2, 40, "observation `place` is NaN"),
+            (3, 60, "the reward is NaN"),
+        ] {
+            let way = |tick: u32| if variant == 3 { tick % 4 / 3 } else { 1 };
+            let played = play(&nan(), variant, 70, way);
+            let fault = played.fault.expect("it is none");
+            assert!(fault.contains(words), "{fault}");
+            assert_eq!(played.places.len(), tick, "variant {variant}");
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Games with a defect in their rules.
+
+use std::{ops::Deref, sync::Arc};
+
+use bevy::{app::PluginGroupBuilder, prelude::*};
+use bevy_playbot::{
+    action::ActionSpace, bot::BlindBot, demo::file::DemoHeader, headless_plugins::HeadlessPlugins,
+    key_bindings::KeyBindings, observation::ObservationSpace, placement::TickPlacement, policy_file::GameCard,
+    vision::Picture,
+};
+
+use crate::{
+    benchmark::Benchmark,
+    defect::{ChangeRules, DefectKind, Plant},
+    detector::Detector,
+    experiment_text::ExperimentText,
+    floor_plan::FloorPlan,
+    game::Game,
+    inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
+    level_files::{LevelDesign, LevelTextError},
+    mode::ModeError,
+    proof::LevelProof,
+};
+
+/// A defect of rules, in one of its variants.
+#[derive(Clone)]
+pub struct PlantedRules {
+    /// What plants it.
+    pub plant: Arc<ChangeRules>,
+    /// Which variant.
+    pub variant: u32,
+}
+
+/// A game with a defect in its rules, under the game's own name: what is planted is found by playing alone.
+///
+/// `G` points to the game: `&dyn Game` or `Arc<dyn Game>`.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use playbot_lab::{bugs::{DefectKind, Mutant}, foreign::ForeignGame, prelude::*, worlds::build_world};
+///
+/// #[derive(Resource)]
+/// struct Gravity(f32);
+///
+/// let game = |app: &mut App| {
+///     app.insert_resource(Gravity(9.8));
+/// };
+/// let game = ForeignGame::new("ball", 1, game).actions(ActionSpace::Discrete(2), || {}).observe(["x"], || [0.0]);
+/// let weak = DefectKind::rules("weak-gravity", "things fall too slowly", 2, |app, variant| {
+///     app.insert_resource(Gravity([2.0, 5.0][variant as usize]));
+/// });
+/// let mutant = Mutant::new(&game as &dyn Game, &weak, 1);
+/// let (world, _) = build_world(&mutant, "default", 0, 0, 1);
+/// assert_eq!(world.resource::<Gravity>().0, 5.0);
+/// assert_eq!(mutant.name(), "ball");
+/// ```
+#[derive(Clone)]
+pub struct Mutant<G> {
+    game: G,
+    rules: Option<PlantedRules>,
+}
+
+impl<G> Mutant<G> {
+    /// A game with this variant of a defect. A defect of levels leaves the game as it is.
+    pub fn new(game: G, kind: &DefectKind, variant: u32) -> Self {
+        let rules = match &kind.plant {
+            Plant::Rules { plant, .. } => Some(PlantedRules { plant: Arc::clone(plant), variant }),
+            Plant::Level(_) => None,
+        };
+        Self { game, rules }
+    }
+
+    /// A game as it is.
+    pub fn sound(game: G) -> Self {
+        Self { game, rules: None }
+    }
+
+    /// The defect in its rules, if there is one.
+    pub fn rules(&self) -> Option<&PlantedRules> {
+        self.rules.as_ref()
+    }
+}
+
+/// Methods of the sound game that are this game's too.
+macro_rules! as_sound {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
+        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
+            self.game.$name($($argument),*)
+        })*
+    };
+}
+
+impl<G: Deref<Target: Game> + Send + Sync> Game for Mutant<G> {
+    as_sound! {
+        fn name() -> &'static str;
+        fn version() -> u32;
+        fn modes() -> &'static [&'static str];
+        fn check_mode(mode: &str) -> Result<(), ModeError>;
+        fn family(mode: &str) -> String;
+        fn fingerprint(mode: &str, level: u64) -> Option<u64>;
+        fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
+        fn tick_hz() -> f64;
+        fn placement() -> TickPlacement;
+        fn headless_plugins(usual: HeadlessPlugins) -> PluginGroupBuilder;
+        fn arenas_per_world() -> Option<u32>;
+        fn problem() -> Option<String>;
+        fn actions() -> ActionSpace;
+        fn action_names() -> Vec<String>;
+        fn key_bindings() -> Option<KeyBindings>;
+        fn observation() -> ObservationSpace;
+        fn picture() -> Option<Picture>;
+        fn has_camera() -> bool;
+        fn build_picture(app: &mut App);
+        fn spawn_agent(world: &mut World, index: u32) -> Entity;
+        fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
+        fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
+        fn end_cause(world: &World, agent: Entity) -> Option<&'static str>;
+        fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
+        fn prove(mode: &str, level: u64) -> LevelProof;
+        fn prove_from(world: &World, agent: Entity) -> LevelProof;
+        fn detectors() -> Vec<Box<dyn Detector>>;
+        fn defects() -> Vec<DefectKind>;
+        fn blind_bots() -> Vec<(&'static str, BlindBot)>;
+        fn demonstrator() -> Option<&'static str>;
+        fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);
+        fn experiment() -> Option<ExperimentText>;
+        fn benchmarks() -> Vec<Benchmark>;
+        fn show_level(request: &LevelRequest) -> Result<LevelView, InspectError>;
+        fn trace_columns() -> Vec<String>;
+        fn trace_row(world: &World, agent: Entity) -> Vec<f32>;
+        fn trace(request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>>;
+        fn has_space_view() -> bool;
+        fn build_space_view(app: &mut App);
+        fn demo_header(mode: &str) -> DemoHeader;
+    }
+
+    fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
+        self.game.benchmarked(benchmark)
+    }
+
+    fn card(&self) -> GameCard<'_> {
+        self.game.card()
+    }
+
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        let game = self.game.built_anew()?;
+        Some(Arc::new(Mutant { game, rules: self.rules.clone() }))
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        self.game.build(app, mode);
+        if let Some(PlantedRules { plant, variant }) = &self.rules {
+            plant(app, *variant);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        bugs::general::{general_defects, testing::Track},
+        foreign::{ForeignGame, Restart},
+        worlds::build_world,
+    };
+
+    #[derive(Resource)]
+    struct Planted(u32);
+
+    fn planted() -> DefectKind {
+        DefectKind::rules("planted", "something is planted", 3, |app, variant| {
+            app.insert_resource(Planted(variant));
+        })
+    }
+
+    #[test]
+    fn what_is_planted_is_in_every_world_and_the_game_keeps_its_name() {
+        let mutant = Mutant::new(&Track as &dyn Game, &planted(), 2);
+        let (world, agents) = build_world(&mutant, "plain", 0, 0, 2);
+        assert_eq!((world.resource::<Planted>().0, agents.len(), mutant.name()), (2, 2, "track"));
+        let (world, _) = build_world(&Mutant::sound(&Track as &dyn Game), "plain", 0, 0, 1);
+        assert!(!world.contains_resource::<Planted>());
+        assert_eq!(general_defects(&mutant).len(), general_defects(&Track).len());
+    }
+
+    #[test]
+    fn worlds_that_are_built_anew_have_it_too() {
+        let game = ForeignGame::new("ball", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .restart(Restart::Rebuild);
+        let mutant = Mutant::new(Arc::new(game) as Arc<dyn Game>, &planted(), 1);
+        let again = mutant.built_anew().expect("it is built for each episode");
+        let (world, _) = build_world(&*again, "default", 0, 0, 1);
+        assert_eq!(world.resource::<Planted>().0, 1);
+    }
+}

@@ -1,0 +1,119 @@
+//! Who is measured.
+
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    bot::BlindBot,
+    vision::ObservationConfig,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    eval::{CHAOS, Player, blind_bots},
+    explore::Explorer,
+    game::Game,
+};
+/// Name of the bot that acts at random.
+pub const RANDOM: &str = "random";
+/// Name of the bot that holds an action.
+pub const HOLD: &str = "hold";
+/// Name of the explorer without skills.
+pub const EXPLORE: &str = "explore";
+/// Name of the explorer with a skill model or a policy.
+pub const EXPLORE_SKILLS: &str = "explore-skills";
+
+/// A tester of one game.
+#[derive(Clone)]
+pub struct Contestant {
+    /// What files say of it.
+    pub record: ContestantRecord,
+    /// How it tests.
+    pub means: Means,
+    /// What a policy sees; bots are left with vectors.
+    pub observation_config: ObservationConfig,
+}
+
+/// How a tester tests.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "a few per measurement")]
+pub enum Means {
+    /// It plays episodes.
+    Plays(Player),
+    /// It explores, and the ways that it finds are played again under the detectors.
+    Explores(Explorer),
+}
+
+/// What files say of a tester.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContestantRecord {
+    /// Its name, unlike that of all others of the game; testers of several games with the same name are counted together.
+    pub name: String,
+    /// Checksum of the file that it was read from, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checksum: Option<String>,
+    /// Whether a policy takes its most probable action instead of drawing one.
+    #[serde(default)]
+    pub greedy: bool,
+    /// Whether it acts with learned skills.
+    pub skilled: bool,
+}
+
+impl ContestantRecord {
+    /// A tester without a file and without skills.
+    pub fn bot(name: impl Into<String>) -> Self {
+        Self { name: name.into(), checksum: None, greedy: false, skilled: false }
+    }
+}
+
+impl Contestant {
+    /// The game's bots and the explorer without skills: [`RANDOM`], [`HOLD`], [`CHAOS`], [`EXPLORE`] and, under its own name,
+    /// the demonstrator, if there is one.
+    pub fn usual(game: &dyn Game) -> Vec<Self> {
+        let bots = blind_bots(game);
+        let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
+        let constant = bots.into_iter().map(|(_, bot)| bot).find(is_constant);
+        let hold = constant.unwrap_or_else(|| BlindBot::Constant(last_action(game)));
+        let mut all = vec![
+            Self::bot(RANDOM, Player::Blind(BlindBot::Uniform)),
+            Self::bot(HOLD, Player::Blind(hold)),
+            Self::bot(CHAOS, Player::Blind(BlindBot::Chaos)),
+            Self::of(ContestantRecord::bot(EXPLORE), Means::Explores(Explorer::Random)),
+        ];
+        all.extend(game.demonstrator().map(|name| Self::bot(name, Player::Demonstrator)));
+        all
+    }
+
+    /// A bot of the game.
+    pub fn bot(name: &str, player: Player) -> Self {
+        Self::of(ContestantRecord::bot(name), Means::Plays(player))
+    }
+
+    /// A tester that sees vectors.
+    pub fn of(record: ContestantRecord, means: Means) -> Self {
+        Self { record, means, observation_config: ObservationConfig::default() }
+    }
+}
+
+/// The last of the discrete actions, or all values at their highest.
+fn last_action(game: &dyn Game) -> ActionValue {
+    match game.actions() {
+        ActionSpace::Discrete(count) => ActionValue::Discrete(count.saturating_sub(1) as u32),
+        ActionSpace::Continuous(count) => ActionValue::Continuous(vec![1.0; count]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bugs::score::testing::Corridor;
+
+    #[test]
+    fn a_game_without_a_bot_that_holds_an_action_holds_its_last() {
+        let all = Contestant::usual(&Corridor::default());
+        let names: Vec<&str> = all.iter().map(|contestant| contestant.record.name.as_str()).collect();
+        assert_eq!(names, [RANDOM, HOLD, CHAOS, EXPLORE, "guide"]);
+        let hold = BlindBot::Constant(ActionValue::Discrete(2));
+        assert!(matches!(&all[1].means, Means::Plays(Player::Blind(bot)) if *bot == hold));
+        assert!(matches!(all[3].means, Means::Explores(Explorer::Random)));
+        assert!(all.iter().all(|contestant| !contestant.record.skilled));
+    }
+}

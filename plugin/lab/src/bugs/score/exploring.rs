@@ -1,0 +1,220 @@
+//! Testers that explore.
+
+use std::ops::ControlFlow;
+
+use bevy_playbot::{action::ActionValue, bot::BlindBot, state_hash::StateHash};
+
+use super::{
+    error::ScoreError,
+    job::{JobFinding, JobResult},
+    trial::Trial,
+};
+use crate::{
+    detectors::{Detectors, Ear, TestedBy, TestedLevel},
+    eval::Player,
+    explore::{Cell, Exploration, ExploreError, ExplorePlan, Explorer, ReachedCell, Route, Stop, explore},
+    findings::{Breakage, Checks, FindingHead, Lengths, lengths, scan},
+    proof::LevelProof,
+};
+
+/// Arenas in which is explored, side by side in one World.
+const ARENAS: u32 = 8;
+
+/// What was found on the way, and when.
+struct Sightings {
+    findings: Vec<JobFinding>,
+    first: Option<f64>,
+    /// Place among the findings of those that can be played again, with the actions that lead there.
+    playable: Vec<(usize, Vec<ActionValue>)>,
+}
+
+impl Sightings {
+    fn add(&mut self, finding: JobFinding, seconds: f64) {
+        self.first.get_or_insert(seconds);
+        if self.findings.iter().all(|known| known.detector != finding.detector) {
+            self.findings.push(finding);
+        }
+    }
+}
+
+/// Explores a subject, and plays some of the ways that were found again under the detectors; `None` if somebody asked to
+/// stop.
+///
+/// # Errors
+///
+/// The explorer cannot explore the game at all.
+pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobResult>, ScoreError> {
+    let mut sightings = Sightings { findings: Vec::new(), first: None, playable: Vec::new() };
+    let ear = Ear::new();
+    let explored = ear.listen(|| explore(trial.game, &plan(trial, explorer), |_| {}, |_| go_on(trial)));
+    hear_errors(trial, &ear, &mut sightings);
+    let found = match explored {
+        Ok(found) if found.stop == Stop::Asked => return Ok(None),
+        Ok(found) => found,
+        Err(error) => {
+            let seconds = trial.clock.seconds();
+            sightings.add(finding_of(error)?, seconds);
+            return Ok(Some(result(sightings, None, None, None, seconds)));
+        }
+    };
+    for route in routes(&found, trial.budget.routes as usize) {
+        if (trial.stop)() {
+            return Ok(None);
+        }
+        look_again(trial, &route, &mut sightings);
+    }
+    let solution = found.solution();
+    inspect(trial, solution.as_ref(), &mut sightings);
+    let ticks = found.solution_ticks();
+    let proof = if ticks.is_some() { LevelProof::Solvable } else { trial.game.prove(trial.mode, trial.level) };
+    let unsolvable = proof.why_unsolvable().map(str::to_owned);
+    let seconds = trial.clock.seconds();
+    let shortened = shortened(trial, &sightings);
+    Ok(Some(result(sightings, ticks, unsolvable, shortened, seconds)))
+}
+
+fn go_on(trial: &Trial) -> ControlFlow<()> {
+    if (trial.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
+fn plan(trial: &Trial, explorer: &Explorer) -> ExplorePlan {
+    let words = trial.name.bytes().chain(trial.contestant.record.name.bytes()).map(u64::from);
+    ExplorePlan {
+        steps: trial.budget.steps.max(1),
+        explorer: explorer.clone(),
+        observation_config: trial.contestant.observation_config,
+        seed: StateHash::of([trial.budget.seed].into_iter().chain(words)).0,
+        arenas: ARENAS,
+        worlds: 1,
+        threads: 1,
+        keeps_panics: false,
+        ..ExplorePlan::new(trial.mode, trial.level)
+    }
+}
+
+/// What it means that an exploration did not come to its end.
+fn finding_of(error: ExploreError) -> Result<JobFinding, ScoreError> {
+    match error {
+        ExploreError::Diverged { divergence, .. } => Ok(JobFinding {
+            detector: "determinism".to_owned(),
+            tick: Some(divergence.tick),
+            message: format!("the way back to a cell does not replay: {divergence}"),
+        }),
+        ExploreError::Fault(fault) => {
+            let Breakage { detector, message, .. } = Breakage::of_fault(&fault, 0);
+            Ok(JobFinding { detector: detector.to_owned(), tick: None, message })
+        }
+        other => Err(other.into()),
+    }
+}
+
+/// Errors that were logged while somebody explored, if a detector listens.
+fn hear_errors(trial: &Trial, ear: &Ear, sightings: &mut Sightings) {
+    let mut ticks = trial.detectors.ticks.iter();
+    let listening = ticks.find(|it| it.watch_world().is_some_and(|watch| watch.hears_errors()));
+    let error = ear.take().into_iter().next();
+    if let (Some(detector), Some(message)) = (listening, error) {
+        let message = format!("the game logged an error: {message}");
+        let finding = JobFinding { detector: detector.name().to_owned(), tick: None, message };
+        sightings.add(finding, trial.clock.seconds());
+    }
+}
+
+/// The way to the aim, and the longest ways, at most so many: those on which the episode ended, and those on which it goes
+/// on, in turn.
+fn routes(found: &Exploration, most: usize) -> Vec<Route> {
+    let mut cells: Vec<(&Cell, &ReachedCell)> = found.cells().iter().collect();
+    cells.sort_by(|(one, near), (other, far)| far.ticks().cmp(&near.ticks()).then_with(|| one.cmp(other)));
+    let (ended, open): (Vec<_>, Vec<_>) = cells.into_iter().partition(|(_, reached)| reached.is_over);
+    let longest = ended.len().max(open.len());
+    let in_turn = (0..longest).flat_map(|index| [ended.get(index), open.get(index)]).flatten();
+    let ways = in_turn.filter_map(|(cell, _)| found.route_to(cell));
+    let mut routes: Vec<Route> = Vec::new();
+    for route in found.solution().into_iter().chain(ways) {
+        if routes.len() >= most {
+            break;
+        }
+        if !(route.is_empty() || routes.contains(&route)) {
+            routes.push(route);
+        }
+    }
+    routes
+}
+
+fn actions(route: &Route) -> Vec<ActionValue> {
+    (0..route.len()).map_while(|tick| route.actions.get(tick)).collect()
+}
+
+/// Plays a way again under the detectors that look tick by tick.
+fn look_again(trial: &Trial, route: &Route, sightings: &mut Sightings) {
+    let actions = actions(route);
+    // The streams of explorers begin from 0.
+    let scanned = scan(trial.game, trial.mode, trial.level, 0, &actions, trial.detectors);
+    for seen in scanned.seen {
+        let finding = JobFinding { detector: seen.detector.to_owned(), tick: Some(seen.tick), message: seen.message };
+        let count = sightings.findings.len();
+        sightings.add(finding, trial.clock.seconds());
+        if sightings.findings.len() > count {
+            sightings.playable.push((count, actions.clone()));
+        }
+    }
+}
+
+/// Lets the detectors of levels look; the way to the aim is an episode to them.
+fn inspect(trial: &Trial, solution: Option<&Route>, sightings: &mut Sightings) {
+    let ended = solution
+        .and_then(|route| scan(trial.game, trial.mode, trial.level, 0, &actions(route), &Detectors::default()).end);
+    // Who looks for differences has somebody play who acts at random, as explorers do.
+    let anybody = Player::Blind(BlindBot::Uniform);
+    let tester = TestedBy {
+        name: &trial.contestant.record.name,
+        player: &anybody,
+        observation_config: trial.contestant.observation_config,
+        seed: trial.budget.seed,
+        episodes: ended.map(|end| (0, end)).into_iter().collect(),
+        // Where it ended is not looked at.
+        places: std::collections::BTreeMap::new(),
+    };
+    let (game, mode, level) = (trial.game, trial.mode, trial.level);
+    let tested = TestedLevel { game, mode, level, place: 0, par: None, testers: vec![tester] };
+    for detector in &trial.detectors.levels {
+        for defect in detector.inspect(&tested) {
+            let detector = detector.name().to_owned();
+            sightings.add(JobFinding { detector, tick: defect.tick, message: defect.message }, trial.clock.seconds());
+        }
+    }
+}
+
+/// The first finding that can be played again, made shorter.
+fn shortened(trial: &Trial, sightings: &Sightings) -> Option<Lengths> {
+    let budget = trial.shortening()?;
+    let checks = Checks::default().with_detectors(trial.detectors);
+    sightings.playable.iter().find_map(|(index, actions)| {
+        let finding = sightings.findings.get(*index)?;
+        let head = FindingHead::new(trial.name, &finding.detector, &finding.message);
+        lengths(trial.game, (trial.mode, trial.level), head, actions, &checks, budget, trial.stop)
+    })
+}
+
+fn result(
+    sightings: Sightings,
+    solution: Option<u32>,
+    unsolvable: Option<String>,
+    shortened: Option<Lengths>,
+    seconds: f64,
+) -> JobResult {
+    let proved_after = unsolvable.as_ref().map(|_| seconds);
+    JobResult {
+        solved: u64::from(solution.is_some()),
+        episodes: 1,
+        ends: vec![solution.map_or_else(|| "not found".to_owned(), |ticks| format!("won {ticks}"))],
+        findings: sightings.findings,
+        unsolvable,
+        original: shortened.map(|lengths| lengths.original),
+        minimised: shortened.map(|lengths| lengths.minimised),
+        seconds,
+        found_after: sightings.first.into_iter().chain(proved_after).min_by(f64::total_cmp),
+        failed_after: solution.is_none().then_some(seconds),
+        ..JobResult::default()
+    }
+}

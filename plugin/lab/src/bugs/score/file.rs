@@ -1,0 +1,119 @@
+//! Files of scores.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::Path,
+};
+
+use playbot_learner::write_atomically_with;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    error::{ScoreError, io_error},
+    found::ScoredJob,
+    record::{SCORE_FORMAT, ScoreRecord},
+    subject::Subject,
+};
+
+/// What testers found in a set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// What was scored, and how.
+    #[serde(flatten)]
+    pub record: ScoreRecord,
+    /// What people called to make it.
+    pub command: String,
+    /// What testers were set on.
+    pub subjects: Vec<Subject>,
+    /// What came of it, in the order of the subjects and, for each, of the testers.
+    pub jobs: Vec<ScoredJob>,
+}
+
+/// What is read before the form is known.
+#[derive(Deserialize)]
+struct FormOnly {
+    format: u32,
+}
+
+impl Score {
+    /// Writes it, whole or not at all: a line for each subject and each job.
+    ///
+    /// # Errors
+    ///
+    /// The system refuses.
+    pub fn write(&self, path: &Path) -> Result<(), ScoreError> {
+        let written = write_atomically_with(path, |file| {
+            let head = serde_json::to_string(&self.record)?;
+            let command = serde_json::to_string(&self.command)?;
+            let head = head.strip_suffix('}').unwrap_or(&head);
+            write!(file, "{head},\"command\":{command},\n\"subjects\":[")?;
+            write_lines(file, &self.subjects)?;
+            write!(file, "],\n\"jobs\":[")?;
+            write_lines(file, &self.jobs)?;
+            file.write_all(b"]}\n")
+        });
+        written.map_err(io_error("write", path))
+    }
+
+    /// Reads one.
+    ///
+    /// # Errors
+    ///
+    /// It is no score, one in a form that this program does not know, or cannot be read.
+    pub fn read(path: &Path) -> Result<Self, ScoreError> {
+        let text = fs::read_to_string(path).map_err(io_error("read", path))?;
+        let no_score = |why: String| ScoreError::NoScore { path: path.into(), why };
+        let of_json = |error: serde_json::Error| no_score(format!("line {}: {error}", error.line()));
+        let FormOnly { format } = serde_json::from_str(&text).map_err(of_json)?;
+        if format != SCORE_FORMAT {
+            return Err(no_score(format!("a score in form {format}, but this program reads form {SCORE_FORMAT}")));
+        }
+        serde_json::from_str(&text).map_err(of_json)
+    }
+}
+
+fn write_lines(file: &mut impl Write, items: &[impl Serialize]) -> io::Result<()> {
+    for (index, item) in items.iter().enumerate() {
+        let text = serde_json::to_string(item)?;
+        write!(file, "{}{text}", if index == 0 { "\n" } else { ",\n" })?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bugs::score::testing::{job, mutant, record};
+
+    #[test]
+    fn a_score_is_written_in_lines_and_reads_back() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("score.json");
+        let score = Score {
+            record: record("garden", &["random"]),
+            command: "playbot bugs score set --out \"a b.json\"".to_owned(),
+            subjects: vec![mutant("garden", "a", "panic"), mutant("garden", "b", "panic")],
+            jobs: vec![job("a", "random", true), job("b", "random", false)],
+        };
+        score.write(&path).expect("writable");
+        assert_eq!(Score::read(&path).expect("readable"), score);
+        assert_eq!(fs::read_to_string(&path).expect("readable").lines().count(), 7);
+        let empty = Score { subjects: Vec::new(), jobs: Vec::new(), ..score };
+        empty.write(&path).expect("writable");
+        assert_eq!(Score::read(&path).expect("readable"), empty);
+    }
+
+    #[test]
+    fn what_is_no_score_is_refused_with_what_is_wrong() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("score.json");
+        let said = |text: &str| {
+            fs::write(&path, text).expect("writable");
+            Score::read(&path).expect_err("no score").to_string()
+        };
+        assert!(said("{").contains("score.json: line 1: "));
+        assert!(said("{\"format\":1}").contains("missing field"));
+        assert!(said("{\"format\":9}").contains("a score in form 9, but this program reads form 1"));
+    }
+}

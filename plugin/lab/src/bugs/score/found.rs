@@ -1,0 +1,198 @@
+//! Which defects were found.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    job::JobResult,
+    subject::{Subject, SubjectKind},
+};
+use crate::verdict::{FALSE_DISCOVERY_RATE, Trials, benjamini_hochberg, fisher_exact};
+
+/// Share of a game's sound levels that a tester has to solve for its failure to say something.
+pub const RELIABLE: f64 = 0.99;
+
+/// How something was found. On a sound level it is false.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Found {
+    /// A detector found something, or the game broke.
+    pub detected: bool,
+    /// It is proved that nobody can solve the level.
+    pub unsolvable: bool,
+    /// A tester failed that solves nearly all sound levels of the game: see [`RELIABLE`].
+    pub failed: bool,
+    /// Beside a sound build: the tester does not do there what it does here.
+    pub differs: bool,
+}
+
+impl Found {
+    /// Whether it was found with nothing to compare it with.
+    pub fn alone(self) -> bool {
+        self.detected || self.unsolvable || self.failed
+    }
+
+    /// Whether it was found by some means.
+    pub fn at_all(self) -> bool {
+        self.alone() || self.differs
+    }
+}
+
+/// What a tester found on a subject, and what that means.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScoredJob {
+    /// What it found.
+    #[serde(flatten)]
+    pub result: JobResult,
+    /// How the defect was found, if it was.
+    pub found: Found,
+    /// Seconds until then, with nothing to compare it with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first: Option<f64>,
+}
+
+/// Says of all jobs what was found. `results` are in any order and stay in it.
+pub fn judge(subjects: &[Subject], results: Vec<JobResult>) -> Vec<ScoredJob> {
+    let subjects: BTreeMap<&str, &Subject> = subjects.iter().map(|subject| (subject.id.as_str(), subject)).collect();
+    let reliable = reliable(&subjects, &results);
+    let differing = differing(&subjects, &results);
+    let scored = |(index, result): (usize, JobResult)| {
+        let game = subjects.get(result.subject.as_str()).map_or("", |subject| subject.game.as_str());
+        let found = Found {
+            detected: !result.findings.is_empty(),
+            unsolvable: result.unsolvable.is_some(),
+            failed: !result.is_solved() && reliable.contains(&(game.to_owned(), result.tester.clone())),
+            differs: differing.contains(&index),
+        };
+        let failed_after = result.failed_after.filter(|_| found.failed);
+        let first = [result.found_after, failed_after].into_iter().flatten().min_by(f64::total_cmp);
+        ScoredJob { result, found, first }
+    };
+    results.into_iter().enumerate().map(scored).collect()
+}
+
+/// Games and the testers that solve nearly all of their sound levels.
+fn reliable(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> BTreeSet<(String, String)> {
+    let mut counts: BTreeMap<(String, String), Trials> = BTreeMap::new();
+    for result in results {
+        let Some(subject) = subjects.get(result.subject.as_str()) else { continue };
+        if subject.kind == SubjectKind::Sound {
+            let count = counts.entry((subject.game.clone(), result.tester.clone())).or_default();
+            count.trials += 1;
+            count.successes += u64::from(result.is_solved());
+        }
+    }
+    let is_reliable = |count: &Trials| count.successes as f64 >= RELIABLE * count.trials as f64;
+    counts.into_iter().filter(|(_, count)| is_reliable(count)).map(|(names, _)| names).collect()
+}
+
+/// Places of the results on mutants that differ from those of the same tester on the original: in anything, where neither
+/// leaves anything to chance; else by Fisher's exact test, with at most one in twenty false on average over all mutants
+/// (Benjamini and Hochberg).
+fn differing(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> BTreeSet<usize> {
+    let key = |result: &JobResult| (result.subject.clone(), result.tester.clone());
+    let known: BTreeMap<(String, String), &JobResult> = results.iter().map(|result| (key(result), result)).collect();
+    let (mut certain, mut doubtful, mut probabilities) = (BTreeSet::new(), Vec::new(), Vec::new());
+    for (index, result) in results.iter().enumerate() {
+        let Some(SubjectKind::Mutant { original, .. }) =
+            subjects.get(result.subject.as_str()).map(|subject| &subject.kind)
+        else {
+            continue;
+        };
+        let Some(before) = known.get(&(original.clone(), result.tester.clone())) else { continue };
+        if result.exact && before.exact {
+            if result.ends != before.ends {
+                certain.insert(index);
+            }
+        } else {
+            let trials = |of: &JobResult| Trials { successes: of.solved, trials: of.episodes };
+            doubtful.push(index);
+            probabilities.push(fisher_exact(trials(result), trials(before)));
+        }
+    }
+    let alarms = benjamini_hochberg(&probabilities, FALSE_DISCOVERY_RATE);
+    certain.extend(doubtful.into_iter().zip(alarms).filter(|(_, is_alarm)| *is_alarm).map(|(index, _)| index));
+    certain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bugs::score::job::JobFinding;
+
+    fn subject(id: &str, kind: SubjectKind) -> Subject {
+        Subject { id: id.to_owned(), game: "garden".to_owned(), kind }
+    }
+
+    fn mutant(id: &str) -> Subject {
+        subject(id, SubjectKind::Mutant { class: "panic".to_owned(), original: "garden bed:0".to_owned() })
+    }
+
+    fn result(subject: &str, tester: &str, solved: u64, episodes: u64) -> JobResult {
+        JobResult {
+            subject: subject.to_owned(),
+            tester: tester.to_owned(),
+            solved,
+            episodes,
+            failed_after: (solved < episodes).then_some(2.0),
+            ..JobResult::default()
+        }
+    }
+
+    fn sound_levels(count: u64) -> Vec<Subject> {
+        (0..count).map(|level| subject(&format!("garden bed:{level}"), SubjectKind::Sound)).collect()
+    }
+
+    #[test]
+    fn only_who_solves_nearly_all_sound_levels_finds_by_failing() {
+        let subjects = [sound_levels(100), vec![mutant("m")]].concat();
+        let mut results = Vec::new();
+        for (level, subject) in (0_u64..).zip(&subjects[..100]) {
+            results.push(result(&subject.id, "good", u64::from(level != 7), 1));
+            results.push(result(&subject.id, "fair", u64::from(level % 50 != 7), 1));
+        }
+        results.extend([result("m", "good", 4, 5), result("m", "fair", 0, 5)]);
+        let scored = judge(&subjects, results);
+        let found = |subject: &str, tester: &str| {
+            let is = |job: &&ScoredJob| job.result.subject == subject && job.result.tester == tester;
+            scored.iter().find(is).map(|job| (job.found.failed, job.first)).expect("it was played")
+        };
+        assert_eq!(found("m", "good"), (true, Some(2.0)));
+        assert_eq!(found("m", "fair"), (false, None));
+        assert_eq!(found("garden bed:7", "good"), (true, Some(2.0)), "a false finding");
+        assert_eq!(found("garden bed:8", "good"), (false, None));
+    }
+
+    #[test]
+    fn what_was_found_first_counts() {
+        let subjects = [sound_levels(1), vec![mutant("m")]].concat();
+        let finding = JobFinding { detector: "stuck".to_owned(), tick: None, message: String::new() };
+        let found = JobResult { findings: vec![finding], found_after: Some(0.5), ..result("m", "good", 0, 1) };
+        let scored = judge(&subjects, vec![result("garden bed:0", "good", 1, 1), found]);
+        assert_eq!((scored[1].first, scored[1].found.alone()), (Some(0.5), true));
+        assert!(scored[1].found.detected && scored[1].found.failed && !scored[1].found.unsolvable);
+        let proved = JobResult { unsolvable: Some("walled in".to_owned()), ..result("m", "bad", 0, 1) };
+        assert!(judge(&subjects, vec![proved])[0].found.unsolvable);
+    }
+
+    #[test]
+    fn beside_a_sound_build_what_is_exact_shows_any_difference_and_chance_only_large_ones() {
+        let subjects = [sound_levels(1), vec![mutant("a"), mutant("b")]].concat();
+        let exact = |subject: &str, end: &str| JobResult {
+            exact: true,
+            ends: vec![end.to_owned()],
+            ..result(subject, "exact", 1, 1)
+        };
+        let results = vec![
+            exact("garden bed:0", "won 9"),
+            exact("a", "won 9"),
+            exact("b", "won 10"),
+            result("garden bed:0", "random", 20, 20),
+            result("a", "random", 17, 20),
+            result("b", "random", 2, 20),
+        ];
+        let scored = judge(&subjects, results);
+        let differs: Vec<bool> = scored.iter().map(|job| job.found.differs).collect();
+        assert_eq!(differs, [false, false, true, false, false, true]);
+    }
+}

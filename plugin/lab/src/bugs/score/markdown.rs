@@ -1,0 +1,83 @@
+//! A page of Markdown.
+
+use super::{record::ScoreBudget, table::ScoreTable};
+use crate::report::PlainTable;
+
+impl ScoreTable {
+    /// The page: headline numbers, classes, testers, and how it was measured.
+    pub fn to_markdown(&self) -> String {
+        let mut lines = vec!["# Planted defects".to_owned(), String::new()];
+        lines.extend(self.headlines().iter().map(|line| format!("- {}", cell(line))));
+        for table in [self.class_table(), self.tester_table()] {
+            lines.extend([String::new(), format!("## {}", heading(&table.caption)), String::new()]);
+            lines.extend(rows(&table));
+        }
+        lines.extend([String::new(), "## How it is measured".to_owned(), String::new()]);
+        lines.extend(self.notes().iter().map(|note| format!("- {note}")));
+        if self.commands.iter().any(|command| !command.is_empty()) {
+            lines.extend([String::new(), "```sh".to_owned()]);
+            lines.extend(self.commands.iter().filter(|command| !command.is_empty()).cloned());
+            lines.push("```".to_owned());
+        }
+        lines.push(String::new());
+        lines.join("\n")
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let ScoreBudget { episodes, steps, routes, replays, seed } = self.budget;
+        let sets: Vec<String> = self.sets.iter().map(|set| format!("{} (seed {})", set.hash, set.seed)).collect();
+        let skilled: Vec<&str> =
+            self.testers.iter().filter(|row| row.skilled).flat_map(|row| &row.testers).map(String::as_str).collect();
+        let skilled = if skilled.is_empty() { "nobody".to_owned() } else { cell(&skilled.join(", ")) };
+        vec![
+            format!("Games and versions: {}. Sets: {}.", cell(&self.games.join(", ")), sets.join(", ")),
+            format!(
+                "Each tester has the same budget on each mutant and sound level: {episodes} episodes for whoever plays, \
+                 {steps} steps and {routes} ways played again for whoever explores; seed {seed}."
+            ),
+            "A mutant is found if a detector finds something or the game breaks, if it is proved that nobody can solve it, \
+             or if a tester fails that solves at least 99 % of the sound levels of the game. On a sound level the same is a \
+             false finding."
+                .to_owned(),
+            "Beside a sound build, a difference from the same tester's episodes on the sound level counts too: any, where \
+             nothing is left to chance, else by Fisher's exact test, with at most one in twenty false over all mutants \
+             (Benjamini and Hochberg)."
+                .to_owned(),
+            "Precision is the share of mutants in all that is found in mutants and on sound levels. Intervals are 95 % \
+             Wilson intervals."
+                .to_owned(),
+            format!("Testers with learned skills: {skilled}."),
+            format!(
+                "Seconds are {}, for mutants, without making findings shorter, which takes up to {replays} replays each.",
+                self.clock.describe()
+            ),
+        ]
+    }
+}
+
+fn rows(table: &PlainTable) -> Vec<String> {
+    let line =
+        |cells: &[String]| format!("| {} |", cells.iter().map(|text| cell(text)).collect::<Vec<_>>().join(" | "));
+    let rule = table.columns.iter().enumerate().map(|(index, _)| if index == 0 { "---" } else { "---:" });
+    let rule = format!("|{}|", rule.collect::<Vec<_>>().join("|"));
+    [line(&table.columns), rule].into_iter().chain(table.rows.iter().map(|row| line(row))).collect()
+}
+
+/// With a capital.
+fn heading(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Text that neither ends a cell of a table nor begins anything in Markdown.
+fn cell(text: &str) -> String {
+    let mut out = String::new();
+    for letter in text.chars() {
+        match letter {
+            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
+            letter if letter.is_control() => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out
+}

@@ -1,0 +1,46 @@
+//! How well testers find planted defects.
+//!
+//! A [`ScorePlan`] sets [`Contestant`]s on all mutants and sound levels of a [`BugSet`](crate::bugs::BugSet), at equal
+//! budgets and under the detectors of a test. A [`ScoreRun`] does so on all cores; a [`ScoreJournal`] keeps what is
+//! finished. A [`Score`] is what came of it, and a [`ScoreTable`] joins several: recall and precision by class and tester,
+//! what a defect costs, and which testers find most together.
+
+mod case;
+mod clock;
+mod contestant;
+mod error;
+mod exploring;
+mod file;
+mod found;
+mod job;
+mod journal;
+mod markdown;
+mod mix;
+mod numbers;
+mod plan;
+mod playing;
+mod record;
+mod rows;
+mod run;
+mod subject;
+mod table;
+mod tables;
+mod tester_row;
+#[cfg(test)]
+pub(crate) mod testing;
+mod trial;
+
+pub use clock::ClockKind;
+pub use contestant::{Contestant, ContestantRecord, EXPLORE, EXPLORE_SKILLS, HOLD, Means, RANDOM};
+pub use error::ScoreError;
+pub use file::Score;
+pub use found::{Found, RELIABLE, ScoredJob, judge};
+pub use job::{JobFinding, JobResult};
+pub use journal::ScoreJournal;
+pub use numbers::Share;
+pub use plan::{ScorePlan, TestedGame};
+pub use record::{GameRecord, SCORE_FORMAT, ScoreBudget, ScoreRecord, SetRecord};
+pub use run::{ScoreRun, ScoreWatch};
+pub use subject::{Subject, SubjectKind};
+pub use table::{ClassRow, FEW_FALSE, ScoreTable};
+pub use tester_row::TesterRow;

@@ -1,0 +1,79 @@
+//! Numbers of a table.
+
+use serde::Serialize;
+
+use crate::verdict::wilson;
+
+/// So many of so many, with the 95 % Wilson interval of the share.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Share {
+    /// So many.
+    pub count: u64,
+    /// Of so many.
+    pub of: u64,
+    /// Lowest and highest share with which that is no surprise.
+    pub interval: [f64; 2],
+}
+
+impl Share {
+    /// So many of so many.
+    pub fn new(count: u64, of: u64) -> Self {
+        Self { count, of, interval: wilson(count, of) }
+    }
+
+    /// How many of these are so.
+    pub fn of(list: impl IntoIterator<Item = bool>) -> Self {
+        let (mut count, mut of) = (0, 0);
+        for is in list {
+            of += 1;
+            count += u64::from(is);
+        }
+        Self::new(count, of)
+    }
+
+    /// The share; `None` of nothing.
+    pub fn share(&self) -> Option<f64> {
+        (self.of > 0).then(|| self.count as f64 / self.of as f64)
+    }
+
+    /// As people read it.
+    pub fn describe(&self) -> String {
+        let Some(share) = self.share() else { return "–".to_owned() };
+        let [low, high] = self.interval.map(|end| 100.0 * end);
+        format!("{:.1} % ({} of {}; {low:.1} to {high:.1})", 100.0 * share, self.count, self.of)
+    }
+
+    /// The same in few words.
+    pub fn short(&self) -> String {
+        if self.of == 0 { "–".to_owned() } else { format!("{} of {}", self.count, self.of) }
+    }
+}
+
+/// The middle of these numbers, or half-way between the two in the middle; `None` of nothing.
+pub(super) fn median(mut numbers: Vec<f64>) -> Option<f64> {
+    numbers.sort_by(f64::total_cmp);
+    let high = *numbers.get(numbers.len() / 2)?;
+    let low = *numbers.get((numbers.len() - 1) / 2)?;
+    Some((low + high) / 2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_have_their_intervals() {
+        let share = Share::of([true, false, true, true, true, true, true, true, false, true]);
+        assert_eq!((share.count, share.of, share.share()), (8, 10, Some(0.8)));
+        assert_eq!(share.describe(), "80.0 % (8 of 10; 49.0 to 94.3)");
+        let nothing = Share::of([]);
+        assert_eq!((nothing.share(), nothing.describe().as_str(), nothing.short().as_str()), (None, "–", "–"));
+    }
+
+    #[test]
+    fn the_median_lies_in_the_middle() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!((median(vec![7.0]), median(Vec::new())), (Some(7.0), None));
+    }
+}

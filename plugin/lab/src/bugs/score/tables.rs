@@ -1,0 +1,97 @@
+//! Tables of a score, for the console and for Markdown.
+
+use super::{
+    numbers::Share,
+    table::{FEW_FALSE, ScoreTable},
+    tester_row::TesterRow,
+};
+use crate::report::{PlainTable, readable};
+
+impl ScoreTable {
+    /// What it comes to, in a few lines.
+    pub fn headlines(&self) -> Vec<String> {
+        let mix = |row: &TesterRow| {
+            let names = if row.testers.is_empty() { "nobody".to_owned() } else { row.testers.join(" + ") };
+            let first =
+                row.first_seconds.map_or_else(String::new, |s| format!("; median to the first {} s", readable(s)));
+            format!(
+                "{names}: recall {}, something found on {} sound levels, {} called unsolvable; {} defects per hour{first}",
+                row.recall.describe(),
+                row.false_findings.short(),
+                row.called_unsolvable,
+                row.found_per_hour.map_or_else(|| "–".to_owned(), readable)
+            )
+        };
+        let mut lines = vec![
+            format!("{} mutants in {} classes, {} sound levels", self.mutants, self.classes.len(), self.sound),
+            format!("Best mix: {}", mix(&self.best)),
+        ];
+        if self.careful.testers != self.best.testers {
+            let most = 100.0 * FEW_FALSE;
+            lines.push(format!(
+                "Best mix with false findings on at most {most} % of sound levels: {}",
+                mix(&self.careful)
+            ));
+        }
+        lines.push(format!("All testers: {}", mix(&self.all)));
+        lines.push(format!(
+            "Found by testers with learned skills alone: {} of all defects, {} of those that are found",
+            self.only_skills.describe(),
+            self.only_skills_of_found.describe()
+        ));
+        lines
+    }
+
+    /// Each class.
+    pub fn class_table(&self) -> PlainTable {
+        let names = self.testers.iter().map(|tester| tester.testers.join(" + "));
+        let last = ["best mix", "precision", "careful mix", "beside a sound build", "skills alone"];
+        let columns = ["class", "mutants"].map(str::to_owned).into_iter().chain(names).chain(last.map(str::to_owned));
+        let rows = self.classes.iter().map(|class| {
+            let all = class.testers.iter();
+            let last = [&class.best, &class.precision, &class.careful, &class.beside, &class.only_skills];
+            let first = [class.class.clone(), class.best.of.to_string()];
+            first.into_iter().chain(all.chain(last).map(Share::short)).collect()
+        });
+        PlainTable { caption: "defects found, by class".to_owned(), columns: columns.collect(), rows: rows.collect() }
+    }
+
+    /// Each tester and the mixes.
+    pub fn tester_table(&self) -> PlainTable {
+        let columns = [
+            "tester",
+            "recall",
+            "beside a sound build",
+            "precision",
+            "false findings",
+            "called unsolvable",
+            "defects per hour",
+            "seconds to the first",
+            "minimised ticks",
+            "of the original",
+        ];
+        let number = |number: Option<f64>| number.map_or_else(|| "–".to_owned(), readable);
+        let row = |name: String, row: &TesterRow| {
+            vec![
+                name,
+                row.recall.describe(),
+                row.beside.short(),
+                row.precision.describe(),
+                row.false_findings.describe(),
+                row.called_unsolvable.to_string(),
+                number(row.found_per_hour),
+                number(row.first_seconds),
+                number(row.minimised),
+                row.minimised_share.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
+            ]
+        };
+        let testers = self.testers.iter().map(|tester| row(tester.testers.join(" + "), tester));
+        let mixes = [("best mix", &self.best), ("careful mix", &self.careful), ("all testers", &self.all)];
+        let mixes = mixes.into_iter().map(|(name, mix)| row(name.to_owned(), mix));
+        PlainTable {
+            caption: "testers".to_owned(),
+            columns: columns.map(str::to_owned).to_vec(),
+            rows: testers.chain(mixes).collect(),
+        }
+    }
+}

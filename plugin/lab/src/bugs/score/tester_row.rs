@@ -1,0 +1,90 @@
+//! How good a tester is, or several together.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use super::{
+    mix::Catch,
+    numbers::{Share, median},
+    rows::Rows,
+};
+
+/// What a tester finds, and what it costs; or several testers together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TesterRow {
+    /// Names of the testers.
+    pub testers: Vec<String>,
+    /// The games that they test.
+    pub games: Vec<String>,
+    /// Whether all of them act with learned skills.
+    pub skilled: bool,
+    /// Mutants that are found, of those that they test; for several, of all mutants.
+    pub recall: Share,
+    /// The same beside a sound build.
+    pub beside: Share,
+    /// Of all that they find in mutants and sound levels: how much is no false finding.
+    pub precision: Share,
+    /// Sound levels on which something is found.
+    pub false_findings: Share,
+    /// Sound levels that are called unsolvable.
+    pub called_unsolvable: u64,
+    /// Seconds that they took for the mutants.
+    pub seconds: f64,
+    /// Distinct defects that are found in an hour of that.
+    pub found_per_hour: Option<f64>,
+    /// Median of the seconds until a defect is found first, of those that are found.
+    pub first_seconds: Option<f64>,
+    /// Median length of the minimised replays, in ticks.
+    pub minimised: Option<f64>,
+    /// Median of their share of the original length.
+    pub minimised_share: Option<f64>,
+    /// How many there are.
+    pub replays: u64,
+}
+
+/// Seconds of an hour.
+const HOUR: f64 = 3600.0;
+
+/// The row of these testers, by their places. A defect is first found by the fastest of them.
+pub(super) fn tester_row(rows: &Rows, testers: &[usize]) -> TesterRow {
+    let catch = Catch::of(&rows.catches, testers);
+    // What a single tester does not test says nothing of it.
+    let is_tested = |mutant: &usize| match testers {
+        [tester] => rows.played[*tester].contains_key(mutant),
+        _ => true,
+    };
+    let mutants: Vec<usize> = (0..rows.mutants.len()).filter(is_tested).collect();
+    let is_tested = |level: &usize| testers.iter().any(|&tester| rows.played_sound[tester].contains_key(level));
+    let sound: Vec<usize> = (0..rows.sound.len()).filter(is_tested).collect();
+    let found: Vec<usize> = mutants.iter().copied().filter(|&mutant| catch.found[mutant]).collect();
+    let jobs = |mutant: usize| testers.iter().filter_map(move |&tester| rows.played[tester].get(&mutant));
+    let wrong = Share::of(sound.iter().map(|&level| catch.false_findings[level]));
+    let seconds: f64 = mutants.iter().flat_map(|&mutant| jobs(mutant)).map(|job| job.result.seconds).sum();
+    let first = |&mutant: &usize| jobs(mutant).filter_map(|job| job.first).min_by(f64::total_cmp);
+    let shortest = |&mutant: &usize| {
+        let lengths = jobs(mutant).filter_map(|job| Some((job.result.minimised?, job.result.original?)));
+        lengths.min().map(|(minimised, original)| (f64::from(minimised), f64::from(original)))
+    };
+    let replays: Vec<(f64, f64)> = found.iter().filter_map(shortest).collect();
+    let shares = replays.iter().filter(|(_, original)| *original > 0.0).map(|(short, long)| short / long);
+    let own = || testers.iter().map(move |&tester| &rows.testers[tester]);
+    let games: BTreeSet<&String> = own().flat_map(|tester| &tester.games).collect();
+    let count = found.len() as u64;
+    TesterRow {
+        testers: own().map(|tester| tester.name.clone()).collect(),
+        games: games.into_iter().cloned().collect(),
+        skilled: !testers.is_empty() && own().all(|tester| tester.skilled),
+        recall: Share::new(count, mutants.len() as u64),
+        beside: Share::of(mutants.iter().map(|&mutant| testers.iter().any(|&tester| rows.beside(tester, mutant)))),
+        precision: Share::new(count, count + wrong.count),
+        false_findings: wrong,
+        called_unsolvable: sound.iter().filter(|&&level| catch.unsolvable[level]).count() as u64,
+        seconds,
+        found_per_hour: (seconds > 0.0).then(|| count as f64 * HOUR / seconds),
+        first_seconds: median(found.iter().filter_map(first).collect()),
+        minimised: median(replays.iter().map(|(short, _)| *short).collect()),
+        minimised_share: median(shares.collect()),
+        replays: replays.len() as u64,
+    }
+}

@@ -1,0 +1,257 @@
+//! Sets of planted defects, in memory and as files.
+//!
+//! ```text
+//! DIR/mutants.json     what is planted where, and the sound levels beside it
+//! DIR/levels/ID.json   the levels that a defect was planted into
+//! ```
+
+use std::{
+    collections::BTreeSet,
+    fs, io,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use bevy_playbot::level_files::LevelFile;
+use playbot_learner::{write_atomically, write_atomically_with};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    error::{BugError, io_error},
+    kinds::defect_kinds,
+    set_text::{BugText, FORMAT, SetText, level_path},
+};
+use crate::{
+    defect::Plant,
+    game::Game,
+    level_files::{LevelDesigns, level_files_mode},
+    split::LevelSplit,
+};
+
+/// Name of the file.
+const MUTANTS: &str = "mutants.json";
+/// Folder of the levels.
+const LEVELS: &str = "levels";
+
+/// Planted defects, and sound levels beside them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BugSet {
+    /// Seed from which they were made.
+    pub seed: u64,
+    /// The games, each once.
+    pub games: Vec<BugGame>,
+    /// The defects, by game and class.
+    pub mutants: Vec<PlantedBug>,
+    /// Levels into which nothing is planted.
+    pub sound: Vec<SoundLevels>,
+}
+
+/// A game with planted defects.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BugGame {
+    /// Its name.
+    pub name: String,
+    /// Version of its rules.
+    pub version: u32,
+}
+
+/// A game or a level with one planted defect.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "BugText", into = "BugText")]
+pub struct PlantedBug {
+    /// Its name in the set: game, class and number.
+    pub id: String,
+    /// Name of the game.
+    pub game: String,
+    /// Class of the defect.
+    pub class: String,
+    /// What is wrong, in one line.
+    pub about: String,
+    /// Mode of the sound level.
+    pub mode: String,
+    /// Number of the sound level.
+    pub level: u64,
+    /// Where the defect is.
+    pub planted: PlantedPart,
+}
+
+/// Where a defect is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PlantedPart {
+    /// In a level, which is this file of the set's folder.
+    Level(LevelFile),
+    /// In the rules, which are played on the sound level.
+    Rules {
+        /// Which variant of the defect.
+        variant: u32,
+    },
+}
+
+/// Sound levels of a game.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SoundLevels {
+    /// Name of the game.
+    pub game: String,
+    /// The levels.
+    pub range: LevelSplit,
+}
+
+impl PlantedBug {
+    /// The sound level, as `MODE:N`.
+    pub fn base(&self) -> String {
+        format!("{}:{}", self.mode, self.level)
+    }
+
+    /// What is played to find it: mode and number of the level. `folder` is the set's.
+    pub fn played(&self, folder: &Path) -> (String, u64) {
+        match &self.planted {
+            PlantedPart::Level(file) => (level_files_mode(&folder.join(&file.path).to_string_lossy()), 0),
+            PlantedPart::Rules { .. } => (self.mode.clone(), self.level),
+        }
+    }
+}
+
+impl BugSet {
+    /// Whether a folder has a set already.
+    pub fn is_in(folder: &Path) -> bool {
+        folder.join(MUTANTS).exists()
+    }
+
+    /// Reads the set of a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`BugError::Missing`], [`BugError::Damaged`], or the file cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, BugError> {
+        let path = folder.join(MUTANTS);
+        let text = fs::read_to_string(&path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => BugError::Missing(folder.to_owned()),
+            io::ErrorKind::InvalidData => damaged(&path, 1, "it is no text"),
+            _ => io_error("read", &path)(error),
+        })?;
+        let set: SetText = serde_json::from_str(&text).map_err(|error| damaged(&path, error.line(), error))?;
+        if set.format != FORMAT {
+            let what = format!("it is of format {}, and this program reads format {FORMAT}", set.format);
+            return Err(damaged(&path, 1, what));
+        }
+        let SetText { seed, games, mutants, sound, .. } = set;
+        let set = Self { seed, games, mutants, sound };
+        let contradiction = set.contradiction().map(|(name, what)| (name.to_owned(), what));
+        match contradiction {
+            // The line on which it is named first.
+            Some((name, what)) => {
+                let line = text.lines().position(|line| line.contains(&format!("\"{name}\""))).map_or(1, |at| at + 1);
+                Err(damaged(&path, line, what))
+            }
+            None => Ok(set),
+        }
+    }
+
+    /// What does not go together, with the name that it is about.
+    fn contradiction(&self) -> Option<(&str, String)> {
+        let mut ids = BTreeSet::new();
+        let games: BTreeSet<&str> = self.games.iter().map(|game| game.name.as_str()).collect();
+        if games.len() != self.games.len() {
+            return Some(("games", "a game is named twice".to_owned()));
+        }
+        for bug in &self.mutants {
+            if !ids.insert(&bug.id) {
+                return Some((bug.id.as_str(), format!("two mutants are called `{}`", bug.id)));
+            }
+            if !games.contains(bug.game.as_str()) {
+                return Some((
+                    bug.id.as_str(),
+                    format!("the game `{}` of `{}` is not among `games`", bug.game, bug.id),
+                ));
+            }
+        }
+        let strange = self.sound.iter().find(|sound| !games.contains(sound.game.as_str()))?;
+        Some((strange.game.as_str(), format!("the game `{}` of sound levels is not among `games`", strange.game)))
+    }
+
+    /// Writes the set, with the texts of its levels by the names of their mutants. Levels that were there before are removed;
+    /// the file that names them is written last.
+    ///
+    /// # Errors
+    ///
+    /// [`BugError::Exists`] unless `replace`; or the system refuses.
+    pub fn write(&self, folder: &Path, levels: &[(String, String)], replace: bool) -> Result<(), BugError> {
+        if !replace && Self::is_in(folder) {
+            return Err(BugError::Exists(folder.to_owned()));
+        }
+        let (path, level_folder) = (folder.join(MUTANTS), folder.join(LEVELS));
+        gone(fs::remove_file(&path)).map_err(io_error("remove", &path))?;
+        if replace {
+            gone(fs::remove_dir_all(&level_folder)).map_err(io_error("remove", &level_folder))?;
+        }
+        fs::create_dir_all(&level_folder).map_err(io_error("create", &level_folder))?;
+        for (id, text) in levels {
+            let file = folder.join(level_path(id));
+            write_atomically(&file, format!("{}\n", text.trim_end()).as_bytes()).map_err(io_error("write", &file))?;
+        }
+        let Self { seed, games, mutants, sound } = self.clone();
+        let text = SetText { format: FORMAT, seed, games, mutants, sound };
+        write_atomically_with(&path, |file| {
+            serde_json::to_writer_pretty(&mut *file, &text)?;
+            writeln!(file)
+        })
+        .map_err(io_error("write", &path))
+    }
+
+    /// Checks that the mutants of a game can be planted: the game has the version that the set was made for and these
+    /// kinds of defects, and levels are those that were written. Sets for other games pass.
+    ///
+    /// # Errors
+    ///
+    /// [`BugError::Version`], [`BugError::Damaged`], or a level cannot be read.
+    pub fn check(&self, folder: &Path, game: &dyn Game) -> Result<(), BugError> {
+        let path = folder.join(MUTANTS);
+        let Some(known) = self.games.iter().find(|known| known.name == game.name()) else { return Ok(()) };
+        if known.version != game.version() {
+            let (made, is) = (known.version, game.version());
+            return Err(BugError::Version { path, game: known.name.clone(), made, is });
+        }
+        let kinds = defect_kinds(game);
+        for bug in self.mutants.iter().filter(|bug| bug.game == known.name) {
+            let kind = kinds.iter().find(|kind| kind.class == bug.class);
+            let fits = kind.is_some_and(|kind| match (&kind.plant, &bug.planted) {
+                (Plant::Level(_), PlantedPart::Level(_)) => true,
+                (Plant::Rules { variants, .. }, PlantedPart::Rules { variant }) => variant < variants,
+                _ => false,
+            });
+            if !fits {
+                let what = format!("this program's `{}` has no defect `{}` like `{}`", known.name, bug.class, bug.id);
+                return Err(damaged(&path, 1, what));
+            }
+            if let PlantedPart::Level(file) = &bug.planted {
+                let level = folder.join(&file.path);
+                let designs = LevelDesigns::of_file(&level.to_string_lossy(), &|text| game.parse_level(text))?;
+                if designs.hash(0) != Some(file.hash) {
+                    let what = format!("it is not the level that was planted as `{}`: it was changed since", bug.id);
+                    return Err(damaged(&level, 1, what));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn damaged(path: &Path, line: usize, what: impl ToString) -> BugError {
+    let what = what.to_string();
+    // serde has it at the end of its words, too.
+    let words = what.find(" at line ").map_or(what.as_str(), |at| &what[..at]).to_owned();
+    BugError::Damaged { path: PathBuf::from(path), line: line.max(1), what: words }
+}
+
+/// What was not there has been removed.
+fn gone(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed,
+    }
+}
+
+#[cfg(test)]
+mod tests;

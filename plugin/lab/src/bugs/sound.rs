@@ -1,0 +1,148 @@
+//! Levels that are sound: those that defects are planted into, and those beside them.
+
+use bevy_playbot::{episode::EpisodeEnd, vision::ObservationConfig};
+
+use super::{error::BugError, make::Source, set::SoundLevels};
+use crate::{
+    eval::{EpisodeResult, EvalPlan, Player, evaluate},
+    held_out::HeldOut,
+    split::LevelSplit,
+};
+
+/// Most levels that are played at a time, and most arenas in which they are: numbers of their own, so that the number of
+/// threads changes nothing.
+const CHUNK: u64 = 128;
+const ARENAS: u32 = 32;
+const WORLDS: u32 = 8;
+/// Times as many levels as are needed are looked at before it is said that there are too few.
+const MOST_TRIES: u64 = 8;
+
+/// What a good end is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum GoodEnd {
+    /// The level is solved.
+    Won,
+    /// Time was up, in a game that nobody wins.
+    Lasted,
+    /// Any, in a game that always ends by losing.
+    Any,
+}
+
+impl GoodEnd {
+    /// The best one that some episode had.
+    fn of(results: &[EpisodeResult]) -> Self {
+        if results.iter().any(|result| result.success) {
+            Self::Won
+        } else if results.iter().any(|result| result.end == EpisodeEnd::Truncated) {
+            Self::Lasted
+        } else {
+            Self::Any
+        }
+    }
+
+    fn is(self, result: &EpisodeResult) -> bool {
+        match self {
+            Self::Won => result.success,
+            Self::Lasted => result.end == EpisodeEnd::Truncated,
+            Self::Any => true,
+        }
+    }
+}
+
+/// So many levels from this number on, in their order, none of which was trained on, and each of which the game's
+/// demonstrator plays to a good end, if there is one.
+pub(super) fn sound_levels(
+    source: &Source,
+    start: u64,
+    wanted: u64,
+    threads: usize,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<Vec<u64>, BugError> {
+    let game = source.game;
+    let trained = source.trained.as_ref().map(|trained| HeldOut::new(game, trained));
+    let is_new = |level: &u64| trained.as_ref().is_none_or(|trained| !trained.contains(&source.levels.mode, *level));
+    let (mut found, mut good_end) = (Vec::new(), None);
+    let (mut next, mut tried) = (start, 0);
+    while (found.len() as u64) < wanted && next <= source.levels.last && tried < MOST_TRIES * wanted.max(CHUNK) {
+        let missing = wanted - found.len() as u64;
+        let count = (missing + missing / 4 + 4).min(CHUNK).min(source.levels.last - next + 1);
+        let chunk = LevelSplit { mode: source.levels.mode.clone(), first: next, last: next + count - 1 };
+        let good: Vec<u64> = match game.demonstrator() {
+            None => chunk.levels().filter(is_new).collect(),
+            Some(_) => {
+                let results = play(source, &chunk, threads)?;
+                let end = *good_end.get_or_insert_with(|| GoodEnd::of(&results));
+                results.iter().filter(|result| end.is(result)).map(|result| result.level).filter(is_new).collect()
+            }
+        };
+        let before = found.len();
+        found.extend(good);
+        found.truncate(usize::try_from(wanted).unwrap_or(usize::MAX));
+        progress((found.len() - before) as u64);
+        next += count;
+        tried += count;
+    }
+    if found.is_empty() {
+        let bot = game.demonstrator().unwrap_or("none").to_owned();
+        return Err(BugError::NoBase { game: game.name().to_owned(), levels: source.levels.to_string(), bot });
+    }
+    if (found.len() as u64) < wanted {
+        let (levels, count) = (source.levels.to_string(), found.len() as u64);
+        return Err(BugError::TooFewLevels { game: game.name().to_owned(), levels, count, wanted });
+    }
+    Ok(found)
+}
+
+fn play(source: &Source, chunk: &LevelSplit, threads: usize) -> Result<Vec<EpisodeResult>, BugError> {
+    let arenas = ARENAS.min(u32::try_from(chunk.len()).unwrap_or(ARENAS));
+    let plan = EvalPlan {
+        split: chunk.clone(),
+        observation_config: ObservationConfig::default(),
+        episodes_per_level: 1,
+        seed: 0,
+        arenas,
+        worlds: WORLDS.min(arenas),
+        threads,
+    };
+    Ok(evaluate(source.game, &Player::Demonstrator, &plan, |_| {})?)
+}
+
+/// Numbers in their order, as ranges without gaps.
+pub(super) fn ranges(game: &str, mode: &str, numbers: &[u64]) -> Vec<SoundLevels> {
+    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
+    let range = |run: &[u64]| {
+        let (first, last) = (*run.first()?, *run.last()?);
+        Some(SoundLevels { game: game.to_owned(), range: LevelSplit { mode: mode.to_owned(), first, last } })
+    };
+    runs.filter_map(range).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_become_ranges_without_gaps() {
+        let ranges: Vec<_> =
+            ranges("a", "hard", &[3, 4, 5, 7, 9, 10]).iter().map(|sound| sound.range.to_string()).collect();
+        assert_eq!(ranges, ["hard:3..5", "hard:7..7", "hard:9..10"]);
+        assert!(super::ranges("a", "hard", &[]).is_empty());
+    }
+
+    #[test]
+    fn a_good_end_is_the_best_that_there_is() {
+        let result = |end: EpisodeEnd| EpisodeResult {
+            level: 0,
+            end,
+            success: end.is_success(),
+            ticks: 9,
+            clipped: 0,
+            total_reward: 0.0,
+        };
+        let [won, lost, out] = [EpisodeEnd::WON, EpisodeEnd::LOST, EpisodeEnd::Truncated].map(result);
+        assert_eq!(GoodEnd::of(&[won, lost, out]), GoodEnd::Won);
+        assert_eq!(GoodEnd::of(&[lost, out]), GoodEnd::Lasted);
+        assert_eq!(GoodEnd::of(&[lost]), GoodEnd::Any);
+        assert!(GoodEnd::Lasted.is(&out) && !GoodEnd::Lasted.is(&lost) && GoodEnd::Any.is(&lost));
+    }
+}

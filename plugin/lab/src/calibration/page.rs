@@ -1,0 +1,88 @@
+//! Results beside recordings, as a page with charts and as Markdown.
+
+use super::{agreement::Measure, read::Calibration};
+use crate::report::{Chart, Curve, PlainTable, Report, Section};
+
+/// Most levels in the tables of a page.
+const MOST_LEVELS: usize = 2000;
+
+impl Calibration {
+    /// A page that opens from disk without network: what agrees, scatter plots, and every level.
+    pub fn to_html(&self) -> String {
+        let section = |heading: &str| Section { heading: heading.to_owned(), ..Section::default() };
+        let agreement = Section {
+            text: [self.words(), vec![self.method().to_owned()]].concat().join("\n\n"),
+            tables: vec![self.agreement_table().into()],
+            ..section("Agreement")
+        };
+        let plots = Section {
+            text: "Each dot is a level.".to_owned(),
+            charts: Measure::ALL.into_iter().filter_map(|measure| self.scatter(measure)).collect(),
+            ..section("People and testers")
+        };
+        let levels = Section { tables: vec![self.level_table(MOST_LEVELS).into()], ..section("Levels") };
+        let report = Report {
+            title: format!("Bots beside people: {}", self.game),
+            subtitle: format!("{}, version {} of the game", self.range, self.game_version),
+            sections: vec![agreement, plots, levels],
+        };
+        report.to_html()
+    }
+
+    /// The same without charts, for a pull request.
+    pub fn to_markdown(&self) -> String {
+        let mut parts = vec![format!("# Bots beside people: {} {}", cell(&self.game), cell(&self.range.to_string()))];
+        parts.extend(self.words().iter().map(|words| cell(words)));
+        parts.push(markdown(&self.agreement_table()));
+        parts.push(self.method().to_owned());
+        parts.push("## Levels".to_owned());
+        parts.push(markdown(&self.level_table(MOST_LEVELS)));
+        parts.join("\n\n") + "\n"
+    }
+
+    /// A dot for each level, the number of people to the right and that of a tester up; `None` if no level has both.
+    pub fn scatter(&self, measure: Measure) -> Option<Chart> {
+        let curve =
+            |(tester, name): (usize, &String)| Curve::scatter(name.as_str(), measure.pairs(&self.levels, tester));
+        let curves: Vec<Curve> = self.testers.iter().enumerate().map(curve).collect();
+        if curves.iter().all(|curve| curve.points.is_empty()) {
+            return None;
+        }
+        let (title, y_range) = match measure {
+            Measure::Completion => ("Share of tries that were completed", Some((0.0, 1.0))),
+            Measure::Time => ("Ticks of completed tries", None),
+            Measure::Deaths => ("Deaths in a try", Some((0.0, 1.0))),
+        };
+        Some(Chart {
+            title: title.to_owned(),
+            x_label: "people".to_owned(),
+            y_label: "testers".to_owned(),
+            curves,
+            y_range,
+            marks: Vec::new(),
+        })
+    }
+}
+
+fn markdown(table: &PlainTable) -> String {
+    let row = |cells: &[String]| {
+        let cells: Vec<String> = cells.iter().map(|text| cell(text)).collect();
+        format!("| {} |", cells.join(" | "))
+    };
+    let ruler = format!("|{}", "---|".repeat(table.columns.len()));
+    let rows = table.rows.iter().map(|cells| row(cells));
+    [row(&table.columns), ruler].into_iter().chain(rows).collect::<Vec<_>>().join("\n")
+}
+
+/// Text that neither ends a cell of a table nor begins anything in Markdown.
+fn cell(text: &str) -> String {
+    let mut out = String::new();
+    for letter in text.chars() {
+        match letter {
+            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
+            letter if letter.is_control() => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out
+}

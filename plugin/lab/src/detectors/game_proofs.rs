@@ -1,0 +1,24 @@
+//! Proofs of a game, for detectors.
+
+use bevy::prelude::*;
+
+use crate::{detector::Proofs, game::Game, proof::LevelProof};
+
+/// What a game can prove of the episode that an agent plays in a World.
+pub(crate) struct GameProofs<'a> {
+    pub game: &'a dyn Game,
+    pub mode: &'a str,
+    pub level: u64,
+    pub world: &'a World,
+    pub agent: Entity,
+}
+
+impl Proofs for GameProofs<'_> {
+    fn of_level(&self) -> LevelProof {
+        self.game.prove(self.mode, self.level)
+    }
+
+    fn of_state(&self) -> LevelProof {
+        self.game.prove_from(self.world, self.agent)
+    }
+}

@@ -1,0 +1,54 @@
+//! How long findings are, before and after what they do not need was left out.
+
+use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
+
+use super::{
+    checks::Checks,
+    head::FindingHead,
+    minimise::{Budget, minimise},
+    play::play_player,
+    solo::Setting,
+    stored::StoredFinding,
+};
+use crate::{eval::Player, game::Game};
+
+/// Lengths of a finding, in ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Lengths {
+    /// As it was found.
+    pub original: u32,
+    /// With nothing in it that could be left out.
+    pub minimised: u32,
+}
+
+/// Makes the finding of this head in these actions shorter. `None` if it is not there again, if nobody has to play for it, or
+/// if there is no check for it.
+pub(crate) fn lengths(
+    game: &dyn Game,
+    (mode, level): (&str, u64),
+    head: FindingHead,
+    actions: &[ActionValue],
+    checks: &Checks,
+    budget: Budget,
+    stop: &dyn Fn() -> bool,
+) -> Option<Lengths> {
+    if !checks.of(&head.detector)?.needs_play() {
+        return None;
+    }
+    let found = StoredFinding::of_actions(game, mode, level, head, actions, checks)?;
+    let shorter = minimise(game, &found, checks, budget, &|_| {}, stop).ok()?;
+    let minimised = u32::try_from(shorter.finding.episode.len()).unwrap_or(u32::MAX);
+    Some(Lengths { original: found.head.original_ticks, minimised })
+}
+
+/// What a player does in the episode with this seed; `None` if what it sees cannot be drawn.
+pub(crate) fn actions_of(
+    game: &dyn Game,
+    (mode, level): (&str, u64),
+    seed: u64,
+    player: &Player,
+    observation_config: &ObservationConfig,
+) -> Option<Vec<ActionValue>> {
+    let setting = Setting { game, mode, level, seed };
+    play_player(setting, player, observation_config).ok().map(|(actions, _)| actions)
+}

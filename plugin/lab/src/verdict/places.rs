@@ -1,0 +1,47 @@
+//! How much of a level was visited.
+
+use serde::{Deserialize, Serialize};
+
+/// Squares that were visited, among all that no wall cuts off from the start: see [`open_cells`](crate::explore::open_cells).
+/// Where gravity has a say, nobody may be able to reach some of these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Places {
+    /// Open squares that were visited.
+    pub visited: u64,
+    /// All open squares.
+    pub open: u64,
+}
+
+impl Places {
+    /// The share that was visited, in percent; `None` if there is nothing to visit.
+    pub fn percent(self) -> Option<f64> {
+        (self.open > 0).then(|| 100.0 * self.visited as f64 / self.open as f64)
+    }
+
+    /// The share for people.
+    pub fn describe(self) -> String {
+        self.percent().map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"))
+    }
+
+    /// Adds those of another level.
+    pub(super) fn add(&mut self, other: Option<Self>) {
+        let other = other.unwrap_or_default();
+        self.visited += other.visited;
+        self.open += other.open;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_of_all_levels_together() {
+        let mut places = Places::default();
+        assert_eq!((places.percent(), places.describe().as_str()), (None, "–"));
+        places.add(Some(Places { visited: 1, open: 10 }));
+        places.add(None);
+        places.add(Some(Places { visited: 9, open: 30 }));
+        assert_eq!((places.percent(), places.describe().as_str()), (Some(25.0), "25.0 %"));
+    }
+}

@@ -1,0 +1,216 @@
+//! Where an agent was in an episode, counted tick by tick.
+
+use bevy::prelude::*;
+use bevy_playbot::{episode::Episode, skill_prior::ActiveSkill};
+
+use super::{
+    skill_name::{skill_count, skill_number},
+    squares::LevelSquares,
+};
+use crate::game::Game;
+
+/// Seconds without a square that is new in the episode, after which time counts as lost.
+const PATIENCE: f64 = 2.0;
+/// Most squares of a way that are kept: the last ones.
+const MOST_STEPS: usize = 200;
+
+/// Where an agent was.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Walk {
+    /// The squares of the level.
+    pub squares: LevelSquares,
+    /// Those in which it was, in their order.
+    pub counts: Vec<SquareCount>,
+    /// The end of its way: squares one after the other, and for how many ticks it stayed in each.
+    pub trail: Vec<[u64; 2]>,
+}
+
+/// What happened in a square.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SquareCount {
+    pub square: usize,
+    /// Ticks.
+    pub ticks: u32,
+    /// Ticks that were lost.
+    pub lost: u32,
+    /// Ticks under each skill that was active there.
+    pub skills: Vec<(usize, u32)>,
+}
+
+/// Counts for one agent, episode after episode, in memory that is used again.
+pub(super) struct WalkCounter {
+    agent: Entity,
+    /// Ticks after which time is lost.
+    patience: u32,
+    /// The level that is played, and its squares.
+    level: Option<(u64, Option<LevelSquares>)>,
+    /// For each square.
+    ticks: Vec<u32>,
+    lost: Vec<u32>,
+    /// For each square and each name that a skill can have.
+    skills: Vec<u32>,
+    names: usize,
+    /// Squares that were visited in this episode.
+    visited: Vec<usize>,
+    /// Ticks since the last of these was new.
+    since_new: u32,
+    trail: Vec<[u64; 2]>,
+}
+
+impl WalkCounter {
+    /// For an agent of a game with so many ticks per second.
+    pub fn new(agent: Entity, tick_hz: f64) -> Self {
+        Self {
+            agent,
+            patience: (PATIENCE * tick_hz).ceil() as u32,
+            level: None,
+            ticks: Vec::new(),
+            lost: Vec::new(),
+            skills: Vec::new(),
+            names: 0,
+            visited: Vec::new(),
+            since_new: 0,
+            trail: Vec::new(),
+        }
+    }
+
+    /// Counts the tick that was just played; `has_ended` if it was the last one of an episode.
+    pub fn tick(&mut self, game: &dyn Game, mode: &str, world: &World, has_ended: bool) {
+        let Some(episode) = world.get::<Episode>(self.agent) else { return };
+        if episode.tick == 0 || !(episode.is_running() || has_ended) {
+            return;
+        }
+        if self.level.is_none_or(|(level, _)| level != episode.level) {
+            let squares = game.floor_plan(mode, episode.level).and_then(|plan| LevelSquares::of(&plan));
+            self.level = Some((episode.level, squares));
+        }
+        let Some((_, Some(squares))) = self.level else { return };
+        let Some(square) = game.whereabouts(world, self.agent).and_then(|place| squares.at(place)) else { return };
+        let skill = world.get::<ActiveSkill>(self.agent);
+        self.count(squares.count(), square, skill.map_or(&[][..], |skill| skill.z.as_slice()));
+    }
+
+    /// Counts a tick in a square, one of so many, under a skill, which may be empty.
+    fn count(&mut self, squares: usize, square: usize, z: &[f32]) {
+        if self.visited.is_empty() {
+            self.names = skill_count(z);
+            self.since_new = 0;
+            grow(&mut self.ticks, squares);
+            grow(&mut self.lost, squares);
+            grow(&mut self.skills, squares * self.names);
+        }
+        if self.ticks[square] == 0 {
+            self.visited.push(square);
+            self.since_new = 0;
+        } else {
+            self.since_new = self.since_new.saturating_add(1);
+        }
+        self.ticks[square] += 1;
+        if self.since_new > self.patience {
+            self.lost[square] += 1;
+        }
+        if let Some(skill) = skill_number(z).filter(|skill| *skill < self.names) {
+            self.skills[square * self.names + skill] += 1;
+        }
+        match self.trail.last_mut() {
+            Some([last, ticks]) if *last == square as u64 => *ticks += 1,
+            _ => {
+                if self.trail.len() >= 2 * MOST_STEPS {
+                    self.trail.drain(..MOST_STEPS);
+                }
+                self.trail.push([square as u64, 1]);
+            }
+        }
+    }
+
+    /// What was counted in the episode, which is over; `None` if the game does not say where its agents are. From here on the
+    /// next one is counted.
+    pub fn take(&mut self) -> Option<Walk> {
+        let (_, squares) = self.level?;
+        let squares = squares?;
+        self.visited.sort_unstable();
+        let mut counts = Vec::with_capacity(self.visited.len());
+        for square in self.visited.drain(..) {
+            let mut skills = Vec::new();
+            let own = square * self.names..(square + 1) * self.names;
+            for (skill, ticks) in self.skills[own].iter_mut().enumerate().filter(|(_, ticks)| **ticks > 0) {
+                skills.push((skill, std::mem::take(ticks)));
+            }
+            let (ticks, lost) = (std::mem::take(&mut self.ticks[square]), std::mem::take(&mut self.lost[square]));
+            counts.push(SquareCount { square, ticks, lost, skills });
+        }
+        let mut trail = std::mem::take(&mut self.trail);
+        trail.drain(..trail.len().saturating_sub(MOST_STEPS));
+        (!counts.is_empty()).then_some(Walk { squares, counts, trail })
+    }
+}
+
+/// Makes room for so many counters.
+fn grow(counters: &mut Vec<u32>, wanted: usize) {
+    if counters.len() < wanted {
+        counters.resize(wanted, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::Rect;
+
+    use super::*;
+    use crate::floor_plan::FloorPlan;
+
+    /// A counter for ten squares in a row whose patience is four ticks.
+    fn counter() -> WalkCounter {
+        let plan = FloorPlan { bounds: Rect::new(0.0, 0.0, 16.0, 1.0), ..FloorPlan::default() };
+        let squares = LevelSquares::of(&plan).expect("it has an extent");
+        WalkCounter { level: Some((7, Some(squares))), ..WalkCounter::new(Entity::PLACEHOLDER, 2.0) }
+    }
+
+    fn walked(counter: &mut WalkCounter, squares: &[usize], z: &[f32]) -> Walk {
+        squares.iter().for_each(|square| counter.count(16, *square, z));
+        counter.take().expect("it went somewhere")
+    }
+
+    fn lost(walk: &Walk) -> Vec<(usize, u32, u32)> {
+        walk.counts.iter().map(|count| (count.square, count.ticks, count.lost)).collect()
+    }
+
+    #[test]
+    fn time_is_lost_two_seconds_after_the_last_new_square() {
+        let mut counter = counter();
+        // Rests: of the six ticks after the first one in square 3, the last two are lost.
+        let resting = walked(&mut counter, &[2, 3, 3, 3, 3, 3, 3, 3, 4], &[]);
+        assert_eq!(lost(&resting), [(2, 1, 0), (3, 7, 2), (4, 1, 0)]);
+        // Goes back and forth.
+        let turning = walked(&mut counter, &[0, 1, 0, 1, 0, 1, 0, 1], &[]);
+        assert_eq!(lost(&turning), [(0, 4, 1), (1, 4, 1)]);
+        assert_eq!(turning.trail.len(), 8);
+        let walking = walked(&mut counter, &[0, 1, 2, 3, 4, 5, 6, 7], &[]);
+        assert!(walking.counts.iter().all(|count| count.lost == 0 && count.ticks == 1), "{walking:?}");
+        assert_eq!(counter.take(), None, "nothing is left of earlier episodes");
+    }
+
+    #[test]
+    fn skills_are_counted_where_they_are_active() {
+        let mut counter = counter();
+        counter.count(16, 5, &[0.1, -2.0]);
+        counter.count(16, 5, &[0.1, -2.0]);
+        counter.count(16, 5, &[1.0, 0.0]);
+        let walk = walked(&mut counter, &[6], &[-1.0, 0.0]);
+        assert_eq!(walk.counts[0].skills, [(0, 1), (3, 2)]);
+        assert_eq!(walk.counts[1].skills, [(1, 1)]);
+        let without = walked(&mut counter, &[5, 6], &[]);
+        assert!(without.counts.iter().all(|count| count.skills.is_empty()), "{without:?}");
+    }
+
+    #[test]
+    fn of_a_long_way_the_end_is_kept() {
+        let mut counter = counter();
+        let squares: Vec<usize> = (0..1_000).map(|tick| tick / 2 % 16).collect();
+        let walk = walked(&mut counter, &squares, &[]);
+        assert_eq!(walk.trail.len(), MOST_STEPS);
+        // The last pair of ticks is number 499.
+        assert_eq!(walk.trail.last(), Some(&[499 % 16, 2]));
+        assert_eq!(walk.counts.iter().map(|count| count.ticks).sum::<u32>(), 1_000);
+    }
+}

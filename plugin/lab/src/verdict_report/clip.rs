@@ -1,0 +1,170 @@
+//! The way of a failure as a picture that moves: an animated PNG of the plan with a dot and its trail.
+
+use bevy::math::{Rect, Vec2};
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
+
+use super::canvas::{Canvas, Colour, PALETTE};
+use crate::{
+    floor_plan::FloorPlan,
+    verdict::{FailureWay, LevelMaps},
+};
+
+/// Largest clip.
+const MOST_BYTES: usize = 30_000;
+/// Pixels of the longer side of a level, if its squares are not smaller than [`SMALLEST`].
+const LENGTH: u64 = 192;
+/// Pixels of a square's side.
+const SMALLEST: u64 = 2;
+const LARGEST: u64 = 8;
+/// Most squares along a side.
+const MOST_SQUARES: u64 = 256;
+/// Longest clip, in milliseconds; what takes longer is shown faster.
+const LONGEST: f64 = 10_000.0;
+/// Shortest and longest time for a square, in milliseconds.
+const PACE: [f64; 2] = [30.0, 800.0];
+
+/// The clip of a level's failure, which plays once; `None` if there is none, or nothing can be drawn. The end of a way that is
+/// too long for a clip is shown.
+pub fn clip(plan: &FloorPlan, maps: &LevelMaps, tick_hz: f64) -> Option<Vec<u8>> {
+    let FailureWay { way, .. } = maps.failure.as_ref()?;
+    let all = maps.columns.checked_mul(maps.rows)?;
+    let is_drawn = maps.columns.max(maps.rows) <= MOST_SQUARES && all > 0 && maps.side > 0.0 && tick_hz > 0.0;
+    if !is_drawn || way.iter().any(|[square, _]| *square >= all) {
+        return None;
+    }
+    let mut way = way.as_slice();
+    while !way.is_empty() {
+        let bytes = Clip::new(plan, maps, tick_hz).encode(way).ok()?;
+        if bytes.len() <= MOST_BYTES {
+            return Some(bytes);
+        }
+        way = &way[way.len() / 2 + 1..];
+    }
+    None
+}
+
+struct Clip {
+    canvas: Canvas,
+    columns: u64,
+    rows: u64,
+    /// Pixels of a square's side.
+    scale: u64,
+    /// Milliseconds of a tick.
+    tick: f64,
+}
+
+impl Clip {
+    fn new(plan: &FloorPlan, maps: &LevelMaps, tick_hz: f64) -> Self {
+        let (columns, rows) = (maps.columns, maps.rows);
+        let scale = (LENGTH / columns.max(rows)).clamp(SMALLEST, LARGEST);
+        let mut canvas = Canvas::new((columns * scale) as usize, (rows * scale) as usize);
+        let (origin, unit) = (Vec2::new(maps.x, maps.y), scale as f32 / maps.side);
+        let height = canvas.height as f32;
+        let on_canvas = |area: &Rect| {
+            let (min, max) = ((area.min - origin) * unit, (area.max - origin) * unit);
+            Rect::from_corners(Vec2::new(min.x, height - max.y), Vec2::new(max.x, height - min.y))
+        };
+        let kinds = [(&plan.walls, Colour::Wall), (&plan.platforms, Colour::Platform), (&plan.hazards, Colour::Hazard)];
+        for (areas, colour) in kinds {
+            areas.iter().for_each(|area| canvas.area(on_canvas(area), colour));
+        }
+        let half = Vec2::splat(maps.side / 2.0);
+        canvas.area(on_canvas(&Rect::from_corners(plan.goal - half, plan.goal + half)), Colour::Goal);
+        Self { canvas, columns, rows, scale, tick: 1000.0 / tick_hz }
+    }
+
+    /// Left, top, right and bottom of a square, in pixels.
+    fn pixels(&self, square: u64) -> [usize; 4] {
+        let (column, row) = (square % self.columns, self.rows - 1 - square / self.columns);
+        [column, row, column + 1, row + 1].map(|edge| (edge * self.scale) as usize)
+    }
+
+    fn encode(&mut self, way: &[[u64; 2]]) -> Result<Vec<u8>, EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes, self.canvas.width as u32, self.canvas.height as u32);
+        encoder.set_color(ColorType::Indexed);
+        encoder.set_depth(BitDepth::Four);
+        encoder.set_palette(PALETTE.as_flattened().to_vec());
+        // The paper is that of the page, light or dark.
+        encoder.set_trns(vec![0]);
+        encoder.set_compression(Compression::Balanced);
+        encoder.set_filter(Filter::NoFilter);
+        encoder.set_animated(way.len() as u32, 1)?;
+        let mut writer = encoder.write_header()?;
+        let total = way.iter().map(|[_, ticks]| *ticks as f64).sum::<f64>() * self.tick;
+        let speed = (total / LONGEST).max(1.0);
+        let mut before: Option<[usize; 4]> = None;
+        for [square, ticks] in way {
+            let now = self.pixels(*square);
+            let mut changed = [0, 0, self.canvas.width, self.canvas.height];
+            if let Some(before) = before {
+                self.canvas.block(before, Colour::Trail);
+                changed = [before[0].min(now[0]), before[1].min(now[1]), before[2].max(now[2]), before[3].max(now[3])];
+            }
+            self.canvas.block(now, Colour::Agent);
+            let [left, top, right, bottom] = changed.map(|edge| edge as u32);
+            let pause = (*ticks as f64 * self.tick / speed).clamp(PACE[0], PACE[1]);
+            writer.set_frame_delay(pause.round() as u16, 1000)?;
+            // At the corner any size fits.
+            writer.set_frame_position(0, 0)?;
+            writer.set_frame_dimension(right - left, bottom - top)?;
+            writer.set_frame_position(left, top)?;
+            writer.write_image_data(&self.canvas.packed(changed))?;
+            before = Some(now);
+        }
+        writer.finish()?;
+        Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+    use crate::verdict_report::testing::garden;
+
+    fn maps(way: Vec<[u64; 2]>) -> LevelMaps {
+        let failure = Some(FailureWay { tester: "random".to_owned(), episode: 0, way });
+        LevelMaps { side: 1.0, columns: 64, rows: 16, failure, ..LevelMaps::default() }
+    }
+
+    #[test]
+    fn a_dot_goes_the_way_and_every_frame_can_be_read() {
+        let way: Vec<[u64; 2]> = (65..85).map(|square| [square, 3]).collect();
+        let bytes = clip(&garden(), &maps(way), 15.0).expect("a way");
+        assert!(bytes.len() < 4_000, "{} bytes", bytes.len());
+        let mut reader = png::Decoder::new(Cursor::new(&bytes)).read_info().expect("a picture");
+        assert_eq!((reader.info().width, reader.info().height), (192, 48));
+        let control = reader.info().animation_control.expect("it moves");
+        assert_eq!((control.num_frames, control.num_plays), (20, 1));
+        let mut buffer = vec![0; 192 * 48];
+        for number in 0..20 {
+            let frame = reader.next_frame(&mut buffer).expect("whole");
+            // From the second on a frame is two squares of 3 pixels.
+            let size = if number == 0 { (192, 48) } else { (6, 3) };
+            assert_eq!((frame.width, frame.height), size, "frame {number}");
+        }
+        // Of the last frame, two pixels to a byte: the trail on the left, the agent on the right.
+        let (trail, agent) = (Colour::Trail as u8, Colour::Agent as u8);
+        assert_eq!(buffer[..3], [(trail << 4) | trail, (trail << 4) | agent, (agent << 4) | agent]);
+        let again: Vec<[u64; 2]> = (65..85).map(|square| [square, 3]).collect();
+        assert_eq!(clip(&garden(), &maps(again), 15.0).as_deref(), Some(bytes.as_slice()), "the same bytes");
+    }
+
+    #[test]
+    fn long_ways_stay_small() {
+        let way: Vec<[u64; 2]> = (0..200).map(|step| [(step * 37) % 1024, 500]).collect();
+        let bytes = clip(&garden(), &maps(way), 15.0).expect("a way");
+        assert!(bytes.len() <= MOST_BYTES, "{} bytes", bytes.len());
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_has_no_clip() {
+        assert_eq!(clip(&garden(), &maps(vec![[1024, 1]]), 15.0), None, "no such square");
+        assert_eq!(clip(&garden(), &maps(Vec::new()), 15.0), None);
+        assert_eq!(clip(&garden(), &LevelMaps::default(), 15.0), None);
+        let huge = LevelMaps { columns: u64::MAX, ..maps(vec![[0, 1]]) };
+        assert_eq!(clip(&garden(), &huge, 15.0), None);
+    }
+}

@@ -1,0 +1,123 @@
+//! Defects that the benchmark of testers plants into the game. Whoever plays or tests it needs none of them.
+
+use std::time::Duration;
+
+use bevy::prelude::*;
+use playbot_lab::{defect::DefectKind, foreign::ForeignGame};
+
+use super::{Game, GameState};
+
+/// Rows that nobody gets past. The game is played on 14, from the middle on.
+const WALL: [usize; 3] = [7, 8, 10];
+/// Steps from which a cake is eaten.
+const FAR: [usize; 3] = [1, 2, 4];
+/// Cakes that are counted before the others are not.
+const COUNTED: [u32; 3] = [0, 1, 3];
+/// Milliseconds between two steps; 300 in the game.
+const PAUSE: [u64; 3] = [500, 800, 2000];
+
+/// The game with the defects that it can have.
+pub fn add_to(game: ForeignGame) -> ForeignGame {
+    kinds().into_iter().fold(game, ForeignGame::defect)
+}
+
+fn kinds() -> [DefectKind; 4] {
+    [
+        DefectKind::rules("invisible-wall", "nobody gets past where nothing is", 3, |app, variant| {
+            let wall = WALL[variant as usize % WALL.len()];
+            let stop = move |mut game: ResMut<Game>, mut transforms: Query<&mut Transform>| {
+                if game.player.i <= wall {
+                    return;
+                }
+                game.player.i = wall;
+                let Some(player) = game.player.entity else { return };
+                if let Ok(mut at) = transforms.get_mut(player) {
+                    at.translation.x = wall as f32;
+                }
+            };
+            add(app, stop);
+        }),
+        DefectKind::rules("goal-far-away", "cakes are eaten from afar", 3, |app, variant| {
+            let far = FAR[variant as usize % FAR.len()];
+            // The game's own rule eats what is here.
+            add(app, move |mut game: ResMut<Game>| {
+                let away = game.player.i.abs_diff(game.bonus.i) + game.player.j.abs_diff(game.bonus.j);
+                if game.bonus.entity.is_some() && (1..=far).contains(&away) {
+                    (game.bonus.i, game.bonus.j) = (game.player.i, game.player.j);
+                }
+            });
+        }),
+        DefectKind::rules("uncounted-goal", "cakes are eaten and not counted", 3, |app, variant| {
+            let counted = COUNTED[variant as usize % COUNTED.len()];
+            add(app, move |mut game: ResMut<Game>| {
+                if game.cake_eaten > counted {
+                    game.score -= 2 * (game.cake_eaten - counted) as i32;
+                    game.cake_eaten = counted;
+                }
+            });
+        }),
+        DefectKind::rules("slow-player", "players walk too slowly", 3, |app, variant| {
+            let pause = Duration::from_millis(PAUSE[variant as usize % PAUSE.len()]);
+            add(app, move |mut game: ResMut<Game>| game.player.move_cooldown.set_duration(pause));
+        }),
+    ]
+}
+
+/// Adds a system that runs after those of the game.
+fn add<M>(app: &mut App, system: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>) {
+    app.add_systems(PostUpdate, system.run_if(in_state(GameState::Playing)));
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use playbot_lab::prelude::{Control, LevelQueue, PlaybotAppExt, Reward, StateHash};
+    use playbot_lab::{bugs::Mutant, foreign::Restart, game::Game as PlayedGame, worlds::build_world};
+
+    use super::*;
+    use crate::{game, refresh};
+
+    /// The game with a bot that goes for the cake.
+    fn played() -> Arc<ForeignGame> {
+        let played = ForeignGame::new("alien_cake_addict", 1, game)
+            .hz(20.0)
+            .keys([KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowRight, KeyCode::ArrowLeft].map(|key| vec![key]))
+            .observe(["cakes"], |game: Res<Game>| [game.cake_eaten as f32])
+            .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
+            .restart(Restart::state(GameState::Playing))
+            .level(refresh)
+            .demonstrator("glutton", |game: Res<Game>| {
+                let (at, cake) = (&game.player, &game.bonus);
+                [at.i < cake.i, at.i > cake.i, at.j < cake.j].iter().position(|go| *go).unwrap_or(3) as u32
+            });
+        Arc::new(played)
+    }
+
+    /// What a replay compares, and what was paid, after each tick of the bot.
+    fn trace(played: &dyn PlayedGame, level: u64) -> Vec<(u64, f32)> {
+        let (mut world, agents) = build_world(played, "default", 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list([level])));
+        played.attach_demonstrator(&mut world, agents[0], 0.0);
+        let mut ticks = Vec::new();
+        for _ in 0..600 {
+            world.tick().expect("sound");
+            let hash = world.get::<StateHash>(agents[0]).expect("an agent").0;
+            ticks.push((hash, world.get::<Reward>(agents[0]).expect("an agent").get()));
+        }
+        ticks
+    }
+
+    #[test]
+    fn every_defect_changes_some_game_and_without_one_nothing_changes() {
+        let sound: Vec<_> = (0..6).map(|level| trace(&*played(), level)).collect();
+        assert_eq!(trace(&Mutant::sound(played()), 0), sound[0]);
+        for kind in kinds() {
+            for variant in 0..3 {
+                let mutant = Mutant::new(played(), &kind, variant);
+                let differs = |level: usize| trace(&mutant, level as u64) != sound[level];
+                assert!((0..sound.len()).any(differs), "{} {variant}", kind.class);
+            }
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Defects that the benchmark of testers plants into the game. Whoever plays or tests it needs none of them.
+
+use bevy::prelude::*;
+use playbot_lab::{defect::DefectKind, foreign::ForeignGame};
+
+use crate::game::{Hero, Run, Screen};
+
+/// What is added to the vertical speed in the air in each tick, units per second, and from which column on. Gravity makes
+/// -0.7.
+const LIFT: [(f32, f32); 3] = [(0.25, 0.0), (0.45, 20.0), (-0.6, 40.0)];
+/// Factor on the speed of a hop, and from which column on.
+const HOP: [(f32, f32); 3] = [(0.5, 0.0), (0.7, 20.0), (1.4, 40.0)];
+/// A speed that only a hop has in its first tick.
+const HOPS: f32 = 13.9;
+/// Columns that nobody gets past.
+const WALL: [f32; 3] = [12.5, 30.5, 50.5];
+
+/// The game with the defects that it can have.
+pub fn add_to(game: ForeignGame) -> ForeignGame {
+    kinds().into_iter().fold(game, ForeignGame::defect)
+}
+
+fn kinds() -> [DefectKind; 4] {
+    [
+        DefectKind::rules("wrong-gravity", "gravity is too weak or too strong", 3, |app, variant| {
+            let (lift, from) = LIFT[variant as usize % LIFT.len()];
+            let change = move |hero: Single<(&Transform, &mut Hero)>| {
+                let (at, mut hero) = hero.into_inner();
+                if at.translation.x >= from && hero.coyote <= 0.0 {
+                    hero.velocity.y += lift;
+                }
+            };
+            app.add_systems(FixedPostUpdate, change.run_if(in_state(Screen::Playing)));
+        }),
+        DefectKind::rules("wrong-jump", "hops are too low or too high", 3, |app, variant| {
+            let (factor, from) = HOP[variant as usize % HOP.len()];
+            let change = move |hero: Single<(&Transform, &mut Hero)>| {
+                let (at, mut hero) = hero.into_inner();
+                if at.translation.x >= from && hero.velocity.y > HOPS {
+                    hero.velocity.y *= factor;
+                }
+            };
+            app.add_systems(FixedPostUpdate, change.run_if(in_state(Screen::Playing)));
+        }),
+        DefectKind::rules("invisible-wall", "nobody gets past where nothing is", 3, |app, variant| {
+            let wall = WALL[variant as usize % WALL.len()];
+            let stop = move |mut at: Single<&mut Transform, With<Hero>>| {
+                if at.translation.x > wall {
+                    at.translation.x = wall;
+                }
+            };
+            app.add_systems(PreUpdate, stop.run_if(in_state(Screen::Playing)));
+        }),
+        DefectKind::rules("goal-does-not-end", "the flag can be touched and the run goes on", 3, |app, variant| {
+            let go_on = move |mut next: ResMut<NextState<Screen>>, hero: Single<&Hero>, run: Res<Run>| {
+                let is_missed = match variant {
+                    0 => true,
+                    1 => hero.coyote <= 0.0,
+                    _ => run.gems < 3,
+                };
+                if is_missed && matches!(*next, NextState::Pending(Screen::Won)) {
+                    next.reset();
+                }
+            };
+            app.add_systems(PostUpdate, go_on);
+        }),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use playbot_lab::{
+        bugs::Mutant,
+        foreign::{LevelSeed, Restart},
+        prelude::*,
+        worlds::build_world,
+    };
+
+    use super::*;
+    use crate::game::{self, Level, Map};
+
+    /// The game with a bot that runs and hops where the ground ahead is another.
+    fn game() -> Arc<ForeignGame> {
+        let game = ForeignGame::new("gem_hop", 1, game::game)
+            .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::ArrowRight, KeyCode::Space]])
+            .observe(["x"], |at: Single<&Transform, With<Hero>>| [at.translation.x])
+            .end(|on: Res<State<Screen>>| matches!(**on, Screen::Won | Screen::Lost).then_some(EpisodeEnd::LOST))
+            .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
+                level.0 = seed.0;
+                next.set(Screen::Loading);
+            })
+            .restart(Restart::Startup)
+            .ready(in_state(Screen::Playing))
+            .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
+                let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
+                1 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
+            });
+        Arc::new(game)
+    }
+
+    /// What a replay compares, after each tick of the bot.
+    fn trace(game: &dyn Game, level: u64) -> Vec<u64> {
+        let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list([level])));
+        game.attach_demonstrator(&mut world, agents[0], 0.0);
+        let mut hashes = Vec::new();
+        for _ in 0..900 {
+            world.tick().expect("sound");
+            hashes.push(world.get::<StateHash>(agents[0]).expect("an agent").0);
+        }
+        hashes
+    }
+
+    #[test]
+    fn every_defect_changes_some_run_and_without_one_nothing_changes() {
+        let sound: Vec<_> = (0..4).map(|level| trace(&*game(), level)).collect();
+        assert_eq!(trace(&Mutant::sound(game()), 0), sound[0]);
+        for kind in kinds() {
+            for variant in 0..3 {
+                let mutant = Mutant::new(game(), &kind, variant);
+                let differs = |level: usize| trace(&mutant, level as u64) != sound[level];
+                assert!((0..sound.len()).any(differs), "{} {variant}", kind.class);
+            }
+        }
+    }
+}

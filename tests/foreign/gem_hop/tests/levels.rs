@@ -1,0 +1,50 @@
+//! What a game's own tests assert of its levels.
+
+#[path = "../src/game.rs"]
+#[allow(dead_code, reason = "what the adapter reads")]
+mod game;
+
+use bevy::prelude::*;
+use game::{Hero, Level, Map, Screen, game};
+use playbot_lab::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    prelude::{EpisodeEnd, LevelTest, assert_deterministic, assert_levels_solvable},
+    verdict::LevelOutcome,
+};
+
+/// The game with a bot that runs and hops, as in `src/main.rs`, and with less to see.
+fn gem_hop() -> ForeignGame {
+    let (right, hop) = (KeyCode::ArrowRight, KeyCode::Space);
+    ForeignGame::new("gem_hop", 1, game)
+        .keys([vec![], vec![right], vec![right, hop]])
+        .observe(["x", "y"], |hero: Single<&Transform, With<Hero>>| [hero.translation.x, hero.translation.y])
+        .end(|screen: Res<State<Screen>>| match **screen {
+            Screen::Won => Some(EpisodeEnd::WON),
+            Screen::Lost => Some(EpisodeEnd::LOST),
+            Screen::Loading | Screen::Playing => None,
+        })
+        .restart(Restart::Startup)
+        .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
+            level.0 = seed.0;
+            next.set(Screen::Loading);
+        })
+        .ready(in_state(Screen::Playing))
+        .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
+            let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
+            1 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
+        })
+}
+
+#[test]
+fn the_runner_solves_most_levels() {
+    let verdicts = LevelTest::new(&gem_hop(), "default:0..7").verdicts().expect("levels");
+    let solved: Vec<_> = verdicts.iter().filter(|level| level.outcome == LevelOutcome::Solved).collect();
+    assert!(solved.len() >= 5, "{verdicts:?}");
+    // Whoever knows which levels must stay solvable names them: here the first of them.
+    assert_levels_solvable(&gem_hop(), &solved[0].level);
+}
+
+#[test]
+fn the_game_plays_the_same_again() {
+    assert_deterministic(&gem_hop(), "default:0..1");
+}

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Runs what docs/how-to/many-machines has, on this machine: the steps of the workflow, the containers of the Jobs and the array
+# of Slurm, and the script for Ray on real workers, some of which are killed half-way. What they join is compared with the
+# results of one process. Takes about two minutes.
+# Called with the program `playbot` and a folder for Python packages that stays between calls:
+#   tests/many_machines/run.sh target/release/playbot target/python
+set -euo pipefail
+playbot=$(realpath "$1")
+mkdir -p "$2"
+packages="$(realpath "$2")/ray"
+cd "$(dirname "$0")/../.."
+# It brings a reader of YAML along.
+version=2.60.0
+
+if ! [ -e "$packages/complete-$version" ]; then
+    rm -rf "$packages"
+    python3 -m venv "$packages"
+    if ! "$packages/bin/pip" install --quiet --disable-pip-version-check "ray==$version"; then
+        echo "!! FAILED: ray $version cannot be installed from PyPI, so nothing was tested" >&2
+        exit 1
+    fi
+    touch "$packages/complete-$version"
+fi
+"$packages/bin/python" tests/many_machines/files_run.py "$playbot"
+# Nothing is sent, and no secret is made, for workers of this machine alone.
+export RAY_USAGE_STATS_ENABLED=0 RAY_AUTH_MODE=disabled
+"$packages/bin/python" tests/many_machines/ray_run.py "$playbot"

@@ -1,0 +1,229 @@
+//! Assertions about levels, recordings and findings: those that hold, and what the others say.
+
+use std::{
+    fs,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+use bevy::prelude::*;
+use bevy_playbot::demo::file::DemoWriter;
+use playbot_lab::{eval::Player, findings::list_findings, prelude::*, proof::LevelProof};
+use playbot_tests::{Cell, Corridor, Drift, as_corridor, corridor_plugin, recording::record_random};
+
+/// The corridor with bots that walk to the right and to the left, and perhaps with something wrong.
+enum Lane {
+    Sound,
+    /// It panics on level 3 when somebody stands at its last cell but one.
+    Burning,
+    /// Each World is another one.
+    Drifting,
+    /// It says that it is the corridor, and has other states.
+    Impostor,
+}
+
+fn burn(agents: Query<(&Episode, &Cell)>) {
+    for (episode, cell) in &agents {
+        assert!(!episode.is_running() || episode.level != 3 || cell.0 != 5, "the corridor burns");
+    }
+}
+
+impl Game for Lane {
+    fn name(&self) -> &'static str {
+        if matches!(self, Self::Impostor) { "corridor" } else { "lane" }
+    }
+
+    fn version(&self) -> u32 {
+        3
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &["plain"]
+    }
+
+    as_corridor! {
+        fn tick_hz() -> f64;
+        fn actions() -> ActionSpace;
+        fn observation() -> ObservationSpace;
+        fn spawn_agent(world: &mut World, index: u32) -> Entity;
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        static WORLDS: AtomicU64 = AtomicU64::new(1);
+        corridor_plugin(app);
+        match self {
+            Self::Sound => {}
+            Self::Burning => {
+                app.add_systems(FixedPostUpdate, burn.before(PlaybotSystems::Judge));
+            }
+            Self::Drifting => {
+                app.insert_resource(Drift(WORLDS.fetch_add(1, Ordering::Relaxed)));
+            }
+            Self::Impostor => {
+                app.insert_resource(Drift(1));
+            }
+        }
+    }
+
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        let walks = |action| BlindBot::Constant(ActionValue::Discrete(action));
+        vec![("right", walks(1)), ("left", walks(0))]
+    }
+
+    fn prove(&self, _mode: &str, level: u64) -> LevelProof {
+        let why = "walled in".to_owned();
+        if level == 4 { LevelProof::Unsolvable { why } } else { LevelProof::Unknown }
+    }
+}
+
+/// What an assertion says that does not hold.
+fn message(assertion: impl FnOnce()) -> String {
+    let panic = catch_unwind(AssertUnwindSafe(assertion)).expect_err("it must not hold");
+    *panic.downcast::<String>().expect("words")
+}
+
+/// The file in a folder of findings whose name begins so.
+fn file(folder: &Path, begin: &str) -> PathBuf {
+    let found = list_findings(folder).expect("findings");
+    found.into_iter().find(|(name, _)| name.starts_with(begin)).unwrap_or_else(|| panic!("no {begin}")).1
+}
+
+#[test]
+fn assertions_hold_for_what_is_sound() {
+    assert_levels_solvable(&Lane::Sound, "plain:0..9");
+    assert_levels_solved_by(&Lane::Sound, "right", "plain:0..9");
+    assert_no_findings(&Lane::Sound, "plain:5..9");
+    assert_deterministic(&Lane::Sound, "plain:0..3");
+    let right = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
+    LevelTest::new(&Corridor, "plain:7").player("mine", right).episodes(2).seed(5).threads(1).assert_solved();
+    let verdicts = LevelTest::new(&Lane::Sound, "plain:2..5").bot("left").verdicts().expect("levels");
+    let levels: Vec<&str> = verdicts.iter().map(|level| level.level.as_str()).collect();
+    assert_eq!(levels, ["plain:2", "plain:3", "plain:4", "plain:5"]);
+    LevelTest::new(&Lane::Sound, "plain:2..5").bot("left").bot("right").assert_solvable();
+}
+
+#[test]
+fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let test = |levels: &str| {
+        let test = LevelTest::new(&Lane::Sound, levels).bot("left").episodes(2).seed(3);
+        test.without_detector("all").findings_in(folder.path()).program("jump")
+    };
+    let found = message(|| test("plain:4..5").assert_solvable());
+    let of = |begin: &str| file(folder.path(), begin).display().to_string();
+    let again = |level: &str| {
+        format!(
+            "  the level again:\n    \
+             jump test lane --levels {level} --bot left --episodes 2 --seed 3 --out again --no-detect all\n    \
+             jump view lane --levels {level} --bot left --episode --out again.png"
+        )
+    };
+    let expected = [
+        "2 of 2 levels were not solved by any tester (`lane`, plain:4..5, left, 2 episodes each, seed 3):".to_owned(),
+        "plain:4: proved-unsolvable".to_owned(),
+        "  left: solved 0 of 2, 2 lost".to_owned(),
+        "  unreachable-goal: walled in".to_owned(),
+        format!("    jump replay {}", of("plain-4.unreachable-goal-")),
+        "  an episode that failed:".to_owned(),
+        format!("    jump replay {}", of("plain-4.lost.left-")),
+        again("plain:4"),
+        "plain:5: bot-failed".to_owned(),
+        "  left: solved 0 of 2, 2 lost".to_owned(),
+        "  an episode that failed:".to_owned(),
+        format!("    jump replay {}", of("plain-5.lost.left-")),
+        again("plain:5"),
+    ];
+    assert_eq!(found, expected.join("\n"));
+    assert_replays(&Lane::Sound, folder.path());
+    // The first levels are told in full, all others by name.
+    let many = message(|| test("plain:10..21").assert_solvable());
+    assert!(many.starts_with("12 of 12 levels ") && many.ends_with("\nand plain:20, plain:21"), "{many}");
+    let mixed = message(|| test("plain:5..6").bot("right").assert_solved());
+    assert!(mixed.contains("  left: solved 0 of 2, 2 lost\n  right: solved 2 of 2\n"), "{mixed}");
+    assert!(message(|| assert_levels_solved_by(&Lane::Sound, "left", "plain:7")).contains("1 of 1 levels was not"));
+}
+
+#[test]
+fn a_finding_is_told_and_stays_told_until_it_is_mended() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let test = LevelTest::new(&Lane::Burning, "plain:0..3").bot("right").findings_in(folder.path()).minimise();
+    let found = message(|| test.assert_no_findings());
+    let file = file(folder.path(), "plain-3.panic.right-");
+    assert!(found.starts_with("something was found on 1 of 4 levels (`lane`, plain:0..3, right, "), "{found}");
+    assert!(found.contains("\n  panic (right, episode 0, tick 1): the corridor burns"), "{found}");
+    assert!(found.contains(&format!("\n    playbot replay {}\n", file.display())), "{found}");
+    assert!(!found.contains("plain:2"), "{found}");
+
+    assert_replays(&Lane::Burning, &file);
+    assert_findings_gone(&Lane::Sound, folder.path());
+    let mended = message(|| assert_replays(&Lane::Sound, &file));
+    assert!(mended.contains(": it does not happen again (plain:3: panic: the corridor burns"), "{mended}");
+    let there = message(|| assert_findings_gone(&Lane::Burning, folder.path()));
+    assert!(there.contains("1 of 1 findings are not gone:") && there.contains("(still-there): plain:3"), "{there}");
+    assert!(there.ends_with(&format!("playbot replay {}", file.display())), "{there}");
+    let empty = tempfile::tempdir().expect("a folder");
+    let none = message(|| assert_findings_gone(&Lane::Sound, empty.path()));
+    assert!(none.contains("has no findings"), "{none}");
+}
+
+#[test]
+fn a_game_that_does_not_play_the_same_is_told_with_the_tick() {
+    let found = message(|| assert_deterministic(&Lane::Drifting, "plain:1..2"));
+    assert!(found.starts_with("2 of 2 levels did not play the same again (`lane`, plain:1..2, right + left + "));
+    assert!(found.contains("\n  determinism (right, episode 0, tick 0): the episode was another one"), "{found}");
+    let options = "--detect determinism --no-detect all --detector determinism.every=1";
+    assert!(found.contains(options), "{found}");
+}
+
+#[test]
+fn what_cannot_be_tested_is_a_failure_in_words() {
+    for (levels, words) in [
+        ("plain:5..2", "cannot test plain:5..2 of `lane`: `plain:5..2`: first level 5 is after last level 2"),
+        ("plain", "is not a range of levels"),
+        ("plane:0..3", "did you mean `plain`?"),
+        ("files:none/*.json", "files:none/*.json matches no file"),
+    ] {
+        let found = message(|| assert_levels_solvable(&Lane::Sound, levels));
+        assert!(found.contains(words), "{found}");
+    }
+    let test = || LevelTest::new(&Lane::Sound, "plain:0..1");
+    for (test, words) in [
+        (test().bot("right2"), "did you mean `right`?"),
+        (test().bot("right").bot("right"), "two testers are called `right`"),
+        (test().policy("none.policy"), "none.policy"),
+        (test().detect("stuck2"), "did you mean `stuck`?"),
+        (test().set_detector("stuck.ticks=-1"), "at least 1"),
+    ] {
+        let found = message(|| test.assert_solvable());
+        assert!(found.starts_with("cannot test plain:0..1 of `lane`: ") && found.contains(words), "{found}");
+    }
+}
+
+#[test]
+fn recordings_play_again_or_the_first_tick_that_differs_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("walk.demo");
+    record_random(&Corridor, "plain", 3, &path, 0..4);
+    assert_replays(&Corridor, &path);
+    assert_replays(&Corridor, folder.path());
+    let other = message(|| assert_replays(&Lane::Impostor, &path));
+    assert!(
+        other.contains("walk.demo: 4 of 4 episodes do not play the same game again:\n  episode 0: level 0, tick 0")
+    );
+    assert!(other.ends_with(&format!("\n    playbot demo verify {}", path.display())), "{other}");
+    let foreign = message(|| assert_replays(&Lane::Sound, &path));
+    assert!(foreign.contains("walk.demo: a recording of the game `corridor`, not of `lane`"), "{foreign}");
+
+    let bytes = fs::read(&path).expect("written");
+    fs::write(&path, &bytes[..bytes.len() - 3]).expect("writable");
+    let cut = message(|| assert_replays(&Corridor, &path));
+    assert!(cut.contains("walk.demo") && cut.contains("is cut off"), "{cut}");
+    drop(DemoWriter::replace(&path, Corridor.demo_header("plain")).expect("writable"));
+    let empty = message(|| assert_replays(&Corridor, folder.path()));
+    assert!(empty.ends_with("walk.demo holds no episode: nothing was replayed"), "{empty}");
+    fs::remove_file(&path).expect("it is there");
+    let none = message(|| assert_replays(&Corridor, folder.path()));
+    assert!(none.contains("has neither recordings nor findings"), "{none}");
+    assert!(message(|| assert_replays(&Corridor, &path)).contains("walk.demo"));
+}

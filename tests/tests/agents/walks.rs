@@ -1,0 +1,161 @@
+//! What tests say of where agents went, why their episodes ended, and under which skills.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy::prelude::*;
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{
+    detectors::Detectors,
+    eval::Player,
+    floor_plan::FloorPlan,
+    prelude::*,
+    verdict::{
+        EndPlace, FailureWay, LevelMaps, LevelVerdict, Places, TestError, TestPlan, TestWatch, Tester, TesterRecord,
+        run_tests,
+    },
+};
+use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner, Prior, SkillDraw};
+use playbot_tests::{Cell, as_corridor, corridor_plugin};
+
+/// The corridor with a plan: seven squares of side 1 below a wall. Agents start in square 3 or 4 and are through in square 6;
+/// in square 0 is an abyss.
+struct Charted;
+
+impl Game for Charted {
+    fn name(&self) -> &'static str {
+        "charted"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &["plain"]
+    }
+
+    /// Eight ticks without a new square are two seconds.
+    fn tick_hz(&self) -> f64 {
+        4.0
+    }
+
+    as_corridor! {
+        fn actions() -> ActionSpace;
+        fn observation() -> ObservationSpace;
+        fn spawn_agent(world: &mut World, index: u32) -> Entity;
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        corridor_plugin(app);
+    }
+
+    fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
+        Some(FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 7.0, 2.0),
+            walls: vec![Rect::new(0.0, 1.0, 7.0, 2.0)],
+            start: Vec2::new(3.5, 0.5),
+            goal: Vec2::new(6.5, 0.5),
+            ..FloorPlan::default()
+        })
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<Cell>(agent).map(|cell| Vec2::new(cell.0 as f32 + 0.5, 0.5))
+    }
+
+    fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {
+        (world.get::<Cell>(agent)?.0 == 0).then_some("abyss")
+    }
+}
+
+fn tester(name: &str, player: Player) -> Tester {
+    Tester { record: TesterRecord::bot(name), player, observation_config: ObservationConfig::default() }
+}
+
+/// Who always does the same: 0 goes left, 1 goes right, 2 rests.
+fn constant(name: &str, action: u32) -> Tester {
+    tester(name, Player::Blind(BlindBot::Constant(ActionValue::Discrete(action))))
+}
+
+fn plan(levels: &str, testers: Vec<Tester>, episodes: u32, threads: usize) -> TestPlan {
+    let (split, detectors) = (levels.parse().expect("levels"), Detectors::default());
+    TestPlan { split, testers, episodes, seed: 2, detectors, shard: None, threads }
+}
+
+/// All verdicts, in the order of the levels.
+fn verdicts(plan: &TestPlan) -> Vec<LevelVerdict> {
+    let mut found = Vec::new();
+    let mut keep = |verdict: LevelVerdict| -> Result<(), TestError> {
+        found.push(verdict);
+        Ok(())
+    };
+    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    run_tests(&Charted, plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
+    found.sort_by_key(|verdict| verdict.index);
+    found
+}
+
+#[test]
+fn visits_lost_time_causes_and_places_are_counted() {
+    let testers = || vec![constant("left", 0), constant("rest", 2), constant("right", 1)];
+    let found = verdicts(&plan("plain:0..0", testers(), 1, 1));
+    let level = &found[0];
+    let places = |visited| Some(Places { visited, open: 7 });
+    // From square 4: to the left 3, 2, 1 and 0, to the right 5 and 6.
+    assert_eq!(level.testers.iter().map(|tester| tester.places).collect::<Vec<_>>(), [places(4), places(1), places(2)]);
+    assert_eq!(level.places, places(7));
+    let failure = FailureWay { tester: "left".to_owned(), episode: 0, way: vec![[3, 1], [2, 1], [1, 1], [0, 1]] };
+    let expected = LevelMaps {
+        side: 1.0,
+        columns: 7,
+        rows: 2,
+        visits: vec![[0, 1], [1, 1], [2, 1], [3, 1], [4, 20], [5, 1], [6, 1]],
+        // Of 20 ticks the first one is new, and the eight after it are two seconds.
+        lost: vec![[4, 11]],
+        failure: Some(failure),
+        ..LevelMaps::default()
+    };
+    assert_eq!(level.maps, Some(expected));
+    let abyss = BTreeMap::from([("abyss".to_owned(), 1)]);
+    assert_eq!(level.causes, abyss);
+    let told: Vec<(u64, u64, &BTreeMap<String, u64>)> =
+        level.ends.iter().map(|EndPlace { lost, timed_out, causes, .. }| (*lost, *timed_out, causes)).collect();
+    assert_eq!(told, [(1, 0, &abyss), (0, 1, &BTreeMap::new())]);
+}
+
+#[test]
+fn of_many_levels_only_those_that_failed_have_maps() {
+    let random = || vec![constant("right", 1), tester("random", Player::Blind(BlindBot::Uniform))];
+    let whole = plan("plain:0..2999", random(), 1, 2);
+    let part = TestPlan { shard: Some("3/100".parse().expect("a shard")), ..whole };
+    let found = verdicts(&part);
+    assert_eq!(found.len(), 30);
+    for level in &found {
+        assert_eq!(level.maps.is_some(), level.score.solved < level.score.episodes, "{}", level.level);
+        assert_eq!(level.maps.is_some(), level.places.is_some(), "{}", level.level);
+    }
+    let mapped = found.iter().filter(|level| level.maps.is_some()).count();
+    assert!((1..30).contains(&mapped), "{mapped} levels with maps");
+    assert_eq!(verdicts(&TestPlan { threads: 1, ..part }), found, "threads change nothing");
+}
+
+#[test]
+fn skills_of_a_policy_are_told_where_they_were_active() {
+    let spec = PolicySpec { obs: 2.into(), latent: 2, action_space: ActionSpace::Discrete(3) };
+    let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings").policy();
+    let prior = SkillPrior { prior: Prior::standard_normal(2, false), horizon: 3, draw: SkillDraw::Sample };
+    let skilled = Player::Policy { policy, prior: Some(prior), draw: ActionDraw::Sample };
+    let found = verdicts(&plan("plain:0..3", vec![tester("skilled", skilled)], 8, 2));
+    for level in &found {
+        let maps = level.maps.as_ref().expect("few levels have maps");
+        let visits: u64 = maps.visits.iter().map(|[_, ticks]| ticks).sum();
+        assert_eq!(maps.skills.iter().map(|skill| skill.ticks).sum::<u64>(), visits, "{maps:?}");
+        assert!(maps.skills.is_sorted_by(|one, other| one.ticks >= other.ticks), "{maps:?}");
+        let known = ["z1+", "z1-", "z2+", "z2-"];
+        assert!(maps.skills.iter().all(|skill| known.contains(&skill.skill.as_str())), "{maps:?}");
+        let squares = |pairs: &[[u64; 2]]| pairs.iter().map(|[square, _]| *square).collect::<Vec<_>>();
+        assert_eq!(squares(&maps.skill_at), squares(&maps.visits));
+        assert!(maps.skill_at.iter().all(|[_, skill]| (*skill as usize) < maps.skills.len()), "{maps:?}");
+    }
+    assert!(found.iter().any(|level| level.maps.as_ref().is_some_and(|maps| maps.skills.len() > 1)));
+}
