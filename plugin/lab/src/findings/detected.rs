@@ -11,7 +11,7 @@ use super::{
     moment::{Moment, Watcher},
 };
 use crate::{
-    detector::{self, Detector, LevelAhead, Watch, WorldMoment},
+    detector::{self, Detector, LevelAhead, Watch, WorldMoment, WorldWatch},
     detectors::{DetectorChoice, Detectors, GameProofs, ShownBy},
     game::Game,
 };

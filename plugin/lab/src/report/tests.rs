@@ -169,5 +169,8 @@ fn a_scatter_is_dots_that_nothing_joins_with_its_name_below() {
     let points = vec![(0.0, 1.0), (5.0, 3.0), (f64::NAN, 2.0), (2.0, 9.0)];
     let svg = chart(vec![Curve::scatter("bot", points)]).to_svg();
     assert_eq!(svg.matches("<circle class=\"dot c0 d0\"").count(), 3, "{svg}");
-    assert!(!svg.contains("<path class=\"line") && !svg.contains("class=\"leader") && svg.contains(">bot</text>"), "{svg}");
+    assert!(
+        !svg.contains("<path class=\"line") && !svg.contains("class=\"leader") && svg.contains(">bot</text>"),
+        "{svg}"
+    );
 }
