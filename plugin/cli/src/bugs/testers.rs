@@ -85,7 +85,8 @@ impl ContestantArgs {
         }
         for testers in &mut all {
             let has_skills = testers.iter().any(|tester| tester.record.name == EXPLORE_SKILLS);
-            testers.extend(with_policy(testers).filter(|_| !has_skills));
+            let explorer = with_policy(testers).filter(|_| !has_skills);
+            testers.extend(explorer);
         }
         self.keep_named(chosen, &mut all)?;
         Ok(all)
@@ -164,8 +165,8 @@ impl ContestantArgs {
 }
 
 /// The explorer with the first policy that has skills.
-fn with_policy(testers: &[Contestant]) -> impl Iterator<Item = Contestant> + use<> {
-    let policy = testers.iter().find_map(|tester| match &tester.means {
+fn with_policy(testers: &[Contestant]) -> Option<Contestant> {
+    testers.iter().find_map(|tester| match &tester.means {
         Means::Plays(Player::Policy { policy, prior: Some(prior), draw }) => {
             let explorer = Explorer::Policy { policy: policy.clone(), prior: Some(prior.clone()), draw: *draw };
             let record = ContestantRecord { name: EXPLORE_SKILLS.to_owned(), ..tester.record.clone() };
@@ -173,13 +174,13 @@ fn with_policy(testers: &[Contestant]) -> impl Iterator<Item = Contestant> + use
             Some(Contestant { record, means: Means::Explores(explorer), observation_config })
         }
         _ => None,
-    });
-    policy.into_iter()
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use playbot_lab::{foreign::ForeignGame, prelude::*};
+    use bevy::prelude::KeyCode;
+    use playbot_lab::foreign::ForeignGame;
 
     use super::*;
 

@@ -102,7 +102,10 @@ impl ScoreJournal {
     ///
     /// The system refuses.
     pub fn close(self) -> Result<(), ScoreError> {
-        fs::remove_file(&self.path).map_err(io_error("remove", &self.path))
+        let Self { path, file, .. } = self;
+        // Not every system removes files that are open.
+        drop(file);
+        fs::remove_file(&path).map_err(io_error("remove", &path))
     }
 
     fn write(&mut self, line: &impl Serialize) -> Result<(), ScoreError> {
@@ -144,6 +147,7 @@ impl ScoreJournal {
             }
             self.length += line.len() as u64;
         }
+        drop(reader);
         let whole = self.length;
         let cut = self.file.metadata().map_err(io_error("read", &self.path))?.len().saturating_sub(whole);
         let cut_off = self.file.set_len(whole).and_then(|()| self.file.seek(SeekFrom::Start(whole)));

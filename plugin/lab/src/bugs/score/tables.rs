@@ -51,7 +51,7 @@ impl ScoreTable {
             let all = class.testers.iter();
             let last = [&class.best, &class.precision, &class.careful, &class.beside, &class.only_skills];
             let first = [class.class.clone(), class.best.of.to_string()];
-            first.into_iter().chain(all.chain(last).map(Share::short)).collect()
+            first.into_iter().chain(all.chain(last).map(Share::short)).collect::<Vec<String>>()
         });
         PlainTable { caption: "defects found, by class".to_owned(), columns: columns.collect(), rows: rows.collect() }
     }
