@@ -91,7 +91,8 @@ mod tests {
                 let sound = text(seed);
                 let Some(broken) = change(&sound, &mut rng(seed.into())) else { continue };
                 planted += 1;
-                let design = level_text::parse(&broken).unwrap_or_else(|error| panic!("{class} {seed}: {error}"));
+                let design =
+                    level_text::parse(&broken).unwrap_or_else(|error| panic!("{class} {seed}: {}", error.what));
                 assert_ne!(design.hash(), level_text::parse(&sound).expect("it was printed").hash(), "{class} {seed}");
                 assert_eq!(change(&sound, &mut rng(seed.into())), Some(broken), "{class} {seed}: the same again");
             }

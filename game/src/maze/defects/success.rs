@@ -1,9 +1,6 @@
 //! Taking back what a game has said of an episode.
 
-use bevy::{
-    prelude::*,
-    reflect::{GetPath, enums::DynamicEnum},
-};
+use bevy::reflect::{GetPath, enums::DynamicEnum};
 use playbot_lab::prelude::*;
 
 /// Lets an episode go on whose aim was reached in this tick. A game cannot say that; only reflection sees what it has said.

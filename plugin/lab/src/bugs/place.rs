@@ -42,7 +42,7 @@ pub(super) fn plant_level(
                 game: game.name().to_owned(),
                 class: class.to_owned(),
                 base: format!("{mode}:{base}"),
-                why: error.to_string(),
+                why: error.what,
             })?;
             Ok::<_, BugError>(design.hash())
         };

@@ -51,7 +51,7 @@ impl ScoreJournal {
             return Err(ScoreError::Exists(score.into()));
         }
         let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-        let mut file = options.map_err(io_error("open", &path))?;
+        let file = options.map_err(io_error("open", &path))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(ScoreError::Busy(score.into())),
