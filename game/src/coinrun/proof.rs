@@ -33,8 +33,8 @@ pub(super) fn prove_from(world: &World, agent: Entity) -> LevelProof {
         return LevelProof::Unknown;
     }
     let why =
-        "the coin cannot be reached any more: a search over all cells from where the player was, in which every place may \
-               give support for a whole jump, ended without it"
+        "the coin cannot be reached any more: a search through all that the rules allow from where the player was, in \
+               which enemies do no harm and time is never up, ended without it"
             .to_owned();
     LevelProof::Unsolvable { why }
 }

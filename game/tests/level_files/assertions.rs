@@ -46,7 +46,7 @@ fn sound_files_pass_and_a_walled_coin_is_told_with_its_proof() {
     let found = message(|| test.assert_solvable());
     assert!(found.starts_with("1 of 2 levels was not solved by any tester (`coinrun`, files:"), "{found}");
     assert!(found.contains("broken/walled.json: proved-unsolvable\n  search: solved 0 of 1"), "{found}");
-    assert!(found.contains("\n  unreachable-goal: the coin cannot be reached: a search over all cells"), "{found}");
+    assert!(found.contains("\n  unreachable-goal: the coin cannot be reached: a search through all"), "{found}");
     assert!(found.contains("\n  an episode that failed:\n    playbot replay "), "{found}");
     assert!(found.contains("playbot test coinrun --levels ") && found.contains("files of levels are seen from "));
     // Each file that is named replays.

@@ -119,7 +119,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    log::init(cli.verbose);
+    log::init(cli.verbose, !matches!(cli.verb, Some(Verb::Bugs(_))));
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {

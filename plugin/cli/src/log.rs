@@ -26,9 +26,13 @@ use tracing_subscriber::{
 /// to warn of.
 const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
 
+/// What broken games log is not news.
+const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot_cli=warn,playbot_lab=warn,playbot_learner=warn";
+
 /// Logs what `RUST_LOG` asks for, or else warnings, and more with each `-v`. Who asks for more is told where it is from.
-pub fn init(verbose: u8) {
-    let level = [QUIET, "info", "debug"][usize::from(verbose.min(2))];
+pub fn init(verbose: u8, hears_games: bool) {
+    let quiet = if hears_games { QUIET } else { WITHOUT_GAMES };
+    let level = [quiet, "info", "debug"][usize::from(verbose.min(2))];
     let asked = EnvFilter::try_from_default_env().ok();
     let is_plain = verbose == 0 && asked.is_none();
     let filter = asked.unwrap_or_else(|| EnvFilter::new(level));

@@ -41,6 +41,7 @@ pub mod foreign;
 pub mod game;
 pub mod games;
 pub mod held_out;
+mod idle;
 pub mod inspect;
 pub mod level_files;
 pub mod mode;

@@ -87,7 +87,9 @@ fn invisible_wall(level: &Level, x: i32, height: i32) -> Vec<Cell> {
 }
 
 fn missing_ground(level: &Level, left: i32, width: i32) -> Vec<Cell> {
-    let columns = (left..left + width).filter(|&x| x < level.coin[0]);
+    // Pits hold nobody anyway.
+    let is_ground = |x: &i32| surface(level, *x) > 0 && !level.tiles.get(*x, surface(level, *x)).is_lava();
+    let columns = (left..level.coin[0]).filter(is_ground).take(width as usize);
     columns.flat_map(|x| (0..surface(level, x)).map(move |y| ([x, y], Tile::Empty))).collect()
 }
 

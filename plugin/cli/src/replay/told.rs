@@ -76,13 +76,15 @@ impl Told<'_> {
     fn shorter_sentence(&self) -> Option<String> {
         let (shorter, path) = self.shorter?;
         let (now, original) = (shorter.finding.episode.len(), self.finding.head.original_ticks);
+        let [before, after] = shorter.efforts;
         let percent = 100.0 * now as f64 / f64::from(original.max(1));
         let end =
             if shorter.is_minimal { "" } else { "; the budget was used up before nothing more could be left out" };
         Some(format!(
-            "{}: {} of {original} ({percent:.0} %), after {}{end}",
+            "{}: {} of {original} ({percent:.0} %), {} of {before} that do something, after {}{end}",
             path.display(),
             counted(now as u64, "tick"),
+            counted(after.into(), "action"),
             counted(shorter.replays.into(), "replay")
         ))
     }

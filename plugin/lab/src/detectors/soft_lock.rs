@@ -52,7 +52,12 @@ impl Detector for SoftLock {
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "ticks between two questions to the game").at_least(1.0),
+            Setting::new(
+                "every",
+                &mut self.every,
+                "ticks between two questions to the game; more, later in an episode",
+            )
+            .at_least(1.0),
             Setting::new("ticks", &mut self.ticks, "ticks that the episode goes on without hope"),
         ]
     }
@@ -86,7 +91,8 @@ impl Asking {
     }
 
     fn ask(&mut self, moment: &Moment<'_>) {
-        self.next = moment.tick.checked_add(self.every);
+        // Who is locked in stays so: later it will do to ask less often.
+        self.next = moment.tick.checked_add(self.every.max(moment.tick / 2));
         let proof = moment.proofs.of_state();
         let Some(why) = proof.why_unsolvable() else { return };
         if moment.proofs.of_level().why_unsolvable().is_some() {

@@ -5,12 +5,9 @@ use bevy_playbot::{
     demo::{file::EpisodeActions, replay::recorded_action},
 };
 
-/// What a game's agents do when they do nothing: action 0, or zeros.
-pub(super) fn idle(space: &ActionSpace) -> ActionValue {
-    match space {
-        ActionSpace::Discrete(_) => ActionValue::Discrete(0),
-        ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; *count]),
-    }
+/// How many actions do something.
+pub(super) fn efforts(actions: &[ActionValue], idle: &ActionValue) -> u32 {
+    u32::try_from(actions.iter().filter(|action| *action != idle).count()).unwrap_or(u32::MAX)
 }
 
 /// The actions of a recorded episode.
@@ -48,8 +45,9 @@ mod tests {
         let actions = [2, 0, 1].map(ActionValue::Discrete);
         assert_eq!(listed(&recorded(&actions, &space)), actions);
         let space = ActionSpace::Continuous(2);
-        let actions = [ActionValue::Continuous(vec![0.5, -1.0]), idle(&space)];
+        let actions = [ActionValue::Continuous(vec![0.5, -1.0]), ActionValue::Continuous(vec![0.0, 0.0])];
         assert_eq!(listed(&recorded(&actions, &space)), actions);
         assert!(listed(&recorded(&[], &space)).is_empty());
+        assert_eq!(efforts(&actions, &actions[1]), 1);
     }
 }

@@ -3,6 +3,7 @@
 use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
 
 use super::{
+    actions::efforts,
     checks::Checks,
     head::FindingHead,
     minimise::{Budget, minimise},
@@ -10,9 +11,9 @@ use super::{
     solo::Setting,
     stored::StoredFinding,
 };
-use crate::{eval::Player, game::Game};
+use crate::{eval::Player, game::Game, idle::idle_action};
 
-/// Lengths of a finding, in ticks.
+/// Lengths of a finding, in actions that do something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lengths {
     /// As it was found.
@@ -37,8 +38,8 @@ pub(crate) fn lengths(
     }
     let found = StoredFinding::of_actions(game, mode, level, head, actions, checks)?;
     let shorter = minimise(game, &found, checks, budget, &|_| {}, stop).ok()?;
-    let minimised = u32::try_from(shorter.finding.episode.len()).unwrap_or(u32::MAX);
-    Some(Lengths { original: found.head.original_ticks, minimised })
+    let [_, minimised] = shorter.efforts;
+    Some(Lengths { original: efforts(&found.actions(), &idle_action(game)), minimised })
 }
 
 /// What a player does in the episode with this seed; `None` if what it sees cannot be drawn.

@@ -5,10 +5,10 @@ use std::cell::Cell;
 use bevy_playbot::action::ActionValue;
 
 use super::{
-    actions::idle, check::Check, checks::Checks, ddmin::ddmin, head::FindingHead, look::look, playable::Unplayable,
+    actions::efforts, check::Check, checks::Checks, ddmin::ddmin, head::FindingHead, look::look, playable::Unplayable,
     solo::Setting, stored::StoredFinding,
 };
-use crate::game::Game;
+use crate::{game::Game, idle::idle_action};
 
 /// How much may be tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,13 +25,15 @@ impl Default for Budget {
     }
 }
 
-/// A finding with fewer actions.
+/// A finding with fewer ticks, or fewer actions that do something.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Minimised {
     /// The finding; the one that was given, if nothing could be left out.
     pub finding: StoredFinding,
     /// Replays that it took.
     pub replays: u32,
+    /// Actions that do something, in the finding that was given and in the shorter one.
+    pub efforts: [u32; 2],
     /// Whether nothing more can be left out, one part at a time; otherwise the budget was used up, or somebody stopped it.
     pub is_minimal: bool,
 }
@@ -57,22 +59,22 @@ pub fn minimise(
     let (mode, level) = (finding.header.mode.as_str(), finding.episode.level_seed);
     let setting = Setting { game, mode, level, seed: finding.head.seed };
     let trial = Trial { setting, head: &finding.head, check, replays: Cell::new(0), ticks: Cell::new(0), progress };
-    let actions = finding.actions();
-    let Some(needed) = trial.needed(&actions) else { return Err(gone()) };
+    let actions_before = finding.actions();
+    let Some(needed) = trial.needed(&actions_before) else { return Err(gone()) };
     let has_enough = || trial.replays.get() >= budget.replays || trial.ticks.get() >= budget.ticks || stop();
-    let mut actions = actions[..needed].to_vec();
+    let mut actions = actions_before[..needed].to_vec();
     actions = ddmin(actions, &has_enough, |shorter| trial.needed(shorter));
     if trial.idle_instead(&mut actions, &has_enough) {
         actions = ddmin(actions, &has_enough, |shorter| trial.needed(shorter));
     }
     let head = FindingHead { tick: None, state_hash: None, ..finding.head.clone() };
     let shorter = StoredFinding::of_actions(game, mode, level, head, &actions, checks);
-    let shorter = shorter.filter(|shorter| shorter.episode.len() < finding.episode.len());
-    Ok(Minimised {
-        finding: shorter.unwrap_or_else(|| finding.clone()),
-        replays: trial.replays.get(),
-        is_minimal: !has_enough(),
-    })
+    let idle = idle_action(game);
+    let size = |finding: &StoredFinding| (finding.episode.len(), efforts(&finding.actions(), &idle));
+    let shorter = shorter.filter(|shorter| size(shorter) < size(finding));
+    let shorter = shorter.unwrap_or_else(|| finding.clone());
+    let efforts = [&actions_before, &shorter.actions()].map(|actions| efforts(actions, &idle));
+    Ok(Minimised { finding: shorter, efforts, replays: trial.replays.get(), is_minimal: !has_enough() })
 }
 
 /// Tries out actions, and counts.
@@ -98,7 +100,7 @@ impl Trial<'_> {
 
     /// Replaces actions by idling where the finding is still there, larger parts first; whether any was.
     fn idle_instead(&self, actions: &mut Vec<ActionValue>, has_enough: &dyn Fn() -> bool) -> bool {
-        let nothing = idle(&self.setting.game.actions());
+        let nothing = idle_action(self.setting.game);
         let mut has_changed = false;
         let mut size = actions.len().div_ceil(2);
         while size > 0 {

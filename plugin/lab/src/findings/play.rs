@@ -8,12 +8,11 @@ use bevy_playbot::{
 };
 
 use super::{
-    actions::idle,
     breakage::Breakage,
     moment::Watcher,
     solo::{Setting, Solo},
 };
-use crate::eval::Player;
+use crate::{eval::Player, idle::idle_action};
 
 /// What came of an episode that was played again.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -96,7 +95,7 @@ pub(super) fn play_player(
     let done = |solo: &Solo| {
         // What does not fit was not done.
         let action = solo.action().filter(|action| misfit(action, &space).is_none());
-        action.unwrap_or_else(|| idle(&space))
+        action.unwrap_or_else(|| idle_action(setting.game))
     };
     loop {
         match solo.tick() {

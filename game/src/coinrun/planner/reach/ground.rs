@@ -1,6 +1,6 @@
 //! What a level lets a player do at a height: where there is room, what is in the way, and what kills or is the coin.
 
-use std::{collections::HashMap, ops::RangeInclusive};
+use std::{collections::HashMap, sync::LazyLock};
 
 use super::bins::{BINS, Bins};
 use crate::coinrun::{
@@ -22,12 +22,7 @@ pub(super) type Rows = [i32; 2];
 /// A level as the search asks for it. What it has answered once it knows.
 pub(super) struct Ground<'a> {
     level: &'a Level,
-    /// A player at the left border, at the bottom.
-    body: Body,
-    corner_columns: Columns,
-    body_columns: Columns,
     answers: HashMap<Question, Bins>,
-    touched: HashMap<u32, Touched>,
     /// Crates, and the bins in which a player may overlap each.
     pub crates: Vec<(Body, Bins)>,
     saws: Vec<(Body, Bins)>,
@@ -35,13 +30,22 @@ pub(super) struct Ground<'a> {
     pub enemies_lend: bool,
 }
 
-/// What is asked of corners. They are the same corners in both rows of a question: who is free in the one and stopped by the
+/// A player at the left border, at the bottom.
+static PLAYER: LazyLock<Body> = LazyLock::new(|| Body { x: 0.0, y: 0.0, ..Body::player() });
+static CORNER_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(corners(&PLAYER, 0.0, 0.0).right));
+static BODY_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(PLAYER.rx + OVERLAP_MARGIN));
+
+/// What is asked of a level. Corners are the same corners in both rows of a question: who is free in the one and stopped by the
 /// other does not slide down beside a wall as if on steps.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Question {
     Room(Rows),
     Passes(Rows, Rows),
     Stops(Rows, i32),
+    /// Whether a body that covers these rows is free of lava.
+    Dry(Rows),
+    /// Whether it covers the coin.
+    Coin(Rows),
 }
 
 /// Where a player touches things, at a height.
@@ -55,37 +59,32 @@ pub(super) struct Touched {
 
 impl<'a> Ground<'a> {
     pub fn new(level: &'a Level) -> Self {
-        let body = Body { x: 0.0, y: 0.0, ..Body::player() };
         let blocks = |kind: fn(&Spawn) -> Option<Body>| level.spawns.iter().filter_map(kind);
-        let crates: Vec<_> = blocks(Spawn::solid_crate).map(|block| (block, beside(&block, &body, true))).collect();
+        let crates: Vec<_> = blocks(Spawn::solid_crate).map(|block| (block, beside(&block, &PLAYER, true))).collect();
         let has_enemies = blocks(Spawn::enemy).next().is_some();
         Self {
             level,
-            body,
-            corner_columns: columns(corners(&body, 0.0, 0.0).right),
-            body_columns: columns(body.rx + OVERLAP_MARGIN),
             answers: HashMap::new(),
-            touched: HashMap::new(),
             enemies_lend: has_enemies && !crates.is_empty(),
             crates,
-            saws: blocks(Spawn::saw).map(|saw| (saw, beside(&saw, &body, false))).collect(),
+            saws: blocks(Spawn::saw).map(|saw| (saw, beside(&saw, &PLAYER, false))).collect(),
         }
     }
 
     /// The player's body with its centre at this height.
     pub fn body(&self, y: f32) -> Body {
-        Body { y, ..self.body }
+        Body { y, ..*PLAYER }
     }
 
     /// The rows of the corners of a player at this height.
     pub fn rows(&self, y: f32) -> Rows {
-        let Corners { low, high, .. } = corners(&self.body, 0.0, y);
+        let Corners { low, high, .. } = corners(&PLAYER, 0.0, y);
         [low.floor() as i32, high.floor() as i32]
     }
 
     /// The row in which a player at this height looks for support.
     pub fn feet(&self, y: f32) -> i32 {
-        (y - (self.body.ry + FOOT_MARGIN)).floor() as i32
+        (y - (PLAYER.ry + FOOT_MARGIN)).floor() as i32
     }
 
     /// Where all corners may be free, for corners in these rows.
@@ -104,8 +103,11 @@ impl<'a> Ground<'a> {
     }
 
     fn ask(&mut self, question: Question) -> Bins {
-        let (tiles, columns) = (&self.level.tiles, &self.corner_columns);
+        let (tiles, columns) = (&self.level.tiles, &*CORNER_COLUMNS);
         let is_wall = |column, row| tiles.get(column, row).is_wall();
+        let covers = |pair: [i32; 2], [low, high]: Rows, is_one: fn(Tile) -> bool| {
+            pair.iter().any(|&column| (low..=high).any(|row| is_one(tiles.get(column, row))))
+        };
         let is_free = |pair: [i32; 2], rows: Rows| !pair.iter().any(|&x| rows.iter().any(|&row| is_wall(x, row)));
         *self.answers.entry(question).or_insert_with(|| match question {
             Question::Room(rows) => any(columns, |pair| is_free(pair, rows)),
@@ -113,38 +115,19 @@ impl<'a> Ground<'a> {
             Question::Stops(here, row) => {
                 any(columns, |pair| is_free(pair, here) && pair.iter().any(|&column| is_wall(column, row)))
             }
+            Question::Dry(rows) => any(&BODY_COLUMNS, |pair| !covers(pair, rows, Tile::is_lava)),
+            Question::Coin(rows) => any(&BODY_COLUMNS, |pair| covers(pair, rows, |tile| tile == Tile::Coin)),
         })
     }
 
     /// What a player at this height touches.
     pub fn touched(&mut self, y: f32) -> Touched {
-        if let Some(&known) = self.touched.get(&y.to_bits()) {
-            return known;
-        }
-        let touched = Touched { alive: self.alive(y), coin: self.covers(y, |tile| tile == Tile::Coin) };
-        self.touched.insert(y.to_bits(), touched);
-        touched
-    }
-
-    fn alive(&self, y: f32) -> Bins {
-        let rows = self.touched_rows(y);
-        let is_lava = |column: &i32| rows.clone().any(|row| self.level.tiles.get(*column, row).is_lava());
-        let dry = any(&self.body_columns, |pair| !pair.iter().any(is_lava));
+        let reach = PLAYER.ry + OVERLAP_MARGIN;
+        let rows = [(y - reach) as i32, (y + reach) as i32];
+        let (dry, coin) = (self.ask(Question::Dry(rows)), self.ask(Question::Coin(rows)));
         let body = self.body(y);
         let saws = self.saws.iter().filter(|(saw, _)| Body { x: saw.x, ..body }.overlaps(saw, -SLACK));
-        saws.fold(dry, |alive, (_, deadly)| alive & !*deadly)
-    }
-
-    /// Where a player at this height may cover such a tile.
-    fn covers(&self, y: f32, is_one: fn(Tile) -> bool) -> Bins {
-        let rows = self.touched_rows(y);
-        let holds = |column: &i32| rows.clone().any(|row| is_one(self.level.tiles.get(*column, row)));
-        any(&self.body_columns, |pair| pair.iter().any(holds))
-    }
-
-    fn touched_rows(&self, y: f32) -> RangeInclusive<i32> {
-        let reach = self.body.ry + OVERLAP_MARGIN;
-        (y - reach) as i32..=(y + reach) as i32
+        Touched { alive: saws.fold(dry, |alive, (_, deadly)| alive & !*deadly), coin }
     }
 }
 

@@ -5,10 +5,7 @@ use bevy_playbot::{
     bot::BlindBot,
 };
 
-use crate::game::Game;
-
-/// First words of the names of actions that do nothing.
-const IDLE: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay", "wait", "stand"];
+use crate::{game::Game, idle::is_named_idle};
 
 /// What agents can do.
 #[derive(Clone, Debug)]
@@ -26,19 +23,16 @@ impl Moves {
         let space = game.actions();
         let ActionSpace::Discrete(count) = space else { return Self { space, idle: 0, choices: Vec::new() } };
         let names = game.action_names();
-        let is_named_idle = |choice: &u32| {
-            let name = names.get(*choice as usize).map_or("", |name| name.split_whitespace().next().unwrap_or(""));
-            IDLE.contains(&name.to_lowercase().as_str())
-        };
+        let is_idle = |choice: &u32| is_named_idle(&names, *choice);
         let last = (count as u32).saturating_sub(1);
-        let idle = (0..=last).find(is_named_idle).unwrap_or(last);
+        let idle = (0..=last).find(is_idle).unwrap_or(last);
         let bots = game.blind_bots().into_iter().filter_map(|(_, bot)| match bot {
             BlindBot::Constant(ActionValue::Discrete(choice)) => Some(choice),
             _ => None,
         });
         let mut choices: Vec<u32> = Vec::new();
         for choice in bots.chain((0..=last).rev()) {
-            if choice != idle && !is_named_idle(&choice) && !choices.contains(&choice) {
+            if choice != idle && !is_idle(&choice) && !choices.contains(&choice) {
                 choices.push(choice);
             }
         }

@@ -67,7 +67,7 @@ impl ScoreTable {
             "called unsolvable",
             "defects per hour",
             "seconds to the first",
-            "minimised ticks",
+            "minimised actions",
             "of the original",
         ];
         let number = |number: Option<f64>| number.map_or_else(|| "–".to_owned(), readable);

@@ -35,7 +35,7 @@ pub struct TesterRow {
     pub found_per_hour: Option<f64>,
     /// Median of the seconds until a defect is found first, of those that are found.
     pub first_seconds: Option<f64>,
-    /// Median length of the minimised replays, in ticks.
+    /// Median length of the minimised replays, in actions that do something.
     pub minimised: Option<f64>,
     /// Median of their share of the original length.
     pub minimised_share: Option<f64>,
