@@ -110,7 +110,8 @@ fn torn_and_foreign_files_are_explained() {
         let error = read(&bytes[..length]).expect_err("torn").to_string();
         assert!(error.ends_with("the file is cut off: export the policy again"), "{length}: {error}");
     }
-    assert!(read(&[b'x'; 100]).expect_err("something else").to_string().contains("not safetensors"));
+    let error = read(&[b'x'; 100]).expect_err("something else").to_string();
+    assert!(error.contains("not safetensors") && error.contains("name one that playbot has written"), "{error}");
     let renamed = edit_header(&path, |header| {
         let tensor = header["critic.l1.bias"].take();
         header.as_object_mut().expect("a map").remove("critic.l1.bias");

@@ -49,22 +49,20 @@ impl LevelFiles {
         u64::try_from(index).ok()
     }
 
-    /// What is wrong if this level is to be the recorded one; `None` if it is.
+    /// What is wrong if this level is to be the recorded one, with what helps whoever recorded it; `None` if it is.
     pub fn difference(&self, level: u64, recorded: &LevelFile) -> Option<String> {
         match self.of(level) {
             Some(file) if file.hash == recorded.hash => None,
             Some(file) if file.path == recorded.path => Some(format!(
-                "the level file {} has the hash {:016x}, recorded was {:016x}: it was changed since; record it again, or \
-                 bring the recorded file back",
+                "the level file {} has the hash {:016x}, recorded was {:016x}: it was changed since; bring the \
+                 recorded file back",
                 file.path, file.hash, recorded.hash
             )),
             Some(file) => Some(format!(
                 "recorded was the level file {recorded}, which is not there any more; the level is {file} now: bring the \
-                 recorded file back, or record again"
+                 recorded file back"
             )),
-            None => Some(format!(
-                "recorded was the level file {recorded}, which is not there any more: bring it back, or record again"
-            )),
+            None => Some(format!("recorded was the level file {recorded}, which is not there any more: bring it back")),
         }
     }
 }
@@ -93,6 +91,7 @@ mod tests {
         assert_eq!(files.difference(0, &file("renamed.json", 0x1f)), None);
         let words = files.difference(0, &file("a.json", 0x2e)).expect("another level");
         assert!(words.contains("a.json has the hash 000000000000001f, recorded was 000000000000002e"), "{words}");
+        assert!(words.ends_with("bring the recorded file back"), "what is no recording is not recorded again: {words}");
         let words = files.difference(0, &file("b.json", 0x2e)).expect("another file");
         assert!(words.contains("b.json (hash 000000000000002e)") && words.contains("a.json"), "{words}");
         assert!(files.difference(1, &file("b.json", 0x2e)).expect("no level").contains("not there any more"));

@@ -40,6 +40,14 @@ fn bots_are_held_beside_people() {
     assert!(words.contains("12 levels of easy:0..11 were played by 1 person (alice) in 12 tries"), "{words}");
     let page = fs::read_to_string(folder.join("pages/people.html")).expect("written");
     assert_eq!(page.matches("<circle class=\"dot").count(), 36, "a dot for each level and measure");
+    for file in ["plots/people.png", "people.svg"] {
+        let (_, words) = done(folder, &["report", "calibrate", "out", "people.demo", "--plot", file]);
+        assert!(words.contains(&format!("plot: {file}")), "{words}");
+    }
+    let png = fs::read(folder.join("plots/people.png")).expect("written");
+    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
+    let svg = fs::read_to_string(folder.join("people.svg")).expect("written");
+    assert_eq!(svg.matches("<circle ").count(), 39, "a dot for each level and measure, and one for each legend");
     let found = json_lines(&done(folder, &["report", "calibrate", "out", "people.demo", "--json"]).0).remove(0);
     assert_eq!(found["levels"].as_array().map(Vec::len), Some(12));
     assert_eq!((found["people"][0].as_str(), found["testers"][0].as_str()), (Some("alice"), Some("search")));
@@ -57,6 +65,7 @@ fn bots_are_held_beside_people() {
         (&["out", "none.demo"], "none.demo"),
         (&["none", "people.demo"], "none has no results.json"),
         (&["out", "people.demo", "--out", "people.pdf"], ".html or .md"),
+        (&["out", "people.demo", "--plot", "people.gif"], ".png or .svg"),
         (&["out"], "RECORDING"),
     ] {
         let (_, told) = ended(folder, &[&["report", "calibrate"], args].concat(), 3);

@@ -95,10 +95,13 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
 
     write(&open);
     let (_, words) = ended(folder, &["replay", &file], 3);
-    assert!(words.contains("it was changed since"), "{words}");
+    assert!(words.contains("it was changed since") && words.contains("remove the finding"), "{words}");
     fs::remove_file(folder.join("sealed.json")).expect("it is there");
     let (_, words) = ended(folder, &["replay", &file], 3);
-    assert!(words.contains("the level no longer exists"), "{words}");
+    assert!(words.contains("the level no longer exists") && words.contains("bring the recorded file back"), "{words}");
+    let (_, words) = ended(folder, &["replay", "out"], 3);
+    assert!(words.contains("out is a folder with ") && words.contains("such as out/findings/"), "{words}");
+    assert!(words.contains("test --regress out"), "{words}");
     let (rows, _) = regress(&["--today", "2027-02-01", "--json"], 1);
     assert!(json_lines(&rows).iter().any(|row| row["status"] == "unplayable"), "{rows}");
 }
@@ -115,7 +118,8 @@ fn what_is_no_finding_is_told() {
         (&["replay", "a.demo", "--minimise"], "--out"),
         (&["replay", "a.demo", "--apng", "a.gif"], ".png"),
         (&["test", "--regress", "empty"], "empty has no findings"),
-        (&["test", "--regress", "none"], "none"),
+        (&["test", "--regress", "none"], "none is no folder"),
+        (&["replay", "empty"], "empty has no findings"),
         (&["test", "coinrun", "--regress", "empty"], "--regress"),
         (&["test", "--today", "2027-01-31"], "--regress"),
     ] {

@@ -197,7 +197,8 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
         errors(&output)
     };
     run("before", &["--seed", "1"], 0);
-    let words = run("same", &["--seed", "2", "--against", "before"], 0);
+    // The file stands for its folder.
+    let words = run("same", &["--seed", "2", "--against", "before/results.json"], 0);
     assert!(words.contains("nothing has changed by more than chance in 30 levels"), "{words}");
     // Earlier results in which level 7 was not solved by the one that leaves nothing to chance, and level 3 was proved
     // unsolvable.
@@ -215,7 +216,9 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
         .expect("writable");
     let words = run("refused", &["--against", "other"], 3);
     assert!(words.contains("other cannot be compared with: versions 0 and 1 of `coinrun`"), "{words}");
-    assert!(run("before", &["--against", "before", "--force"], 3).contains("cannot be compared with themselves"));
+    for before in ["before", "before/results.json"] {
+        assert!(run("before", &["--against", before, "--force"], 3).contains("cannot be compared with themselves"));
+    }
 }
 
 /// A line of results in which `search` failed on one level, and another level was proved unsolvable.
@@ -252,6 +255,18 @@ fn the_page_has_pictures_of_the_levels_and_is_made_again_to_the_byte() {
     done(folder, &["report", "html", "out"]);
     let page = read(folder, "out/report.html");
     assert!(page.contains("version 0 of `coinrun` was tested") && !page.contains("<figure>"), "{page}");
+}
+
+#[test]
+fn results_outlive_reports_that_cannot_be_written() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("out/junit.xml/taken")).expect("writable");
+    let output = test(folder, "out", &["--levels", "easy:0..0", "--bot", "random"]);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
+    let words = errors(&output);
+    assert!(words.contains("the results in out are whole") && words.contains("playbot report html out"), "{words}");
+    assert_eq!(results(folder, "out")["levels"].as_array().map(Vec::len), Some(1));
 }
 
 #[cfg(unix)]

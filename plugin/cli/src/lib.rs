@@ -53,6 +53,7 @@ mod study_run;
 mod test;
 mod trace;
 mod train;
+mod unwritten;
 mod usage_error;
 mod view;
 #[cfg(feature = "window")]

@@ -24,7 +24,8 @@ const LAST: u64 = 1_999_999;
 /// Plant defects: make a set of broken games and levels, and name sound levels beside them.
 ///
 /// Every kind of defect that the games have, their own ones and those of all games, is planted a few times, each time into
-/// another level that the game's own bot solves, or with another variant. The same seed makes the same files.
+/// another level that the game's own bot solves, or with another variant. A game's own defects of rules are planted where some
+/// bot's episode goes another way with them. The same seed makes the same files.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bugs make --seed 1 --out runs/bugs
@@ -87,13 +88,13 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let sources = sources(args, games)?;
     output::make_folder(&args.out)?;
     let plan = MakePlan { seed: args.seed, per_kind: args.per_kind, sound: args.sound, threads: args.threads.threads };
-    let bar = progress::bar("bugs make", plan.levels(sources.len()), "sound levels");
-    let made = make_bugs(&sources, &plan, &|levels| bar.inc(levels));
+    let bar = progress::bar("bugs make", plan.steps(&sources), "levels and mutants");
+    let made = make_bugs(&sources, &plan, &|steps| bar.inc(steps));
     bar.finish_and_clear();
     let made = made?;
     made.set.write(&args.out, &made.levels, args.force)?;
-    for NoPlace { game, class, planted, wanted } in &made.without_place {
-        tell!("warning: {game}: only {planted} of {wanted} levels with the defect {class} were found");
+    for missing in &made.without_place {
+        tell!("warning: {}", missing.describe());
     }
     print(&made.set, &made.without_place, args.json)?;
     tell!("planted: {}", args.out.display());
@@ -155,8 +156,10 @@ fn print(set: &BugSet, without_place: &[NoPlace], json: bool) -> Result<(), CliE
     if json {
         let class = |(&(game, class), &(levels, rules)): (&(&str, &str), &(u64, u64))| json!({ "game": game, "class": class, "levels": levels, "rules": rules });
         let missing = |missing: &NoPlace| {
-            let NoPlace { game, class, planted, wanted } = missing;
-            json!({ "game": game, "class": class, "planted": planted, "wanted": wanted })
+            let NoPlace { game, class, planted, wanted, without_effect } = missing;
+            json!({
+                "game": game, "class": class, "planted": planted, "wanted": wanted, "without_effect": without_effect,
+            })
         };
         return print_line(json!({
             "seed": set.seed,

@@ -1,9 +1,9 @@
 //! The verb.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use playbot_lab::{
-    findings::{Checks, FindingStatus, Minimised, Recheck, StoredFinding, recheck},
+    findings::{Checks, FindingStatus, Minimised, Recheck, StoredFinding, list_findings, recheck},
     game::Game,
     games::{Artifact, Games},
 };
@@ -15,8 +15,12 @@ use super::window::show;
 use super::{picture::Pictures, shorter::write_shorter, told::Told};
 use crate::{
     error::{CliError, Outcome},
-    output, progress,
+    number::counted,
+    output, program, progress,
 };
+
+/// Findings of a folder that are named instead of it.
+const MOST_NAMED: usize = 3;
 
 /// Play a finding again: does it still happen, and how does it look?
 ///
@@ -64,6 +68,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.finding.is_dir() {
+        return Err(instead_of(&args.finding));
+    }
     let finding = StoredFinding::read(&args.finding)?;
     let game = games.of_file(Artifact::Finding, &args.finding, &finding.header.game)?;
     let pictures = Pictures { still: args.png.as_deref(), animated: args.apng.as_deref(), scale: args.scale };
@@ -90,6 +97,22 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         show(game, shown)?;
     }
     Ok(if status == FindingStatus::StillThere { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// What to name instead of a folder.
+fn instead_of(folder: &Path) -> CliError {
+    let found = match list_findings(folder) {
+        Ok(found) => found,
+        Err(error) => return error.into(),
+    };
+    let names: Vec<String> = found.iter().take(MOST_NAMED).map(|(_, path)| path.display().to_string()).collect();
+    let folder = folder.display();
+    CliError::Usage(format!(
+        "{folder} is a folder with {}: name one, such as {}, or play all of them with `{} test --regress {folder}`",
+        counted(found.len() as u64, "finding"),
+        names.join(", "),
+        program::name()
+    ))
 }
 
 fn check_out(args: &Args) -> Result<(), CliError> {

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use playbot_lab::{
     calibration::{Calibration, CalibrationError},
     games::Games,
-    verdict::ResultLines,
+    verdict::{ResultLines, results_folder},
 };
 
 use crate::{
     error::{CliError, Outcome, print_line},
     open, output,
+    plot::PlotFile,
 };
 
 /// Levels that are printed; files have more.
@@ -27,6 +28,7 @@ const MOST_PRINTED: usize = 40;
 #[command(after_help = "Examples:
   playbot report calibrate runs/test people.demo
   playbot report calibrate runs/test alice.demo bob.demo --out people.html
+  playbot report calibrate runs/test people.demo --plot people.png
   playbot report calibrate runs/test recordings --json")]
 pub struct Args {
     /// Folder of the results.
@@ -38,6 +40,9 @@ pub struct Args {
     /// File to write: a page with scatter plots (.html), or Markdown (.md).
     #[arg(long, value_name = "FILE", value_parser = page)]
     out: Option<PathBuf>,
+    /// Draw the scatter plots into this file, a .png or .svg.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     /// Print one line of JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -53,12 +58,14 @@ fn page(text: &str) -> Result<PathBuf, String> {
 }
 
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
-    let lines = ResultLines::open(&args.results)?;
+    let results = results_folder(&args.results);
+    let lines = ResultLines::open(results)?;
     if let Some(out) = &args.out {
         output::prepare(out)?;
     }
+    let plot = args.plot.as_deref().map(PlotFile::new).transpose()?;
     let game = games.get(&lines.record().game).ok();
-    let found = Calibration::read(&args.results, &args.recordings, game).map_err(explain)?;
+    let found = Calibration::read(results, &args.recordings, game).map_err(explain)?;
     if args.json {
         let line = serde_json::to_string(&found)
             .map_err(|error| CliError::Io(format!("the comparison cannot be written as JSON: {error}")))?;
@@ -73,6 +80,10 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         let text = if is_page { found.to_html() } else { found.to_markdown() };
         output::write(out, text.as_bytes())?;
         tell!("{}", out.display());
+    }
+    if let Some(plot) = plot {
+        plot.write(&found.to_drawing())?;
+        tell!("plot: {}", plot.path().display());
     }
     Ok(Outcome::Pass)
 }

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use playbot_lab::{
     games::Games,
-    verdict::{Comparison, ResultLines},
+    verdict::{Comparison, ResultLines, results_folder},
     verdict_report::{HtmlReport, REPORT, write_html},
 };
 
-use super::failure;
 use crate::{
     error::{CliError, Outcome},
-    output, program,
+    output, program, unwritten,
 };
 
 /// Make the page of results again: one file that opens without network, with a table of the levels that can be sorted and
@@ -35,14 +34,16 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
-    let lines = ResultLines::open(&args.results)?;
-    let file = args.out.clone().unwrap_or_else(|| args.results.join(REPORT));
+    let folder = results_folder(&args.results);
+    let lines = ResultLines::open(folder)?;
+    let file = args.out.clone().unwrap_or_else(|| folder.join(REPORT));
     output::prepare(&file)?;
-    let comparison = args.against.as_ref().map(|before| Comparison::read(before, &args.results)).transpose()?;
+    let before = args.against.as_deref().map(results_folder);
+    let comparison = before.map(|before| Comparison::read(before, folder)).transpose()?;
     let game = games.get(&lines.record().game).ok();
     let report = HtmlReport { game, comparison: comparison.as_ref(), program: program::name() };
-    write_html(&args.results, &file, &report).map_err(|error| {
-        failure::told(error, "the results are unchanged: make room or rights there, or name another file with --out")
+    write_html(folder, &file, &report).map_err(|error| {
+        unwritten::told(error, "the results are unchanged: make room or rights there, or name another file with --out")
     })?;
     tell!("{}", file.display());
     Ok(Outcome::Pass)

@@ -4,13 +4,13 @@ use std::{fs, path::PathBuf};
 
 use playbot_lab::{
     games::Games,
-    verdict::{Comparison, RESULTS, ResultLines, TestRecord, merge},
+    verdict::{Comparison, RESULTS, ResultLines, TestRecord, merge, results_folder},
 };
 
-use super::failure;
 use crate::{
     error::{CliError, Outcome},
     test::{Results, tell_results},
+    unwritten,
 };
 
 /// Joins the results of all shards of a test: the same bytes as those of the whole test.
@@ -39,34 +39,36 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
-    check_out(args)?;
-    let Some(first) = args.shards.first() else {
+    let shards: Vec<PathBuf> = args.shards.iter().map(|shard| results_folder(shard).to_owned()).collect();
+    check_out(args, &shards)?;
+    let Some(first) = shards.first() else {
         return Err(CliError::Usage("name the folders of the shards".to_owned()));
     };
     let record = TestRecord { shard: None, ..ResultLines::open(first)?.record().clone() };
     // Without the game there are no pictures, and all else is the same.
     let game = games.get(&record.game).ok();
-    let results = Results { folder: &args.out, against: args.against.as_deref(), game, json: args.json };
+    let against = args.against.as_deref().map(results_folder);
+    let results = Results { folder: &args.out, against, game, json: args.json };
     results.check_folders()?;
     // Nothing is written where it turns out that nothing can be compared.
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
     }
-    merge(&args.shards, &args.out).map_err(|error| {
-        failure::told(error, "the shards are unchanged: make room or rights there and call this again")
+    merge(&shards, &args.out).map_err(|error| {
+        unwritten::told(error, "the shards are unchanged: make room or rights there and call this again")
     })?;
     tell_results(&results)
 }
 
 /// Checks that the joined results take the place of nothing that is needed.
-fn check_out(args: &Args) -> Result<(), CliError> {
+fn check_out(args: &Args, shards: &[PathBuf]) -> Result<(), CliError> {
     let out = args.out.display();
     if args.out.is_file() {
         return Err(CliError::Usage(format!("{out} is a file: name a folder to write into")));
     }
     // A path that is not there is no folder of a shard.
     if let Ok(folder) = fs::canonicalize(&args.out)
-        && args.shards.iter().any(|shard| fs::canonicalize(shard).is_ok_and(|shard| shard == folder))
+        && shards.iter().any(|shard| fs::canonicalize(shard).is_ok_and(|shard| shard == folder))
     {
         return Err(CliError::Usage(format!("--out {out} is the folder of a shard: choose another --out")));
     }

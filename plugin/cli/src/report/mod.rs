@@ -1,7 +1,6 @@
 //! `playbot report`.
 
 mod calibrate;
-mod failure;
 mod html;
 mod merge;
 mod verb;

@@ -15,7 +15,7 @@ use playbot_lab::{
 use crate::{
     error::{CliError, Outcome, print_line},
     number::counted,
-    program,
+    program, unwritten,
 };
 
 /// Most findings whose replay is named.
@@ -58,9 +58,15 @@ impl Results<'_> {
 /// found: in the comparison if there is one, else in the results.
 pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     let comparison = results.against.map(|before| Comparison::read(before, results.folder)).transpose()?;
-    let overview = write_reports(results.folder, comparison.as_ref(), program::name())?;
+    let folder = results.folder.display();
+    let next = format!(
+        "the results in {folder} are whole: make room or rights there, and make their page with `{} report html {folder}`",
+        program::name()
+    );
+    let not_written = |error| unwritten::told(error, &next);
+    let overview = write_reports(results.folder, comparison.as_ref(), program::name()).map_err(not_written)?;
     let report = HtmlReport { game: results.game, comparison: comparison.as_ref(), program: program::name() };
-    write_html(results.folder, &results.folder.join(REPORT), &report)?;
+    write_html(results.folder, &results.folder.join(REPORT), &report).map_err(not_written)?;
     if results.json {
         let mut lines = ResultLines::open(results.folder)?;
         while let Some(line) = lines.next_line()? {
@@ -78,7 +84,7 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
         tell_comparison(comparison);
     }
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
-    tell!("{}: {}", results.folder.display(), names.collect::<Vec<_>>().join(", "));
+    tell!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
     let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
 }

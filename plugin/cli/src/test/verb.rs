@@ -7,7 +7,10 @@ use playbot_lab::{
     game::Game,
     games::Games,
     split::LevelSplit,
-    verdict::{Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, run_tests_keeping},
+    verdict::{
+        Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, results_folder,
+        run_tests_keeping,
+    },
 };
 
 use super::{
@@ -105,7 +108,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(name)?;
     let plan = plan(args, game)?;
     let record = plan.record(game);
-    let results = Results { folder: out, against: args.against.as_deref(), game: Some(game), json: args.json };
+    let against = args.against.as_deref().map(results_folder);
+    let results = Results { folder: out, against, game: Some(game), json: args.json };
     results.check_folders()?;
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;

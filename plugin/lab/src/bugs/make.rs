@@ -6,6 +6,7 @@ use bevy_playbot::level_files::LevelFile;
 use playbot_learner::{Streams, rng::below};
 
 use super::{
+    effect::{Bases, MOST_TRIED, bases_with_effect, stream},
     error::BugError,
     kinds::defect_kinds,
     place::plant_level,
@@ -54,11 +55,11 @@ pub struct Made {
     pub set: BugSet,
     /// Texts of the levels that a defect was planted into, by the names of their mutants.
     pub levels: Vec<(String, String)>,
-    /// Kinds for which not enough levels had a place.
+    /// Kinds for which not enough levels had a place, or that change nothing.
     pub without_place: Vec<NoPlace>,
 }
 
-/// A kind of defect for which not enough levels had a place.
+/// A kind of defect for which not enough levels had a place, or a variant of which changes nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoPlace {
     /// The game.
@@ -69,12 +70,32 @@ pub struct NoPlace {
     pub planted: u32,
     /// How many were to be.
     pub wanted: u32,
+    /// Variants, of a defect of rules, that change nothing on any level that was tried.
+    pub without_effect: BTreeSet<u32>,
+}
+
+impl NoPlace {
+    /// What is missing and why, in words.
+    pub fn describe(&self) -> String {
+        let Self { game, class, planted, wanted, without_effect } = self;
+        let start = format!("{game}: only {planted} of {wanted} mutants with the defect {class} were made");
+        if without_effect.is_empty() {
+            return format!("{start}: no other level has a place for it");
+        }
+        let variants: Vec<String> = without_effect.iter().map(u32::to_string).collect();
+        format!("{start}: no bot notices its variant {} on any of {MOST_TRIED} levels", variants.join(", "))
+    }
 }
 
 impl MakePlan {
-    /// Sound levels that are looked for in all of so many games, for a bar.
-    pub fn levels(&self, games: usize) -> u64 {
-        self.sound + games as u64 * self.bases()
+    /// Sound levels that are looked for, and mutants for which a level is looked for, in all of these games: for a bar.
+    pub fn steps(&self, sources: &[Source]) -> u64 {
+        let rules = |source: &Source| {
+            let kinds = source.game.defects();
+            kinds.iter().filter(|kind| matches!(kind.plant, Plant::Rules { .. })).count() as u64
+        };
+        let mutants: u64 = sources.iter().map(|source| rules(source) * u64::from(self.per_kind)).sum();
+        self.sound + sources.len() as u64 * self.bases() + mutants
     }
 
     fn bases(&self) -> u64 {
@@ -89,7 +110,9 @@ impl MakePlan {
 }
 
 /// Plants every kind of defect into every game. The same seed gives the same set, whatever the number of threads; each
-/// mutant depends on nothing but the seed, its game, class and number. `progress` hears how many more levels were found sound.
+/// mutant depends on nothing but the seed, its game, class and number. A defect of rules that a game has itself is planted
+/// where some bot's episode goes another way with it: that of the demonstrator, of a bot that holds an action, of chaos or of
+/// random actions. `progress` hears how many more levels were found sound, and how many of those mutants have their level.
 ///
 /// # Errors
 ///
@@ -106,8 +129,9 @@ pub fn make_bugs(sources: &[Source], plan: &MakePlan, progress: &(dyn Fn(u64) + 
         let (beside, bases) = levels.split_at(usize::try_from(share).unwrap_or(usize::MAX).min(levels.len()));
         made.set.games.push(BugGame { name: game.name().to_owned(), version: game.version() });
         made.set.sound.extend(ranges(game.name(), mode, beside));
+        let noticed = bases_with_effect(game, (mode, bases), &game.defects(), plan, progress);
         for kind in defect_kinds(game) {
-            plant(&mut made, game, (mode, bases), &kind, plan)?;
+            plant(&mut made, game, (mode, bases), &kind, &noticed, plan)?;
         }
     }
     Ok(made)
@@ -121,23 +145,32 @@ fn start(source: &Source, plan: &MakePlan, wanted: u64) -> u64 {
     first + below(&mut rng, (last - first + 1).saturating_sub(4 * wanted))
 }
 
-/// Plants all mutants of a kind.
+/// Plants all mutants of a kind. Those of rules that are among the `noticed` have their levels already.
 fn plant(
     made: &mut Made,
     game: &dyn Game,
     (mode, bases): (&str, &[u64]),
     kind: &DefectKind,
+    noticed: &Bases,
     plan: &MakePlan,
 ) -> Result<(), BugError> {
-    let mut taken = BTreeSet::new();
+    let (mut taken, mut without_effect) = (BTreeSet::new(), BTreeSet::new());
     let mut planted = 0;
     for number in 0..plan.per_kind {
         let id = format!("{}-{}-{planted:02}", game.name(), kind.class);
-        let mut rng = Streams::new(plan.seed).stream(&format!("{}/{}", game.name(), kind.class), u64::from(number));
+        let mut rng = stream(plan.seed, game, kind, number);
         let (level, part) = match &kind.plant {
             Plant::Rules { variants, .. } => {
-                let base = bases[below(&mut rng, bases.len() as u64) as usize];
-                (base, PlantedPart::Rules { variant: number % (*variants).max(1) })
+                let variant = number % (*variants).max(1);
+                let base = match noticed.get(&(kind.class, number)) {
+                    Some(Some(base)) => *base,
+                    Some(None) => {
+                        without_effect.insert(variant);
+                        continue;
+                    }
+                    None => bases[below(&mut rng, bases.len() as u64) as usize],
+                };
+                (base, PlantedPart::Rules { variant })
             }
             Plant::Level(change) => {
                 match plant_level(game, kind.class, (mode, bases), &**change, &mut rng, &mut taken)? {
@@ -163,7 +196,7 @@ fn plant(
     }
     if planted < plan.per_kind {
         let (game, class) = (game.name().to_owned(), kind.class.to_owned());
-        made.without_place.push(NoPlace { game, class, planted, wanted: plan.per_kind });
+        made.without_place.push(NoPlace { game, class, planted, wanted: plan.per_kind, without_effect });
     }
     Ok(())
 }

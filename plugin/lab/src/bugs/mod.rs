@@ -7,6 +7,7 @@
 //! - [`make_bugs`] plants a [`BugSet`], reproducibly from a seed, which is kept in a folder.
 //! - [`score`] measures which testers find them.
 
+mod effect;
 mod error;
 mod general;
 mod kinds;

@@ -1,7 +1,10 @@
 //! Results beside recordings, as a page with charts and as Markdown.
 
 use super::{agreement::Measure, read::Calibration};
-use crate::report::{Chart, Curve, PlainTable, Report, Section};
+use crate::{
+    drawing::Drawing,
+    report::{Chart, Curve, PlainTable, Report, Section, draw_scatters},
+};
 
 /// Most levels in the tables of a page.
 const MOST_LEVELS: usize = 2000;
@@ -17,7 +20,7 @@ impl Calibration {
         };
         let plots = Section {
             text: "Each dot is a level.".to_owned(),
-            charts: Measure::ALL.into_iter().filter_map(|measure| self.scatter(measure)).collect(),
+            charts: self.scatters(),
             ..section("People and testers")
         };
         let levels = Section { tables: vec![self.level_table(MOST_LEVELS).into()], ..section("Levels") };
@@ -38,6 +41,15 @@ impl Calibration {
         parts.push("## Levels".to_owned());
         parts.push(markdown(&self.level_table(MOST_LEVELS)));
         parts.join("\n\n") + "\n"
+    }
+
+    /// The scatter plots of all measures as one picture.
+    pub fn to_drawing(&self) -> Drawing {
+        draw_scatters(&self.scatters())
+    }
+
+    fn scatters(&self) -> Vec<Chart> {
+        Measure::ALL.into_iter().filter_map(|measure| self.scatter(measure)).collect()
     }
 
     /// A dot for each level, the number of people to the right and that of a tester up; `None` if no level has both.

@@ -45,10 +45,16 @@ pub enum FindingError {
     },
     /// A folder has no findings.
     #[error(
-        "{} has no findings: name a folder with .finding files, or one that `playbot test` has written with findings in it",
-        .0.display()
+        "{} has no findings: name a folder with .finding files, or one that `playbot test` has written with findings in it; \
+         where a test has found nothing, there is nothing to play again", .0.display()
     )]
     None(PathBuf),
+    /// There is no such folder.
+    #[error(
+        "{} is no folder: name one with .finding files, such as one that `playbot test` has written; a single finding is \
+         played by `playbot replay`", .0.display()
+    )]
+    NoFolder(PathBuf),
     /// The pins cannot be understood.
     #[error(
         "{}, line {line}, column {column}: {message}; write \

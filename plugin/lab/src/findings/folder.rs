@@ -17,9 +17,12 @@ pub const FINDINGS: &str = "findings";
 ///
 /// # Errors
 ///
-/// [`FindingError::None`] if there are none, or the folder cannot be read.
+/// [`FindingError::None`] if there are none, [`FindingError::NoFolder`] if it is none; or the folder cannot be read.
 pub fn list_findings(folder: &Path) -> Result<Vec<(String, PathBuf)>, FindingError> {
-    let mut found = files_in(folder).map_err(io_error("list", folder))?;
+    let mut found = files_in(folder).map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => FindingError::NoFolder(folder.into()),
+        _ => io_error("list", folder)(source),
+    })?;
     let below = folder.join(FINDINGS);
     if below.is_dir() {
         found.extend(files_in(&below).map_err(io_error("list", &below))?);
@@ -103,6 +106,10 @@ mod tests {
         let none: Result<Vec<String>, _> = names(&one);
         assert!(matches!(none, Err(FindingError::None(_))));
         assert!(one.join(FINDINGS).join("notes.txt").exists(), "what is no finding stays");
-        assert!(list_findings(&parent.path().join("none")).expect_err("no folder").is_usage());
+        for no_folder in [parent.path().join("none"), all.join("c.finding")] {
+            let error = list_findings(&no_folder).expect_err("no folder");
+            assert!(error.is_usage() && error.to_string().contains("is no folder: name one"), "{error}");
+        }
+        assert!(list_findings(&one).expect_err("none").to_string().contains("nothing to play again"));
     }
 }

@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::stored::StoredFinding;
 use crate::{
     game::{Game, read_level_designs},
-    level_files::is_level_files,
+    level_files::{LevelFileError, is_level_files},
 };
 
 /// Why a finding cannot be played again, in words.
@@ -42,25 +42,46 @@ impl StoredFinding {
             )));
         }
         if !is_level_files(&header.mode) {
-            return game.check_mode(&header.mode).map_err(gone);
+            return game.check_mode(&header.mode).map_err(|error| {
+                Unplayable(format!("the level no longer exists: {error}; test the levels again, or remove the finding"))
+            });
         }
-        let designs = read_level_designs(game, &header.mode).map_err(gone)?;
+        let designs = read_level_designs(game, &header.mode).map_err(|error| gone(&error))?;
         match &episode.level_file {
             Some(file) => {
-                designs.files().difference(episode.level_seed, file).map_or(Ok(()), |what| Err(Unplayable(what)))
+                let difference = designs.files().difference(episode.level_seed, file);
+                difference.map_or(Ok(()), |what| Err(Unplayable(format!("{what}, or remove the finding"))))
             }
             None => Err(Unplayable("it names no level file, though its levels are files".to_owned())),
         }
     }
 }
 
-fn gone(error: impl std::fmt::Display) -> Unplayable {
-    Unplayable(format!("the level no longer exists: {error}"))
+/// A level file that cannot be read. What is said of patterns elsewhere helps nobody here.
+fn gone(error: &LevelFileError) -> Unplayable {
+    let what = match error {
+        LevelFileError::NoFiles { pattern, folder } => format!("there is no file {pattern}, seen from {folder}"),
+        error => error.to_string(),
+    };
+    Unplayable(format!("the level no longer exists: {what}; bring the recorded file back, or remove the finding"))
 }
 
 #[cfg(test)]
 mod tests {
+    use bevy::prelude::KeyCode;
+
     use crate::{findings::testing::stored, foreign::ForeignGame};
+
+    #[test]
+    fn a_level_file_that_is_gone_is_told_without_patterns() {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {}).keys([vec![], vec![KeyCode::Space]]);
+        let mut finding = stored();
+        finding.header.mode = "files:none/gone.json".to_owned();
+        let words = finding.check_playable(&game).expect_err("it is gone").to_string();
+        assert!(words.starts_with("the level no longer exists: there is no file none/gone.json"), "{words}");
+        assert!(words.ends_with("bring the recorded file back, or remove the finding"), "{words}");
+        assert!(!words.contains('*'), "{words}");
+    }
 
     #[test]
     fn other_games_and_versions_are_named() {

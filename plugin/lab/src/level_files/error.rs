@@ -61,6 +61,12 @@ pub enum LevelFileError {
         /// The answer of the operating system.
         why: String,
     },
+    /// It is something that cannot be read from its beginning to its end.
+    #[error("{path} is no regular file, but a folder, a pipe or a device: name a file with a level")]
+    NotAFile {
+        /// Its path.
+        path: String,
+    },
     /// It holds no letters.
     #[error(
         "{path}, line {line}: byte {byte} of the line is no text in UTF-8: save the level as UTF-8, or is it another file?"

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::File,
+    fs::{self, File},
     io::Read,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -82,6 +82,10 @@ fn understand(path: &str, text: &str, parse: Parse) -> Result<DrawnLevel, LevelF
 fn read_text(path: &str) -> Result<String, LevelFileError> {
     let unreadable =
         |error: std::io::Error| LevelFileError::Unreadable { path: path.to_owned(), why: error.to_string() };
+    // Opening a pipe waits for somebody who writes into it.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(LevelFileError::NotAFile { path: path.to_owned() });
+    }
     let file = File::open(path).map_err(unreadable)?;
     let bytes = file.metadata().map_err(unreadable)?.len();
     if bytes > MOST_BYTES {
@@ -99,4 +103,28 @@ fn read_text(path: &str) -> Result<String, LevelFileError> {
         let byte = 1 + before.iter().rev().take_while(|&&byte| byte != b'\n').count();
         LevelFileError::NoText { path: path.to_owned(), line, byte }
     })
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
+        Ok(LevelDesign::new((), text))
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_and_not_waited_for() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join("pipe.json");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        let mut refused = vec!["/dev/null".to_owned(), folder.path().display().to_string()];
+        if made.is_ok_and(|status| status.success()) {
+            refused.push(pipe.display().to_string());
+        }
+        for path in refused {
+            let error = read_one(&path, &parse).map(drop).expect_err("no file");
+            assert_eq!(error, LevelFileError::NotAFile { path: path.clone() });
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Reports: results as a table on the console, curves as SVG, and both in one HTML file.
 //!
 //! - [`Chart`] draws [`Curve`]s as SVG, [`to_svg`] several charts in one file, [`sparkline`] a curve as text.
+//! - [`draw_scatters`] draws the dots of charts as a [`Drawing`](crate::drawing::Drawing).
 //! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`]; a [`PlainTable`] holds any text.
 //! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
 //! - [`CellChart`] draws which cells of a level an explorer has reached.
@@ -19,6 +20,7 @@ mod mark;
 mod number;
 mod plain_text;
 mod result;
+mod scatter;
 mod sparkline;
 pub mod statistics;
 mod study;
@@ -35,6 +37,7 @@ pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
 pub use number::{percent, readable, readable_with_spread, whole};
 pub use result::{ResultRow, ResultTable};
+pub use scatter::draw_scatters;
 pub use sparkline::sparkline;
 pub use study::{StudyReport, StudyResult, SuccessCurve, TestResult, TrainingResult};
 pub use svg::to_svg;

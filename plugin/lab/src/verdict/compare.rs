@@ -17,6 +17,10 @@ use super::{
     results::ResultLines,
 };
 
+mod common_levels;
+
+use common_levels::{may_have_common_levels, no_common_level};
+
 /// Expected share of false alarms among the levels that are said to be easier or harder.
 pub const FALSE_DISCOVERY_RATE: f64 = 0.05;
 
@@ -87,8 +91,7 @@ impl Comparison {
             }
         }
         if comparison.levels == 0 {
-            let (one, other) = (&earlier.record().range, &lines.record().range);
-            let differences = vec![format!("no level is in {one} and in {other}")];
+            let differences = vec![no_common_level(earlier.record(), lines.record())];
             return Err(TestError::Incomparable { folder: before.into(), differences });
         }
         comparison.only_before = known.len() as u64;
@@ -225,7 +228,10 @@ struct Comparable {
 
 fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestError> {
     let earlier = ResultLines::open(before)?;
-    let differences = earlier.record().differences_of_game(record);
+    let mut differences = earlier.record().differences_of_game(record);
+    if differences.is_empty() && !may_have_common_levels(earlier.record(), record) {
+        differences.push(no_common_level(earlier.record(), record));
+    }
     let (common, mut left_out) = common_testers(earlier.record(), record);
     let other_detectors = other_detectors(earlier.record(), record);
     left_out.extend(other_detectors.iter().map(|name| format!("the detector `{name}` did not look so before and now")));

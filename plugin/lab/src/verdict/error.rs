@@ -23,7 +23,7 @@ pub enum TestError {
     #[error("two testers are called `{0}`: give each file or folder a name of its own, and name each bot once")]
     SameName(String),
     /// A shard without any level tests nothing.
-    #[error("shard {shard} has no level, since {range} has only {length}: use at most {length} shards")]
+    #[error("shard {shard} has no level, since {range} has only {length}: use at most {}", shards_of(*length))]
     EmptyShard {
         /// The shard.
         shard: Shard,
@@ -62,7 +62,10 @@ pub enum TestError {
         message: String,
     },
     /// Results that cannot be joined.
-    #[error("{} and {} cannot be joined: {}", first.display(), second.display(), differences.join(", "))]
+    #[error(
+        "{} and {} cannot be joined: {}; name shards of one test, and test those again that are of another one",
+        first.display(), second.display(), differences.join(", ")
+    )]
     Unlike {
         /// One folder.
         first: PathBuf,
@@ -88,7 +91,10 @@ pub enum TestError {
     #[error("missing {}: name their folders too, or test them with `playbot test --shard`", shards(.0))]
     Missing(Vec<Shard>),
     /// Results that say nothing about each other.
-    #[error("{} cannot be compared with: {}", folder.display(), differences.join(", "))]
+    #[error(
+        "{} cannot be compared with: {}; name results of the same version of the game with a level and a tester in common, or \
+         leave --against out", folder.display(), differences.join(", ")
+    )]
     Incomparable {
         /// The folder of the earlier results.
         folder: PathBuf,
@@ -102,7 +108,7 @@ pub enum TestError {
     #[error(transparent)]
     Finding(#[from] FindingError),
     /// The operating system refused.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}: {source}; {}", path.display(), next_step(source))]
     Io {
         /// What was tried.
         action: &'static str,
@@ -144,6 +150,34 @@ pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Err
     move |source| TestError::Io { action, path: path.into(), source }
 }
 
+/// What serde says of a line, with its column: the line that it counts from 1 is another one.
+pub(super) fn json_fault(error: &serde_json::Error) -> String {
+    let (words, column) = (error.to_string(), error.column());
+    let place = format!(" at line {} column {column}", error.line());
+    match words.strip_suffix(&place) {
+        Some(what) => format!("{what} (column {column})"),
+        None => words,
+    }
+}
+
+/// What to do where the system refused.
+fn next_step(source: &io::Error) -> &'static str {
+    use io::ErrorKind::{
+        FileTooLarge, IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem,
+        StorageFull,
+    };
+    match source.kind() {
+        StorageFull | QuotaExceeded | FileTooLarge => "make room there and call this again",
+        PermissionDenied | ReadOnlyFilesystem => "make rights there or name another folder, and call this again",
+        NotFound | NotADirectory | IsADirectory => "name another folder, or move what is in the way",
+        _ => "call this again, and look at the disk if that does not help",
+    }
+}
+
+fn shards_of(levels: u64) -> String {
+    if levels == 1 { "1 shard".to_owned() } else { format!("{levels} shards") }
+}
+
 fn no_results(folder: &Path) -> &'static str {
     if folder.join(super::journal::JOURNAL).exists() {
         "its test is not done, finish it with `playbot test --resume`"
@@ -170,6 +204,32 @@ mod tests {
         assert_eq!(shards(&[shard(3)]), "shard 3/20");
         let words = TestError::Missing((0..10).map(shard).collect()).to_string();
         assert!(words.starts_with("missing shards 0/20, 1/20,") && words.contains("7/20 and 2 more: "), "{words}");
+    }
+
+    #[test]
+    fn what_the_system_refuses_has_a_next_step() {
+        use io::ErrorKind::{NotFound, Other, PermissionDenied, StorageFull};
+        for (kind, next) in
+            [(StorageFull, "make room"), (PermissionDenied, "make rights"), (NotFound, "name another"), (Other, "call")]
+        {
+            let words = io_error("write", Path::new("a/junit.xml"))(kind.into()).to_string();
+            let (what, then) = words.rsplit_once("; ").expect("two parts");
+            assert!(what.starts_with("cannot write a/junit.xml: ") && then.starts_with(next), "{words}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_go_together_has_a_next_step_and_one_is_no_plural() {
+        let differences = || vec!["games `a` and `b`".to_owned()];
+        let other = TestError::Incomparable { folder: "before".into(), differences: differences() }.to_string();
+        assert!(other.starts_with("before cannot be compared with: games `a` and `b`; name results"), "{other}");
+        let unlike = TestError::Unlike { first: "a".into(), second: "b".into(), differences: differences() };
+        assert!(unlike.to_string().contains("games `a` and `b`; name shards of one test"), "{unlike}");
+        let empty = |length| {
+            let shard = Shard { index: 3, count: 7 };
+            TestError::EmptyShard { shard, range: "hard:0..9".to_owned(), length }.to_string()
+        };
+        assert!(empty(1).ends_with("use at most 1 shard") && empty(2).ends_with("use at most 2 shards"));
     }
 
     #[test]

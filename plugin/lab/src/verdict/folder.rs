@@ -14,7 +14,7 @@ use std::{
 use playbot_learner::write_atomically_with;
 
 use super::{
-    error::{TestError, io_error},
+    error::{TestError, io_error, json_fault},
     journal::{JOURNAL, Journal},
     level_verdict::LevelVerdict,
     plan::TestRecord,
@@ -127,7 +127,7 @@ fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), Tes
     let known: TestRecord = serde_json::from_str(&text).map_err(|error| TestError::Damaged {
         path: file.into(),
         line: error.line(),
-        message: error.to_string(),
+        message: json_fault(&error),
     })?;
     let mut differences = known.differences(record);
     if known.shard != record.shard {

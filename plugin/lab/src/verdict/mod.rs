@@ -70,7 +70,7 @@ pub use places::Places;
 pub use plan::{TestPlan, TestRecord};
 pub use report_files::{AGAINST, JUNIT, SUMMARY, write_reports};
 pub use rerun::rerun_commands;
-pub use results::{RESULTS, ResultLines};
+pub use results::{RESULTS, ResultLines, results_folder};
 pub use run::{TestEnd, TestWatch, run_tests, run_tests_keeping};
 pub use shard::{Shard, ShardError};
 pub use tester::{Tester, TesterRecord};

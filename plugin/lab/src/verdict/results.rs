@@ -12,7 +12,7 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    error::{TestError, io_error},
+    error::{TestError, io_error, json_fault},
     level_verdict::LevelVerdict,
     plan::TestRecord,
 };
@@ -23,6 +23,16 @@ pub const RESULTS: &str = "results.json";
 const LEVELS: &str = ",\"levels\":[";
 /// After the last level.
 const END: &str = "]}";
+
+/// The folder of results that are named by it, or by the file in it.
+pub fn results_folder(named: &Path) -> &Path {
+    let is_file = named.file_name().is_some_and(|name| name == RESULTS) && named.is_file();
+    match named.parent() {
+        Some(folder) if is_file && folder.as_os_str().is_empty() => Path::new("."),
+        Some(folder) if is_file => folder,
+        _ => named,
+    }
+}
 
 /// Writes results, a level at a time.
 pub(super) struct ResultWriter<W> {
@@ -81,7 +91,7 @@ impl ResultLines {
         let record = head.strip_suffix(LEVELS).map(|record| serde_json::from_str(&format!("{record}}}")));
         let record = match record {
             Some(Ok(record)) => record,
-            Some(Err(error)) => return Err(TestError::Damaged { path, line: 1, message: error.to_string() }),
+            Some(Err(error)) => return Err(TestError::Damaged { path, line: 1, message: json_fault(&error) }),
             None => {
                 let message = "this is not the head of results".to_owned();
                 return Err(TestError::Damaged { path, line: 1, message });
@@ -123,7 +133,7 @@ impl ResultLines {
     /// The file ends before its end, holds something else, or cannot be read.
     pub fn next_level(&mut self) -> Result<Option<LevelVerdict>, TestError> {
         let Some(line) = self.next_line()? else { return Ok(None) };
-        serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&error.to_string()))
+        serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&json_fault(&error)))
     }
 
     /// The next level as it is written, if it is the one at this place of the range.
@@ -133,7 +143,7 @@ impl ResultLines {
     /// It is another one, or none.
     pub(super) fn line_of(&mut self, index: u64) -> Result<String, TestError> {
         let line = self.next_line()?.ok_or_else(|| self.damaged("levels are missing"))?;
-        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&error.to_string()))?;
+        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&json_fault(&error)))?;
         match found["index"].as_u64() {
             Some(found) if found == index => Ok(line),
             _ => Err(self.damaged(&format!("this is not the level with index {index}"))),
@@ -210,5 +220,21 @@ mod tests {
             let found = all.expect_err(text).to_string();
             assert!(found.contains(&format!("{RESULTS}, line {line}: ")), "{found}");
         }
+        fs::write(folder.path().join(RESULTS), written(&[r#"{"index":0}"#, r#"{"index":1,]"#])).expect("writable");
+        let mut lines = open().expect("a head");
+        lines.next_line().expect("a level");
+        let found = lines.next_level().expect_err("no level").to_string();
+        assert!(found.contains(&format!("{RESULTS}, line 3: ")) && found.contains("(column 1"), "{found}");
+        assert!(!found.contains("at line"), "one line is enough: {found}");
+    }
+
+    #[test]
+    fn the_file_stands_for_its_folder() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join(RESULTS);
+        assert_eq!(results_folder(&file), file, "there is none");
+        fs::write(&file, "").expect("writable");
+        assert_eq!(results_folder(&file), folder.path());
+        assert_eq!(results_folder(folder.path()), folder.path());
     }
 }

@@ -10,6 +10,10 @@ use std::path::{Path, PathBuf};
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";
 
+/// What to do with a file that something else has written.
+const FOREIGN: &str =
+    "it is another file; name one that playbot has written, such as a policy of `playbot policy export`";
+
 /// A tensor in host memory.
 #[derive(Clone, Debug)]
 struct StoredTensor {
@@ -94,14 +98,14 @@ impl TensorFile {
             SafeTensorError::HeaderTooSmall
             | SafeTensorError::InvalidHeaderLength
             | SafeTensorError::MetadataIncompleteBuffer => FileError::CutOff { path: path.to_owned(), advice: "" },
-            error => format(format!("not safetensors: {error}")),
+            error => format(format!("not safetensors ({error}): {FOREIGN}")),
         };
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(foreign)?;
         let description = metadata
             .metadata()
             .as_ref()
             .and_then(|map| map.get(DESCRIPTION).cloned())
-            .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry")))?;
+            .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry: {FOREIGN}")))?;
         let views = SafeTensors::deserialize(bytes).map_err(foreign)?;
         let tensors = views
             .iter()

@@ -111,6 +111,16 @@ impl Game for Dash {
             }),
             DefectKind::level("no-place", "there is no place for it", |_, _| None),
             DefectKind::level("the-same", "nothing is changed", |text, _| Some(format!(" {text}"))),
+            DefectKind::rules("seldom", "some levels end before they begin, in variant 0 none", 3, |app, variant| {
+                app.add_systems(FixedUpdate, move |mut agents: Query<(&Control, &mut Episode)>| {
+                    for (control, mut episode) in &mut agents {
+                        let is_here = variant > 0 && episode.level % 4 == u64::from(variant);
+                        if is_here && control.is_active() && episode.is_running() && episode.end().is_none() {
+                            episode.truncate();
+                        }
+                    }
+                });
+            }),
         ]
     }
 }
@@ -147,9 +157,26 @@ fn every_kind_is_planted_into_levels_that_the_bot_solves() {
     let Made { set, levels, without_place } = make(&plan(7));
     assert_eq!(set.games, [BugGame { name: "dash".to_owned(), version: 3 }]);
     let kinds = defect_kinds(&Dash).len();
-    assert_eq!(set.mutants.len(), 3 * (kinds - 2));
-    let missing = |class: &str| NoPlace { game: "dash".into(), class: class.into(), planted: 0, wanted: 3 };
-    assert_eq!(without_place, [missing("no-place"), missing("the-same")]);
+    assert_eq!(set.mutants.len(), 3 * (kinds - 2) - 1);
+    let missing = |class: &str, planted, without_effect: &[u32]| NoPlace {
+        game: "dash".into(),
+        class: class.into(),
+        planted,
+        wanted: 3,
+        without_effect: without_effect.iter().copied().collect(),
+    };
+    let few = [missing("no-place", 0, &[]), missing("the-same", 0, &[]), missing("seldom", 2, &[0])];
+    assert_eq!(without_place, few);
+    assert!(
+        few[0]
+            .describe()
+            .ends_with("only 0 of 3 mutants with the defect no-place were made: no other level has a place for it")
+    );
+    assert!(few[2].describe().ends_with("no bot notices its variant 0 on any of 20 levels"));
+    let seldom: Vec<_> = set.mutants.iter().filter(|bug| bug.class == "seldom").collect();
+    assert_eq!(seldom.iter().map(|bug| bug.id.as_str()).collect::<Vec<_>>(), ["dash-seldom-00", "dash-seldom-01"]);
+    assert_eq!(seldom[0].planted, PlantedPart::Rules { variant: 1 });
+    assert!(seldom[0].level % 4 == 1 && seldom[1].level % 4 == 2, "it changes nothing elsewhere: {seldom:?}");
     assert_eq!(levels.len(), 3);
     let beside: Vec<u64> = set.sound.iter().flat_map(|sound| sound.range.levels()).collect();
     assert_eq!(beside.len(), 10);

@@ -119,6 +119,11 @@ fn what_cannot_be_compared_is_refused_by_name() {
     let stranger = said(&record(&["jumper"]), 0).expect_err("a stranger");
     assert!(stranger.contains("the tester `jumper` was not there before"), "{stranger}");
     assert!(said(&record(&["random"]), 7).expect_err("other levels").contains("no level is in"));
+    // What the ranges say is known before anybody plays.
+    let elsewhere = TestRecord { range: "easy:0..9".parse().expect("a split"), ..record(&["random"]) };
+    let words = Comparison::check(&one, &elsewhere).expect_err("another mode").to_string();
+    assert!(words.contains("no level is in hard:0..499 and in easy:0..9; name results"), "{words}");
+    Comparison::check(&one, &record(&["random"])).expect("the same levels");
     let left_out = said(&record(&["random", "jumper"]), 0).expect("one in common");
     assert_eq!(left_out, ["the tester `jumper` was not there before"]);
     let retrained = TesterRecord { checksum: Some("1".to_owned()), ..TesterRecord::bot("random") };
