@@ -81,9 +81,8 @@ fn restore(mut arenas: Query<(&Arena, &mut Tiles)>) {
 
 fn invisible_wall(level: &Level, x: i32, height: i32) -> Vec<Cell> {
     let low = surface(level, x);
-    let free =
-        (low..(low + height).min(SIZE)).filter(|&y| matches!(level.tiles.get(x, y), Tile::Empty | Tile::Barrier));
-    free.map(|y| ([x, y], Tile::Wall)).collect()
+    let free = (low..SIZE).filter(|&y| matches!(level.tiles.get(x, y), Tile::Empty | Tile::Barrier));
+    free.take(height as usize).map(|y| ([x, y], Tile::Wall)).collect()
 }
 
 fn missing_ground(level: &Level, left: i32, width: i32) -> Vec<Cell> {

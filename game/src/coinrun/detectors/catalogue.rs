@@ -2,7 +2,7 @@
 
 use playbot_lab::detector::Detector;
 
-use super::{coin, lanes::StrayEnemy, lethal};
+use super::{coin, inside::inside_ground, lanes::StrayEnemy, lethal};
 
 /// The detectors of the game.
 pub(in crate::coinrun) fn detectors() -> Vec<Box<dyn Detector>> {
@@ -11,6 +11,7 @@ pub(in crate::coinrun) fn detectors() -> Vec<Box<dyn Detector>> {
         Box::new(lethal::FarHazard),
         Box::new(coin::goal_ignored()),
         Box::new(StrayEnemy),
+        Box::new(inside_ground()),
     ]
 }
 
@@ -24,7 +25,7 @@ mod tests {
     #[test]
     fn names_are_different_and_all_are_usual() {
         let names: BTreeSet<_> = detectors().iter().map(|detector| detector.name()).collect();
-        assert_eq!(names.len(), 4);
+        assert_eq!(names.len(), 5);
         assert!(detectors().iter().all(|detector| detector.is_usual()));
     }
 

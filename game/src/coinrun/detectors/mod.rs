@@ -1,10 +1,12 @@
-//! Detectors of CoinRun's own: whether what its rules say about hazards, coin and enemies is what happens.
+//! Detectors of CoinRun's own: whether what its rules say about hazards, coin, enemies and ground is what
+//! happens.
 //!
 //! They look with the rules' own geometry at every tick, whoever plays.
 
 mod catalogue;
 mod coin;
 mod contact;
+mod inside;
 mod lanes;
 mod lethal;
 #[cfg(test)]

@@ -11,8 +11,7 @@ use std::path::{Path, PathBuf};
 const DESCRIPTION: &str = "playbot";
 
 /// What to do with a file that something else has written.
-const FOREIGN: &str =
-    "it is another file; name one that playbot has written, such as a policy of `playbot policy export`";
+const FOREIGN: &str = "it is another file; name one that playbot has written";
 
 /// A tensor in host memory.
 #[derive(Clone, Debug)]

@@ -47,6 +47,17 @@ impl Bins {
         *self == Self::NONE
     }
 
+    /// How far the nearest bin is from that of a place, in bins; none is far away.
+    pub fn distance(&self, x: f32) -> usize {
+        let is_in = |bin: usize| self.0[bin / 64] >> (bin % 64) & 1 == 1;
+        let there = ((x / WIDTH) as usize).min(BINS - 1);
+        let near = (0..BINS).find(|&far| {
+            let left = there.checked_sub(far).is_some_and(is_in);
+            left || there + far < BINS && is_in(there + far)
+        });
+        near.unwrap_or(BINS)
+    }
+
     /// These and those at most so many bins away.
     #[must_use]
     pub fn spread(mut self, by: usize) -> Self {
@@ -115,6 +126,10 @@ mod tests {
             Bins::of(|bin| [0, 1, 2, 61, 62, 63, 64, 65, 505, 506, 507].contains(&bin) || bin.abs_diff(300) <= 2);
         assert_eq!(bins, expected);
         assert_eq!(Bins::at(64.0), Bins::of(|bin| bin == BINS - 1));
+        let bins = Bins::of(|bin| [10, 40].contains(&bin));
+        let distance = |bin: usize| bins.distance((bin as f32 + 0.5) * WIDTH);
+        assert_eq!([3, 10, 22, 30, 507].map(distance), [7, 0, 12, 10, 467]);
+        assert_eq!(Bins::NONE.distance(3.0), BINS);
     }
 
     #[test]

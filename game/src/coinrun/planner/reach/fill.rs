@@ -1,9 +1,12 @@
 //! The search: from state to state until there is nothing new.
 
-use std::collections::HashMap;
+use std::{
+    cmp::Ordering,
+    collections::{BinaryHeap, HashMap},
+};
 
 use super::{
-    bins::Bins,
+    bins::{BINS, Bins},
     ground::Ground,
     loose::{self, Loose},
     state::{Exact, State},
@@ -29,10 +32,11 @@ pub fn coin_is_unreachable(sim: &Sim) -> bool {
     let mut known = Known::default();
     let is_held = memory.on_crate || memory.lent_support;
     let start = State::Exact(Exact { y: player.y, vy: player.vy + 0.0, is_held });
-    let mut open = vec![(start, Bins::at(player.x))];
+    let coin = level.coin[0] as f32 + 0.5;
+    let mut open = BinaryHeap::from([Open { state: start, places: Bins::at(player.x), distance: BINS }]);
     let mut after = Vec::new();
     for _ in 0..MOST_STEPS {
-        let Some((state, places)) = open.pop() else { return true };
+        let Some(Open { state, places, .. }) = open.pop() else { return true };
         match state {
             State::Exact(state) => step(&mut ground, state, places, &mut after),
             State::Loose(state) => loose::step(&mut ground, state, places, &mut after),
@@ -47,11 +51,39 @@ pub fn coin_is_unreachable(sim: &Sim) -> bool {
             }
             let new = known.add(next, places & touched.alive);
             if !new.is_empty() {
-                open.push((next, new));
+                open.push(Open { state: next, places: new, distance: new.distance(coin) });
             }
         }
     }
     false
+}
+
+/// A state to go on from. Whoever is nearest to the coin goes first: where there is a way, it is found soon.
+struct Open {
+    state: State,
+    places: Bins,
+    /// From the coin along x, in bins.
+    distance: usize,
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.distance == other.distance
+    }
+}
+
+impl Eq for Open {}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.distance.cmp(&self.distance)
+    }
 }
 
 /// Where the search has been.

@@ -14,6 +14,7 @@ use crate::{
     eval::Player,
     explore::{Cell, Exploration, ExploreError, ExplorePlan, Explorer, ReachedCell, Route, Stop, explore},
     findings::{Breakage, Checks, FindingHead, Lengths, lengths, scan},
+    idle::idle_action,
     proof::LevelProof,
 };
 
@@ -141,13 +142,18 @@ fn routes(found: &Exploration, most: usize) -> Vec<Route> {
     routes
 }
 
+/// Ticks for which an agent stays where a way ends.
+const STAY: usize = 150;
+
 fn actions(route: &Route) -> Vec<ActionValue> {
     (0..route.len()).map_while(|tick| route.actions.get(tick)).collect()
 }
 
 /// Plays a way again under the detectors that look tick by tick.
 fn look_again(trial: &Trial, route: &Route, sightings: &mut Sightings) {
-    let actions = actions(route);
+    let mut actions = actions(route);
+    // Some defects are only seen by who stays a while.
+    actions.extend(std::iter::repeat_n(idle_action(trial.game), STAY));
     // The streams of explorers begin from 0.
     let scanned = scan(trial.game, trial.mode, trial.level, 0, &actions, trial.detectors);
     for seen in scanned.seen {
