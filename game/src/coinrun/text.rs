@@ -64,11 +64,22 @@ impl Level {
         [width, self.used_height(width)]
     }
 
+    /// What goes on as it is up to the border is left out, but for a little: rock and free columns, as [`Level::from_text`]
+    /// puts them there again.
     fn used_height(&self, width: i32) -> i32 {
-        let highest_tile = (0..SIZE - 1).rev().find(|&y| (1..width - 2).any(|x| self.tiles.get(x, y) != Tile::Empty));
-        let highest_body = self.spawns.iter().map(|spawn| spawn.cell()[1]).max();
-        let highest = highest_tile.max(highest_body).unwrap_or(0);
-        (highest + 1 + HEADROOM).min(SIZE)
+        let columns = || 1..width - 2;
+        let top = SIZE - 2;
+        let goes_on = |y: i32| {
+            columns().all(|x| {
+                let tile = self.tiles.get(x, y);
+                tile == self.tiles.get(x, top) && matches!(tile, Tile::Wall | Tile::Empty)
+            })
+        };
+        let same_from = (0..=top).rev().take_while(|&y| goes_on(y)).last().unwrap_or(SIZE - 1);
+        let above_bodies = self.spawns.iter().map(|spawn| spawn.cell()[1] + 1).max().unwrap_or(1);
+        let is_ceiling = columns().all(|x| self.tiles.get(x, top) == Tile::Wall);
+        let shown = if is_ceiling { 1 } else { HEADROOM };
+        (same_from.max(above_bodies) + shown).min(SIZE)
     }
 
     /// Reads a picture. What lies right of it becomes rock. Above it, a column that ends in `#`
@@ -203,6 +214,18 @@ mod tests {
         let text = generate(Mode::Hard, 5).to_text();
         for letter in ['A', 'C', 'S', '>', 'x'] {
             assert!(text.contains(letter), "{letter} is missing in\n{text}");
+        }
+    }
+
+    #[test]
+    fn rock_above_a_ceiling_is_left_out() {
+        let free = "#........#\n#A......C#\n##########\n";
+        for (top, height) in [("##########\n", 4), ("####.#####\n", 6)] {
+            let level = Level::from_text(&format!("{top}{free}")).expect("a level");
+            assert_eq!(level.used_size()[1], height, "{}", level.to_text());
+            let copy = Level::from_text(&level.to_text()).expect("own picture");
+            let differs = |x, y| copy.tiles.get(x, y) != level.tiles.get(x, y);
+            assert!(!(0..SIZE).any(|x| (0..SIZE).any(|y| differs(x, y))), "{}", level.to_text());
         }
     }
 

@@ -85,6 +85,9 @@ fn pars_are_those_of_a_file_or_of_recordings() {
     assert!(regress(&["--detector", "shortcut.facto=0.4"], 3).1.contains("did you mean `factor`?"));
     assert!(regress(&["--no-detect", "shortcut"], 3).1.contains("--regress"));
 
+    write("others.json", r#"{"easy:7": 5, "esay:0": 5}"#);
+    let words = "pars for 0 of 1 level; 2 names are no level of this test: easy:7, esay:0 (did you mean easy:0?)";
+    assert!(test("others.json", 3).1.contains(words));
     write("quick.json", r#"{"easy:0": 1, "easy:1": 5}"#);
     test("quick.json", 1);
     assert!(results().contains("\"detector\":\"too-long\"") && results().contains("\"pars "), "{}", results());

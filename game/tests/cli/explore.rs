@@ -11,7 +11,8 @@ fn a_maze_is_covered_and_its_solution_recorded_and_drawn() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let files = ["--out", "new/way.demo", "--png", "new/way.png", "--json"];
-    let (out, _) = done(folder, &[&MAZE[..], &files, &["--threads", "2"]].concat());
+    let (out, told) = done(folder, &[&MAZE[..], &files, &["--threads", "2"]].concat());
+    assert!(told.contains("recorded: new/way.demo, ") && told.contains("drawn: new/way.png"), "{told}");
     let found = json_lines(&out).remove(0);
     assert_eq!((found["coverage"].as_f64(), found["stop"].as_str()), (Some(1.0), Some("covered")), "{found}");
     assert!(found["open_cells"].as_u64().is_some_and(|open| open >= 17), "{found}");
@@ -42,6 +43,9 @@ fn a_goal_that_is_not_found_is_a_finding() {
     assert!(out.contains("solution  none was found") && out.contains("coinrun hard:0"), "{out}");
     assert!(told.contains("nothing is recorded: no solution was found"), "{told}");
     assert!(!folder.join("none.demo").exists());
+    // The outer wall.
+    let (_, told) = ended(folder, &[&MAZE[..], &["--until", "solved", "--cell", "0,0"]].concat(), 1);
+    assert!(told.contains("cell 0,0 was not reached"), "{told}");
 }
 
 #[test]
@@ -51,7 +55,12 @@ fn mistakes_are_told_before_anything_is_explored() {
     for (args, words) in [
         (&["maze2d", "--level", "medum:1"][..], "did you mean `medium`?"),
         (&["coinrun", "--level", "hard:0..3"], "one at a time is explored, such as hard:0"),
-        (&["coinrun", "--level", "hard"], "is not a range of levels"),
+        (&["coinrun", "--level", "hard"], "`hard` names no level: write its mode and its number, such as hard:7"),
+        (
+            &["coinrun", "--level", "hard:0", "--cell", "900,4"],
+            "cell 900,4 lies outside of the level: its cells go from 0,0",
+        ),
+        (&["coinrun", "--level", "hard:0", "--cell", "4"], "theirs is 2, such as"),
         (&["coinrun", "--sticky", "2"], "it lies between 0 and 1"),
         (&["coinrun", "--cell-size", "0"], "the size of a cell is 0"),
         (&["coinrun", "--steps", "0"], "--steps"),

@@ -80,6 +80,16 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     let told = done(folder, &["replay", &file]).0;
     assert!(told.contains("maze2d sealed.json: unreachable-goal: "), "{told}");
     assert!(done(folder, &["replay", &file, "--png", "a.png"]).1.contains("nothing is drawn"));
+    // As reports name it, from the folder of the results: the level file is in a folder above.
+    let (results, below) = (folder.join("out"), format!("findings/{name}"));
+    let shorter = ["replay", &below, "--minimise", "--out", "short.finding"];
+    assert!(done(&results, &shorter).0.contains("it happens again"), "{name}");
+    let shown = done(&results, &["demo", "show", "short.finding"]).0;
+    assert!(shown.contains("files:sealed.json"), "it names the level as the test did: {shown}");
+    fs::remove_file(results.join("short.finding")).expect("it is there");
+    assert!(ended(&results, &["test", "--regress", "."], 1).0.contains("still-there"));
+    let summary = fs::read_to_string(results.join("summary.md")).expect("written");
+    assert!(summary.contains("# from the folder of the results:"), "{summary}");
 
     let regress = |more: &[&str], wanted: i32| ended(folder, &[&["test", "--regress", "out"], more].concat(), wanted);
     let (table, words) = regress(&[], 1);
@@ -98,7 +108,10 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     assert!(words.contains("it was changed since") && words.contains("remove the finding"), "{words}");
     fs::remove_file(folder.join("sealed.json")).expect("it is there");
     let (_, words) = ended(folder, &["replay", &file], 3);
-    assert!(words.contains("the level no longer exists") && words.contains("bring the recorded file back"), "{words}");
+    assert!(
+        words.contains("there is no level file sealed.json") && words.contains("bring the recorded file back"),
+        "{words}"
+    );
     let (_, words) = ended(folder, &["replay", "out"], 3);
     assert!(words.contains("out is a folder with ") && words.contains("such as out/findings/"), "{words}");
     assert!(words.contains("test --regress out"), "{words}");
@@ -113,7 +126,7 @@ fn what_is_no_finding_is_told() {
     done(folder, &["record", "coinrun", "--levels", "easy:0..0", "--out", "a.demo"]);
     fs::create_dir(folder.join("empty")).expect("writable");
     for (args, words) in [
-        (&["replay", "none.finding"][..], "none.finding"),
+        (&["replay", "none.finding"][..], "none.finding: there is no such file"),
         (&["replay", "a.demo"], "a recording, but of no finding"),
         (&["replay", "a.demo", "--minimise"], "--out"),
         (&["replay", "a.demo", "--apng", "a.gif"], ".png"),

@@ -21,7 +21,10 @@ fn nothing_is_lost_or_half_written_when_shards_cannot_be_joined() {
         (&["--out", "zero", "--force"][..], "--out zero is the folder of a shard: choose another"),
         (&["--out", "./zero/../one", "--force"], "is the folder of a shard"),
         (&["--out", "file"], "file is a file: name a folder"),
-        (&["--out", "joined", "--against", "maze"], "maze cannot be compared with: games `maze2d` and `coinrun`"),
+        (
+            &["--out", "joined", "--against", "maze"],
+            "maze and this test cannot be compared: games `maze2d` and `coinrun`",
+        ),
         (&["--out", "joined", "--against", "none"], "none has no results.json"),
     ] {
         let told = merge(more);

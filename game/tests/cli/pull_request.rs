@@ -123,7 +123,19 @@ fn the_same_code_raises_no_alarm_with_twenty_other_seeds() {
     let folder = temporary.path();
     draw(folder, 0..25);
     // Fewer episodes could not be told from noise in so many levels, and would prove nothing here.
-    let plan = ["test", "coinrun", "--levels", FILES, "--bot", "random,right-jump", "--episodes", "8", "--no-detect", "all", "--force"];
+    let plan = [
+        "test",
+        "coinrun",
+        "--levels",
+        FILES,
+        "--bot",
+        "random,right-jump",
+        "--episodes",
+        "8",
+        "--no-detect",
+        "all",
+        "--force",
+    ];
     let solved = |out: &str| -> Vec<Option<u64>> {
         let text = fs::read_to_string(folder.join(out).join("results.json")).expect("results");
         let results: Value = serde_json::from_str(&text).expect("JSON");

@@ -215,7 +215,7 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
     fs::write(folder.join("other/results.json"), before.replace("\"game_version\":1", "\"game_version\":0"))
         .expect("writable");
     let words = run("refused", &["--against", "other"], 3);
-    assert!(words.contains("other cannot be compared with: versions 0 and 1 of `coinrun`"), "{words}");
+    assert!(words.contains("other and this test cannot be compared: versions 0 and 1 of `coinrun`"), "{words}");
     for before in ["before", "before/results.json"] {
         assert!(run("before", &["--against", before, "--force"], 3).contains("cannot be compared with themselves"));
     }

@@ -98,6 +98,15 @@ fn best(run: &Path, checkpoint: &Checkpoint) -> String {
 
 /// The error of a recording that could not be read; where there is none, with the command that makes one.
 pub fn missing_recording(error: DemoFileError) -> CliError {
+    missing(error, "record GAME --out")
+}
+
+/// The same for recordings of people, which nobody else makes.
+pub fn missing_recording_of_people(error: DemoFileError) -> CliError {
+    missing(error, "play GAME --record")
+}
+
+fn missing(error: DemoFileError, verb: &str) -> CliError {
     let is_missing = match &error.fault {
         DemoFault::NoDemos => true,
         DemoFault::Io { source, .. } => source.kind() == ErrorKind::NotFound,
@@ -114,7 +123,7 @@ pub fn missing_recording(error: DemoFileError) -> CliError {
         }
         _ => error.path.join("my.demo"),
     };
-    let command = format!("`playbot record GAME --out {}`", shown(&file));
+    let command = format!("`playbot {verb} {}`", shown(&file));
     CliError::Usage(format!("{error}; name recordings that exist, or make one with {command}"))
 }
 
@@ -152,6 +161,8 @@ mod tests {
         let file = folder.path().join("none.demo");
         let error = missing_recording(DemoReader::open(&file).map(|_| ()).expect_err("none"));
         names(&error, &file, "none.demo`");
+        let error = missing_recording_of_people(DemoReader::open(&file).map(|_| ()).expect_err("none"));
+        names(&error, &file, "`playbot play GAME --record ");
         let error = missing_recording(find_demos(folder.path()).expect_err("none"));
         names(&error, folder.path(), "my.demo`");
         let file = folder.path().join("README.md");

@@ -102,7 +102,12 @@ pub type Print<'a> = &'a mut dyn FnMut(String) -> Result<(), InspectError>;
 /// It cannot be read.
 pub fn read_text(path: &Path) -> Result<String, InspectError> {
     let read = std::fs::read_to_string(path);
-    read.map_err(|error| InspectError::Usage(format!("cannot read {}: {error}", path.display())))
+    read.map_err(|error| {
+        InspectError::Usage(format!(
+            "cannot read {}: {error}; name a file that is there and may be read",
+            path.display()
+        ))
+    })
 }
 
 /// The shortest decimal that reads back as the same number; whole numbers without a point, and no negative zero.

@@ -141,7 +141,7 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
     assert!(many.starts_with("12 of 12 levels ") && many.ends_with("\nand plain:20, plain:21"), "{many}");
     let mixed = message(|| test("plain:5..6").bot("right").assert_solved());
     assert!(mixed.contains("  left: solved 0 of 2, 2 lost\n  right: solved 2 of 2\n"), "{mixed}");
-    assert!(message(|| assert_levels_solved_by(&Lane::Sound, "left", "plain:7")).contains("1 of 1 levels was not"));
+    assert!(message(|| assert_levels_solved_by(&Lane::Sound, "left", "plain:7")).contains("1 of 1 level was not"));
 }
 
 #[test]

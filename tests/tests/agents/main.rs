@@ -9,6 +9,7 @@ mod explore;
 mod faults;
 mod findings;
 mod lander;
+mod leaps;
 mod level_detectors;
 mod orders;
 mod pipeline;

@@ -196,6 +196,8 @@ fn tell_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError
     } else {
         print_line(table.class_table().to_text())?;
         print_line(table.tester_table().to_text())?;
+        ScoreTable::meanings().into_iter().try_for_each(print_line)?;
+        print_line("")?;
         table.headlines().into_iter().try_for_each(print_line)?;
     }
     tell!("score: {}", path.display());

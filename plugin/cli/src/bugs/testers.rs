@@ -26,8 +26,8 @@ const DEMONSTRATOR: &str = "demonstrator";
 pub struct ContestantArgs {
     /// Testers, separated by commas; all that there are if none is named: random, hold (the action that a bot of the game
     /// holds, or else its last one), chaos (random actions, each held for up to 30 ticks), explore, explore-skills (with a
-    /// skill model, or else with the first policy that has skills), demonstrator (the game's own bot, also by its own name),
-    /// and the names of policies.
+    /// skill model, or else with the first policy that has skills), and demonstrator (the game's own bot, also by its own
+    /// name). Policies that are given test in any case.
     #[arg(long = "tester", value_name = "NAME", value_delimiter = ',')]
     testers: Vec<String>,
     /// Policy file and the name under which it is scored; may be given several times, and a name once for each game.
@@ -156,7 +156,9 @@ impl ContestantArgs {
         for (game, testers) in chosen.iter().zip(all) {
             let is_named = |name: &str| {
                 let is_demonstrator = game.demonstrator() == Some(name);
-                self.testers.iter().any(|known| known == name || (is_demonstrator && known == DEMONSTRATOR))
+                // Whoever gives a policy wants to see it tested.
+                let is_given = self.policy.iter().any(|policy| policy.name == name);
+                is_given || self.testers.iter().any(|known| known == name || (is_demonstrator && known == DEMONSTRATOR))
             };
             testers.retain(|tester| is_named(&tester.record.name));
         }

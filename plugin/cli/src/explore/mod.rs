@@ -2,6 +2,7 @@
 
 mod chart;
 mod failed;
+mod one_level;
 mod recorded;
 mod talents;
 mod verb;

@@ -37,6 +37,11 @@ impl RecordingFile {
         Ok(Self(path.to_owned()))
     }
 
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
     /// Plays a way under the recorder, replays what was recorded, and puts it in its place if it is the same.
     ///
     /// # Errors

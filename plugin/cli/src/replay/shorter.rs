@@ -9,7 +9,8 @@ use playbot_lab::{
 
 use crate::{error::CliError, interrupt, output, progress};
 
-/// Leaves out what is not needed, with a bar, and writes what remains. Ctrl-C ends it with the best so far.
+/// Leaves out what is not needed, with a bar, and writes what remains. Its level is named as it is `stored`: it may have been
+/// found in another folder. Ctrl-C ends it with the best so far.
 ///
 /// # Errors
 ///
@@ -17,6 +18,7 @@ use crate::{error::CliError, interrupt, output, progress};
 pub fn write_shorter(
     game: &dyn Game,
     finding: &StoredFinding,
+    stored: &StoredFinding,
     replays: u32,
     out: &Path,
 ) -> Result<Minimised, CliError> {
@@ -28,6 +30,6 @@ pub fn write_shorter(
     bar.finish_and_clear();
     let shorter = shorter?;
     output::make_folder_of(out)?;
-    shorter.finding.write(out)?;
+    shorter.finding.clone().with_level_of(stored).write(out)?;
     Ok(shorter)
 }

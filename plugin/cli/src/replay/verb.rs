@@ -25,7 +25,8 @@ const MOST_NAMED: usize = 3;
 /// Play a finding again: does it still happen, and how does it look?
 ///
 /// Findings are files that `playbot test` writes: a level, the actions that lead there, and what was found, in which tick and
-/// with which state of the game. Exit code 0 if it happens again just so, 1 if not.
+/// with which state of the game. Detectors look as they were set when they found it. A level file that is not there as seen
+/// from the current folder is looked for in each folder above the finding. Exit code 0 if it happens again just so, 1 if not.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot replay runs/test/findings/NAME.finding
@@ -71,8 +72,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if args.finding.is_dir() {
         return Err(instead_of(&args.finding));
     }
-    let finding = StoredFinding::read(&args.finding)?;
-    let game = games.of_file(Artifact::Finding, &args.finding, &finding.header.game)?;
+    let stored = StoredFinding::read(&args.finding)?;
+    let game = games.of_file(Artifact::Finding, &args.finding, &stored.header.game)?;
+    let finding = stored.clone().seen_from(game, &args.finding);
     let pictures = Pictures { still: args.png.as_deref(), animated: args.apng.as_deref(), scale: args.scale };
     pictures.prepare()?;
     check_out(args)?;
@@ -80,13 +82,13 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let status = again.status(&finding);
     let shorter = match &args.out {
         Some(out) if status != FindingStatus::Gone => {
-            Some((write_shorter(game, &finding, args.replays, out)?, out.as_path()))
+            Some((write_shorter(game, &finding, &stored, args.replays, out)?, out.as_path()))
         }
         _ => None,
     };
     let told = Told {
         path: &args.finding,
-        finding: &finding,
+        finding: &stored,
         again: &again,
         shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
     };

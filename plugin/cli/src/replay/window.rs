@@ -6,7 +6,7 @@ use playbot_lab::{findings::StoredFinding, game::Game, split::LevelSplit};
 use crate::{
     error::CliError,
     interrupt,
-    window::{GameWindow, Playlist, WindowSetup},
+    window::{GameWindow, Playlist, WindowError, WindowSetup},
 };
 
 /// Plays the actions in a window; behind them a person goes on.
@@ -24,9 +24,37 @@ pub fn show(game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
         observation_config: ObservationConfig::default(),
         seed: 0,
         stop: interrupt::asked,
-    })?;
+    })
+    .map_err(or_a_picture)?;
     window.replay(finding.episode.clone());
     interrupt::listen();
     tell!("what was found is played first, then you go on; P pause, R again, Escape ends");
     Ok(window.run()?)
+}
+
+/// Where no window opens, pictures can still be drawn.
+fn or_a_picture(error: WindowError) -> CliError {
+    match error {
+        WindowError::NoDisplay(_) | WindowError::NoLibrary(_) | WindowError::NoAdapter(_) => {
+            let words = error.to_string();
+            CliError::Usage(words.replace("there is `playbot eval`", "--png FILE and --apng FILE draw the finding"))
+        }
+        error => error.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_display_pictures_are_named() {
+        let missing = || "DISPLAY is not set".to_owned();
+        let all = [WindowError::NoDisplay, WindowError::NoLibrary, WindowError::NoAdapter];
+        for error in all.map(|of| of(missing())) {
+            let words = or_a_picture(error).to_string();
+            assert!(words.contains("--png FILE and --apng FILE") && !words.contains("eval"), "{words}");
+        }
+        assert!(!or_a_picture(WindowError::Lost(missing())).to_string().contains("--png"));
+    }
 }

@@ -91,7 +91,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
 fn explain(error: CalibrationError) -> CliError {
     match error {
         CalibrationError::Results(error) => error.into(),
-        CalibrationError::Recording(error) => open::missing_recording(error),
+        CalibrationError::Recording(error) => open::missing_recording_of_people(error),
         other => CliError::Usage(other.to_string()),
     }
 }

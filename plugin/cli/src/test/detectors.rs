@@ -7,6 +7,8 @@ use playbot_lab::{
     findings::Checks,
     game::Game,
     games::Games,
+    split::LevelSplit,
+    verdict::{LevelPars, level_name},
 };
 
 use crate::{
@@ -39,12 +41,12 @@ pub struct DetectorArgs {
 const OF_PARS: [&str; 2] = ["shortcut", "too-long"];
 
 impl DetectorArgs {
-    /// The detectors that were chosen.
+    /// The detectors that were chosen for a test of these levels. Says which of them have pars.
     ///
     /// # Errors
     ///
-    /// There is no such detector or setting, a number makes no sense, or the pars cannot be read.
-    pub fn choose(&self, game: &dyn Game) -> Result<Detectors, CliError> {
+    /// There is no such detector or setting, a number makes no sense, or the pars cannot be read or are for other levels.
+    pub fn choose(&self, game: &dyn Game, split: &LevelSplit) -> Result<Detectors, CliError> {
         let mut with = self.detect.clone();
         if self.par.is_some() {
             let is_wanted = |name: &&str| !self.no_detect.iter().any(|other| other == name);
@@ -52,10 +54,18 @@ impl DetectorArgs {
         }
         let choice = DetectorChoice { with, without: self.no_detect.clone(), settings: self.detector.clone() };
         let detectors = Detectors::choose(game, &choice).map_err(|error| usage(&error))?;
-        match &self.par {
-            Some(path) => Ok(detectors.with_pars(Pars::read(path, game).map_err(|error| usage(&error))?)),
-            None => Ok(detectors),
+        let Some(path) = &self.par else { return Ok(detectors) };
+        let pars = Pars::read(path, game).map_err(|error| usage(&error))?;
+        let found = LevelPars::of(&pars, game, split);
+        if found.with == 0 {
+            return Err(CliError::Usage(format!(
+                "{}: {found}; name levels of {split} as results do, such as {}",
+                path.display(),
+                level_name(game, split, split.first)
+            )));
         }
+        tell!("{found}");
+        Ok(detectors.with_pars(pars))
     }
 
     /// All detectors of a game, with these settings: they look for findings again.

@@ -22,7 +22,8 @@ use crate::{
 pub struct RegressArgs {
     /// Play the findings in this folder again instead, as a test or `playbot replay --minimise` has written them, and say
     /// which are still there. Exit code 1 if one is, or cannot be played; those that are pinned in DIR/pins.ron do not count
-    /// until the day after their last. Detectors look as --detector sets them. Ctrl-C ends it with what is known by then.
+    /// until the day after their last. Detectors look as they were set when they found it, or as --detector sets them. Ctrl-C
+    /// ends it with what is known by then.
     #[arg(
         long,
         value_name = "DIR",

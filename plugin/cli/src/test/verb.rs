@@ -51,8 +51,7 @@ use crate::{
   playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test
   playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
 pub struct Args {
-    /// Name of the game.
-    #[arg(required_unless_present_any = ["regress", "list_detectors"])]
+    /// Name of the game; not with --regress.
     game: Option<String>,
     /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; the held-out levels of the
     /// game's experiment if none are named.
@@ -72,8 +71,8 @@ pub struct Args {
     /// Folder of earlier results of the same version of the game: tell what has changed since.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// Folder for the results.
-    #[arg(long, value_name = "DIR", required_unless_present_any = ["regress", "list_detectors"])]
+    /// Folder for the results; not with --regress.
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Go on with a test that was stopped or killed; begin it if there is none.
     #[arg(long, conflicts_with = "force")]
@@ -102,8 +101,15 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(outcome) = args.regress.run(games, &args.detectors, args.compute.threads(), args.json) {
         return outcome;
     }
-    let (Some(name), Some(out)) = (&args.game, &args.out) else {
-        return Err(CliError::Usage("name a game and --out, or a folder of findings with --regress".to_owned()));
+    let Some(name) = &args.game else {
+        let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
+        return Err(CliError::Usage(format!(
+            "name the game to test ({}), or a folder of findings with --regress",
+            names.join(", ")
+        )));
+    };
+    let Some(out) = &args.out else {
+        return Err(CliError::Usage(format!("name a folder for the results with --out, such as --out runs/{name}")));
     };
     let game = games.get(name)?;
     let plan = plan(args, game)?;
@@ -155,12 +161,13 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
     split.check(game)?;
     let episodes = u32::try_from(args.episodes)
         .map_err(|_| CliError::Usage("--episodes has too many digits: choose fewer".to_owned()))?;
+    let detectors = args.detectors.choose(game, &split)?;
     let plan = TestPlan {
         split,
         testers: args.testers.load(game, args.compute.device())?,
         episodes,
         seed: args.seed,
-        detectors: args.detectors.choose(game)?,
+        detectors,
         shard: args.shard,
         threads: args.compute.threads(),
     };

@@ -23,8 +23,9 @@ impl Commands<'_> {
     /// Those that play a level again: the same episodes.
     pub fn again(&self, level: &LevelVerdict) -> Vec<String> {
         let mut commands = rerun_commands(self.program, &self.record, level);
-        // Findings are named with their own files.
-        commands.retain(|command| !command.starts_with(&format!("{} replay ", self.program)));
+        // Findings are named with their own files, and all is run from the same folder.
+        commands
+            .retain(|command| !command.starts_with(&format!("{} replay ", self.program)) && !command.starts_with('#'));
         let tests = format!("{} test ", self.program);
         for command in &mut commands {
             for (name, path) in &self.policies {

@@ -70,7 +70,7 @@ impl Failure<'_> {
             lines.extend(finding.file.iter().map(|file| self.replay(file)));
         }
         let more = level.findings.len().saturating_sub(MOST_FINDINGS);
-        lines.extend((more > 0).then(|| format!("  and {more} more findings")));
+        lines.extend((more > 0).then(|| format!("  and {more} more finding{}", if more == 1 { "" } else { "s" })));
         if let Some(file) = episode {
             lines.extend(["  an episode that failed:".to_owned(), self.replay(file)]);
         }

@@ -39,7 +39,7 @@ impl Wanted {
     /// What is wrong with so many of these levels.
     pub fn complaint(self, broken: usize, levels: u64) -> String {
         let was = if broken == 1 { "was" } else { "were" };
-        let of = format!("{broken} of {levels} levels");
+        let of = format!("{broken} of {levels} level{}", if levels == 1 { "" } else { "s" });
         match self {
             Self::Solvable => format!("{of} {was} not solved by any tester"),
             Self::Solved => format!("{of} {was} not solved by every tester in every episode"),

@@ -19,7 +19,7 @@ impl Calibration {
             ..section("Agreement")
         };
         let plots = Section {
-            text: "Each dot is a level.".to_owned(),
+            text: "Each dot is a level; on the line `equal` people and testers have the same number.".to_owned(),
             charts: self.scatters(),
             ..section("People and testers")
         };
@@ -52,14 +52,16 @@ impl Calibration {
         Measure::ALL.into_iter().filter_map(|measure| self.scatter(measure)).collect()
     }
 
-    /// A dot for each level, the number of people to the right and that of a tester up; `None` if no level has both.
+    /// A dot for each level, the number of people to the right and that of a tester up, and the line on which they are equal;
+    /// `None` if no level has both.
     pub fn scatter(&self, measure: Measure) -> Option<Chart> {
         let curve =
             |(tester, name): (usize, &String)| Curve::scatter(name.as_str(), measure.pairs(&self.levels, tester));
-        let curves: Vec<Curve> = self.testers.iter().enumerate().map(curve).collect();
+        let mut curves: Vec<Curve> = self.testers.iter().enumerate().map(curve).collect();
         if curves.iter().all(|curve| curve.points.is_empty()) {
             return None;
         }
+        curves.extend(diagonal(&curves));
         let (title, y_range) = match measure {
             Measure::Completion => ("Share of tries that were completed", Some((0.0, 1.0))),
             Measure::Time => ("Ticks of completed tries", None),
@@ -74,6 +76,14 @@ impl Calibration {
             marks: Vec::new(),
         })
     }
+}
+
+/// Where both numbers are equal, as far as dots lie: they have one unit. `None` if all lie in one point.
+fn diagonal(curves: &[Curve]) -> Option<Curve> {
+    let numbers =
+        || curves.iter().flat_map(|curve| &curve.points).flat_map(|&(x, y)| [x, y]).filter(|it| it.is_finite());
+    let (low, high) = (numbers().fold(f64::INFINITY, f64::min), numbers().fold(f64::NEG_INFINITY, f64::max));
+    (low < high).then(|| Curve::new("equal", vec![(low, low), (high, high)]))
 }
 
 fn markdown(table: &PlainTable) -> String {
@@ -97,4 +107,18 @@ fn cell(text: &str) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_diagonal_spans_all_dots_of_both_axes() {
+        let one = Curve::scatter("one", vec![(2.0, 5.0), (f64::NAN, 90.0)]);
+        let other = Curve::scatter("other", vec![(3.0, 1.0)]);
+        let line = diagonal(&[one, other]).expect("several numbers");
+        assert_eq!((line.points, line.is_scatter), (vec![(1.0, 1.0), (90.0, 90.0)], false));
+        assert_eq!(diagonal(&[Curve::scatter("one", vec![(2.0, 2.0)])]), None);
+    }
 }

@@ -16,8 +16,9 @@ impl Calibration {
             1 => "1 person".to_owned(),
             count => format!("{count} people"),
         };
+        let were = if self.levels.len() == 1 { "was" } else { "were" };
         let mut words = vec![format!(
-            "{shared} of {} were played by {people} ({}{more}) in {}. Each person counts once on a level, however many tries \
+            "{shared} of {} {were} played by {people} ({}{more}) in {}. Each person counts once on a level, however many tries \
              it took.",
             self.range,
             names.join(", "),

@@ -84,6 +84,11 @@ impl Pars {
         self.0.get(level).copied()
     }
 
+    /// The names of the levels that have one.
+    pub fn levels(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
     /// Whether no level has one.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

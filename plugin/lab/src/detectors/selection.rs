@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use bevy_playbot::unknown_name::UnknownName;
+use bevy_playbot::unknown_name::{UnknownName, nearest};
 use thiserror::Error;
 
 use super::{
-    catalogue::{Known, all},
+    catalogue::{ALWAYS, Known, all},
     level_detector::LevelDetector,
     par::Pars,
     tick_time::TickTime,
@@ -40,9 +40,22 @@ pub struct Detectors {
 /// Detectors cannot be chosen so.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum DetectorError {
-    /// There is no such detector or setting.
+    /// There is no such detector.
     #[error(transparent)]
     Name(#[from] UnknownName),
+    /// The detector has no such setting.
+    #[error("the detector `{detector}` has no setting `{key}`{}; {}", hint(key, known), settings(known))]
+    Setting {
+        /// The detector.
+        detector: String,
+        /// What was named.
+        key: String,
+        /// Its settings.
+        known: Vec<String>,
+    },
+    /// What every test finds can neither be chosen nor left out, and has no settings.
+    #[error("`{0}` looks in every test, whatever is chosen, and has no settings: leave it out of the options")]
+    Always(String),
     /// This is no setting.
     #[error("`{0}` sets nothing: write it as detector.setting=number, such as stuck.ticks=200")]
     Form(String),
@@ -81,7 +94,7 @@ impl Detectors {
         let names: Vec<&str> = known.iter().map(Known::name).chain([ALL]).collect();
         let unknown = choice.with.iter().chain(&choice.without).find(|name| !names.contains(&name.as_str()));
         if let Some(unknown) = unknown {
-            return Err(UnknownName::new("detector", unknown, &names).into());
+            return Err(no_detector(unknown, &names));
         }
         known.retain(|known| choice.takes(known));
         Ok(Self::of(known))
@@ -146,6 +159,23 @@ impl DetectorChoice {
     }
 }
 
+/// That a name is no detector that can be chosen.
+fn no_detector(name: &str, names: &[&str]) -> DetectorError {
+    if ALWAYS.iter().any(|(always, _)| *always == name) {
+        return DetectorError::Always(name.to_owned());
+    }
+    UnknownName::new("detector", name, names).into()
+}
+
+fn hint(key: &str, known: &[String]) -> String {
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    nearest(key, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+}
+
+fn settings(known: &[String]) -> String {
+    if known.is_empty() { "it has none".to_owned() } else { format!("it has {}", known.join(", ")) }
+}
+
 /// Changes settings.
 fn set(known: &mut [Known], choice: &DetectorChoice) -> Result<(), DetectorError> {
     for text in &choice.settings {
@@ -153,19 +183,47 @@ fn set(known: &mut [Known], choice: &DetectorChoice) -> Result<(), DetectorError
         let (place, value) = text.split_once('=').ok_or_else(form)?;
         let (name, key) = place.trim().split_once('.').ok_or_else(form)?;
         let names: Vec<&str> = known.iter().map(Known::name).collect();
-        let unknown = UnknownName::new("detector", name, &names);
-        let Some(detector) = known.iter_mut().find(|known| known.name() == name) else { return Err(unknown.into()) };
+        let unknown = no_detector(name, &names);
+        let Some(detector) = known.iter_mut().find(|known| known.name() == name) else { return Err(unknown) };
         if !choice.takes(detector) {
             return Err(DetectorError::Idle { text: text.clone(), name: name.to_owned() });
         }
         let settings = detector.settings();
-        let keys: Vec<&str> = settings.iter().map(|setting| setting.key).collect();
-        let unknown = UnknownName::new("setting", key, &keys);
-        let Some(setting) = settings.into_iter().find(|setting| setting.key == key) else { return Err(unknown.into()) };
+        let keys = settings.iter().map(|setting| setting.key.to_owned()).collect();
+        let unknown = DetectorError::Setting { detector: name.to_owned(), key: key.to_owned(), known: keys };
+        let Some(setting) = settings.into_iter().find(|setting| setting.key == key) else { return Err(unknown) };
         match value.trim().parse::<f64>() {
             Ok(number) if number.is_finite() && number >= setting.least => *setting.value = number,
             _ => return Err(DetectorError::Value { text: text.clone(), least: setting.least.to_string() }),
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foreign::ForeignGame;
+
+    fn said(choice: &DetectorChoice) -> String {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
+        Detectors::choose(&game, choice).map(drop).expect_err("no such choice").to_string()
+    }
+
+    #[test]
+    fn an_unknown_setting_is_told_with_its_detector_and_what_there_is() {
+        let settings = vec!["stuck.tick=3".to_owned()];
+        let words = said(&DetectorChoice { settings, ..DetectorChoice::default() });
+        assert!(
+            words.starts_with("the detector `stuck` has no setting `tick` (did you mean `ticks`?); it has "),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn what_always_looks_is_not_called_unknown() {
+        let without = vec!["panic".to_owned()];
+        let words = said(&DetectorChoice { without, ..DetectorChoice::default() });
+        assert!(words.starts_with("`panic` looks in every test"), "{words}");
+    }
 }

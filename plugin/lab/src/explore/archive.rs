@@ -19,15 +19,21 @@ pub struct ReachedCell {
     way: Way,
     /// Whether the episode was over on arrival, on every way there: nobody can go on from it.
     pub is_over: bool,
+    /// Whether every way there only passes it between two ticks: it ends with the tick behind the cell.
+    pub is_passed: bool,
     /// Visits in which it was seen.
     pub visits: u64,
 }
 
 impl ReachedCell {
     /// Ticks of the shortest way that was found to it. A way on which the episode goes on comes before a shorter one on
-    /// which it ends.
+    /// which it ends, and one that ends in the cell before a shorter one that passes it.
     pub fn ticks(&self) -> u32 {
         self.way.ticks
+    }
+
+    fn sight(&self) -> Sight {
+        Sight { ticks: self.ticks(), is_over: self.is_over, is_passed: self.is_passed }
     }
 }
 
@@ -37,6 +43,13 @@ pub(super) struct Destination {
     /// The cell; `None` for the start of the level, which has no way.
     pub cell: Option<Cell>,
     pub way: Way,
+    /// Whether the way only passes the cell: the agent is behind it then.
+    pub is_passed: bool,
+}
+
+impl Destination {
+    /// The start of the level.
+    pub const START: Self = Self { cell: None, way: Way::START, is_passed: false };
 }
 
 /// All cells, with their ways.
@@ -50,7 +63,7 @@ pub(super) struct Archive {
 impl Archive {
     /// Nothing but the start of a level.
     pub fn new(space: ActionSpace) -> Self {
-        let start = ReachedCell { way: Way::START, is_over: false, visits: 0 };
+        let start = ReachedCell { way: Way::START, is_over: false, is_passed: false, visits: 0 };
         Self { start, cells: BTreeMap::new(), ways: Ways::new(space), solution: None }
     }
 
@@ -76,8 +89,7 @@ impl Archive {
 
     /// Whether a cell has not been reached yet, or not so soon.
     pub fn is_news(&self, cell: &Cell, sight: &Sight) -> bool {
-        let is_better = |known: &ReachedCell| (sight.is_over, sight.ticks) < (known.is_over, known.ticks());
-        self.cells.get(cell).is_none_or(is_better)
+        self.cells.get(cell).is_none_or(|known| sight.is_better_than(&known.sight()))
     }
 
     /// Draws cells to explore from, with the weights of the paper's version without knowledge of the game: 1/√(visits + 1).
@@ -93,7 +105,7 @@ impl Archive {
         let mut draw = || {
             let at = unit(rng) * sum;
             let (cell, reached) = open[ends.partition_point(|end| *end <= at).min(open.len() - 1)];
-            Destination { cell: cell.cloned(), way: reached.way }
+            Destination { cell: cell.cloned(), way: reached.way, is_passed: reached.is_passed }
         };
         (0..count).map(|_| draw()).collect()
     }
@@ -113,11 +125,12 @@ impl Archive {
             let found = ReachedCell {
                 way: way.map_or(destination.way, |way| way.cut(sight.ticks)),
                 is_over: sight.is_over,
+                is_passed: sight.is_passed,
                 visits: 0,
             };
             let reached = self.cells.entry(cell).or_insert(found);
             if is_news {
-                (reached.way, reached.is_over) = (found.way, found.is_over);
+                *reached = ReachedCell { visits: reached.visits, ..found };
             }
             reached.visits += 1;
         }
@@ -141,9 +154,10 @@ mod tests {
     fn visit(archive: &Archive, from: Option<i32>, actions: &[u32], seen: &[(i32, u32, bool)]) -> Visited {
         let from = from.map(cell);
         let way = from.as_ref().map_or(Way::START, |from| archive.cells[from].way);
-        let seen = seen.iter().map(|&(number, ticks, is_over)| (cell(number), Sight { ticks, is_over }));
+        let seen =
+            seen.iter().map(|&(number, ticks, is_over)| (cell(number), Sight { ticks, is_over, is_passed: false }));
         Visited {
-            destination: Destination { cell: from, way },
+            destination: Destination { cell: from, way, is_passed: false },
             piece: Route { actions: Actions::Discrete(actions.to_vec()), hashes: actions.to_vec() },
             seen: seen.collect(),
             solved: None,
@@ -183,6 +197,25 @@ mod tests {
         assert_eq!(actions(&archive, 3), [1, 2, 5, 5]);
         archive.merge(visit(&archive, None, &[9], &[(3, 1, true)]));
         assert_eq!(actions(&archive, 3).len(), 4);
+    }
+
+    #[test]
+    fn a_way_that_ends_in_a_cell_counts_more_than_one_that_passes_it() {
+        let mut archive = archive();
+        let passing = |archive: &Archive, actions: &[u32]| {
+            let mut visit = visit(archive, None, actions, &[]);
+            let ticks = actions.len() as u32;
+            visit.seen.insert(cell(7), Sight { ticks, is_over: false, is_passed: true });
+            visit
+        };
+        archive.merge(passing(&archive, &[4, 4]));
+        assert_eq!((actions(&archive, 7), archive.cells[&cell(7)].is_passed), (vec![4, 4], true));
+        assert!(archive.choose(99, &mut Streams::new(1).stream("test", 0)).iter().any(|chosen| chosen.is_passed));
+        archive.merge(visit(&archive, None, &[5, 5, 5], &[(7, 3, false)]));
+        assert_eq!((actions(&archive, 7), archive.cells[&cell(7)].is_passed), (vec![5, 5, 5], false));
+        archive.merge(passing(&archive, &[6]));
+        assert_eq!(actions(&archive, 7), [5, 5, 5]);
+        assert_eq!(archive.cells[&cell(7)].visits, 3);
     }
 
     #[test]

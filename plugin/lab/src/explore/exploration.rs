@@ -84,7 +84,8 @@ impl Exploration {
         self.archive.cells()
     }
 
-    /// The shortest way that was found to a cell, with the state hash after each tick; its last one is that on arrival.
+    /// The shortest way that was found to a cell, with the state hash after each tick; its last one is that on arrival,
+    /// or that behind a cell that is only passed.
     pub fn route_to(&self, cell: &Cell) -> Option<Route> {
         self.archive.route_to(cell)
     }
@@ -104,9 +105,14 @@ impl Exploration {
         self.open.iter().flatten().filter(move |cell| !self.cells().contains_key(cell))
     }
 
+    /// How many of the open cells were reached; `None` if nobody knows how many there are.
+    pub fn open_reached(&self) -> Option<usize> {
+        Some(self.open.as_ref()?.len() - self.missed().count())
+    }
+
     /// The share of the open cells that were reached; `None` if nobody knows how many there are.
     pub fn coverage(&self) -> Option<f64> {
         let open = self.open.as_ref().map(BTreeSet::len)?;
-        Some((open - self.missed().count()) as f64 / open.max(1) as f64)
+        Some(self.open_reached()? as f64 / open.max(1) as f64)
     }
 }

@@ -27,6 +27,7 @@
 
 mod archive;
 mod cell;
+mod check_cell;
 mod error;
 mod exploration;
 mod explorer;
@@ -34,6 +35,7 @@ mod grid;
 mod job;
 mod lookout;
 mod open_cells;
+mod passed;
 mod plan;
 mod play_route;
 mod round;
@@ -45,11 +47,13 @@ mod world;
 
 pub use archive::ReachedCell;
 pub use cell::{Cell, NoCell};
+pub use check_cell::check_cell;
 pub use error::ExploreError;
 pub use exploration::{EndCounts, Exploration, Stop};
 pub use explorer::Explorer;
 pub use grid::CellGrid;
 pub use open_cells::open_cells;
+pub(crate) use passed::{cells_between, reach};
 pub use plan::ExplorePlan;
 pub use play_route::{follow_route, record_route};
 pub use round::{Round, explore};

@@ -43,12 +43,12 @@ pub struct ExplorePlan {
 }
 
 impl ExplorePlan {
-    /// The usual plan for a level: random actions that last for 20 ticks on average, and 200,000 steps.
+    /// The usual plan for a level: random actions that last for 20 ticks on average, and 500,000 steps.
     pub fn new(mode: impl Into<String>, level: u64) -> Self {
         Self {
             mode: mode.into(),
             level,
-            steps: 200_000,
+            steps: 500_000,
             until: Until::default(),
             explorer: Explorer::default(),
             observation_config: ObservationConfig::default(),

@@ -58,7 +58,8 @@ pub fn explore(
     let floor_plan = game.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
     let open = floor_plan.as_ref().and_then(|floor_plan| open_cells(floor_plan, &grid));
-    let mut crews = build_crews(game, plan, Lookout::new(grid, plan.cell_size))?;
+    let tile = CellGrid::new(floor_plan.as_ref(), None).size;
+    let mut crews = build_crews(game, plan, Lookout::new(grid, plan.cell_size, open.as_ref(), tile))?;
     let mut chance = Streams::new(plan.seed).stream("explore/choose", 0);
     let mut archive = Archive::new(game.actions());
     let (mut steps, mut visits, mut ends) = (0, 0, EndCounts::default());
@@ -86,6 +87,8 @@ pub fn explore(
         }
     };
     let grid = has_places(&crews).then_some(grid);
+    // They look at the open cells, which are part of what was found.
+    drop(crews);
     Ok(Exploration {
         mode: plan.mode.clone(),
         level: plan.level,
@@ -109,7 +112,11 @@ fn has_places(crews: &[Crew<'_>]) -> bool {
 }
 
 /// Worlds of agents. Games that are built anew for each episode have one in each, since others would have to wait for it.
-fn build_crews<'a>(game: &'a dyn Game, plan: &'a ExplorePlan, lookout: Lookout) -> Result<Vec<Crew<'a>>, ExploreError> {
+fn build_crews<'a>(
+    game: &'a dyn Game,
+    plan: &'a ExplorePlan,
+    lookout: Lookout<'a>,
+) -> Result<Vec<Crew<'a>>, ExploreError> {
     let worlds = if game.built_anew().is_some() { plan.arenas } else { plan.worlds.min(plan.arenas) };
     let arrangement = Arrangement::new(game, plan.arenas, worlds);
     let mut crews = Vec::new();

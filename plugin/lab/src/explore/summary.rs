@@ -26,12 +26,16 @@ pub struct ExplorationSummary {
     pub visits: u64,
     /// Why it ended.
     pub stop: Stop,
-    /// Cells that were reached.
+    /// Cells that were reached, open or not.
     pub cells: usize,
     /// Cells that no wall cuts off from the start, if the floor plan says it.
     pub open_cells: Option<usize>,
+    /// How many of these were reached.
+    pub open_cells_reached: Option<usize>,
     /// The share of these that were reached.
     pub coverage: Option<f64>,
+    /// Cells that were reached and are none of these, such as those above the level.
+    pub other_cells: Option<usize>,
     /// Whether the level is known to have a goal.
     pub has_goal: bool,
     /// Ticks of the shortest solution.
@@ -56,7 +60,9 @@ impl Exploration {
             stop: self.stop,
             cells: self.cells().len(),
             open_cells: self.open.as_ref().map(BTreeSet::len),
+            open_cells_reached: self.open_reached(),
             coverage: self.coverage(),
+            other_cells: self.open_reached().map(|open| self.cells().len() - open),
             has_goal: self.has_goal,
             solution_ticks: self.solution_ticks(),
             ends: self.ends,
@@ -69,17 +75,24 @@ impl fmt::Display for ExplorationSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { game, mode, level, explorer, steps, visits, cells, ends, .. } = self;
         writeln!(f, "{game} {mode}:{level}, explored by {explorer} in {steps} steps and {visits} visits")?;
-        match (self.open_cells, self.coverage) {
-            (Some(open), Some(coverage)) => {
-                let percent = 100.0 * coverage;
-                writeln!(f, "cells     {cells}, {percent:.1} % of the {open} that no wall cuts off from the start")?;
+        match (self.open_cells, self.open_cells_reached, self.coverage) {
+            (Some(open), Some(reached), Some(coverage)) => {
+                write!(f, "cells     {reached} of {open} open cells ({:.1} %)", 100.0 * coverage)?;
+                match self.other_cells {
+                    Some(others) if others > 0 => writeln!(f, ", {others} more")?,
+                    _ => writeln!(f)?,
+                }
             }
             _ => writeln!(f, "cells     {cells}")?,
         }
         match (self.solution_ticks, self.has_goal) {
+            (Some(ticks), _) if ends.won == 0 => writeln!(f, "solution  {ticks} ticks; episodes go on after it")?,
             (Some(ticks), _) => writeln!(f, "solution  {ticks} ticks")?,
             (None, true) => writeln!(f, "solution  none was found")?,
             (None, false) => writeln!(f, "solution  none was found, and no goal is known")?,
+        }
+        if *ends == EndCounts::default() {
+            return write!(f, "episodes  none came to its end");
         }
         write!(f, "episodes  {} won, {} lost, {} out of time", ends.won, ends.lost, ends.out_of_time)
     }
@@ -101,7 +114,9 @@ mod tests {
             stop: Stop::Spent,
             cells: 30,
             open_cells: Some(40),
-            coverage: Some(0.75),
+            open_cells_reached: Some(24),
+            coverage: Some(0.6),
+            other_cells: Some(6),
             has_goal: true,
             solution_ticks: None,
             ends: EndCounts { won: 0, lost: 2, out_of_time: 1 },
@@ -112,12 +127,27 @@ mod tests {
     #[test]
     fn people_read_coverage_and_solution() {
         let text = summary().to_string();
-        for words in ["walk easy:7", "30, 75.0 % of the 40", "none was found\n", "0 won, 2 lost, 1 out of time"] {
+        for words in [
+            "walk easy:7",
+            "cells     24 of 40 open cells (60.0 %), 6 more\n",
+            "none was found\n",
+            "0 won, 2 lost, 1 out of time",
+        ] {
             assert!(text.contains(words), "`{words}` is missing in: {text}");
         }
-        let solved = ExplorationSummary { solution_ticks: Some(12), ..summary() }.to_string();
-        assert!(solved.contains("solution  12 ticks"), "{solved}");
+        let none_else = ExplorationSummary { other_cells: Some(0), ..summary() }.to_string();
+        assert!(none_else.contains("24 of 40 open cells (60.0 %)\n"), "{none_else}");
         let bare = ExplorationSummary { open_cells: None, coverage: None, has_goal: false, ..summary() }.to_string();
         assert!(bare.contains("cells     30\n") && bare.contains("no goal is known"), "{bare}");
+    }
+
+    #[test]
+    fn a_solution_does_not_contradict_how_episodes_ended() {
+        let solved = |ends| ExplorationSummary { solution_ticks: Some(12), ends, ..summary() }.to_string();
+        let won = solved(EndCounts { won: 3, ..EndCounts::default() });
+        assert!(won.contains("solution  12 ticks\n") && won.contains("3 won, 0 lost"), "{won}");
+        let endless = solved(EndCounts::default());
+        assert!(endless.contains("solution  12 ticks; episodes go on after it\n"), "{endless}");
+        assert!(endless.ends_with("episodes  none came to its end"), "{endless}");
     }
 }

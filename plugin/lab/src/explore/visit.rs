@@ -34,6 +34,16 @@ pub(super) struct Sight {
     pub ticks: u32,
     /// Whether the episode was over.
     pub is_over: bool,
+    /// Whether the agent had passed the cell between two ticks, and was behind it.
+    pub is_passed: bool,
+}
+
+impl Sight {
+    /// Whether it says more of the way to a cell than another one.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let rank = |sight: &Self| (sight.is_over, sight.is_passed, sight.ticks);
+        rank(self) < rank(other)
+    }
 }
 
 /// What a visit has brought.
@@ -41,7 +51,7 @@ pub(super) struct Visited {
     pub destination: Destination,
     /// What was done behind the way to the destination.
     pub piece: Route,
-    /// The cells that were seen from the destination on, each for the first time.
+    /// The cells that were seen from the destination on, each when the way to it was best.
     pub seen: BTreeMap<Cell, Sight>,
     /// Ticks after which the level's aim was reached.
     pub solved: Option<u32>,
@@ -70,6 +80,8 @@ pub(super) struct Visit {
     ticks: u32,
     /// Ticks that are left unless something new is found.
     left: u32,
+    /// Where the agent was after the last tick, from the destination on.
+    place: Option<Vec2>,
     rng: ChaCha8Rng,
     /// The last random action that was played.
     last: Option<ActionValue>,
@@ -88,13 +100,14 @@ impl Visit {
         // As replays have them, in case a game draws from the streams of its agents.
         agent.insert((Control::Bot, LevelQueue::Always(level), AgentStreams::new(0, 0)));
         let destination = job.destination.clone();
-        let here = destination.cell.clone().map(|cell| (cell, Sight { ticks: destination.way.ticks, is_over: false }));
+        let sight = Sight { ticks: destination.way.ticks, is_over: false, is_passed: destination.is_passed };
+        let here = destination.cell.clone().map(|cell| (cell, sight));
         let piece = Route::empty(&draws.space);
         let seen = here.into_iter().collect();
         let visited = Visited { destination, piece, seen, solved: None, steps: 0, end: None };
         let rng = draws.streams.stream("explore", job.number);
         let (ticks, left) = (0, job.patience);
-        Self { level, job, visited, ticks, left, rng, last: None, next: None, was_solved: false }
+        Self { level, job, visited, ticks, left, place: None, rng, last: None, next: None, was_solved: false }
     }
 
     /// Decides what the agent does in the next tick, or lets the policy do so.
@@ -127,7 +140,8 @@ impl Visit {
         }
     }
 
-    /// Takes notes after a tick; true if the visit is over. `spot` says in which cell the agent is after so many ticks.
+    /// Takes notes after a tick; true if the visit is over. `spot` says in which cell the agent is after so many ticks,
+    /// and which ones it has passed since it was in a place.
     ///
     /// # Errors
     ///
@@ -138,7 +152,7 @@ impl Visit {
         agent: Entity,
         end: Option<EpisodeResult>,
         archive: &Archive,
-        spot: impl FnOnce(u32) -> Option<Spotted>,
+        spot: impl FnOnce(u32, Option<Vec2>) -> Option<Spotted>,
     ) -> Result<bool, Divergence> {
         let episode = world.get::<Episode>(agent);
         let ticks = end.map_or_else(|| episode.map_or(0, |episode| episode.tick), |end| end.ticks);
@@ -166,7 +180,7 @@ impl Visit {
             }
         }
         if ticks >= self.visited.destination.way.ticks
-            && let Some(spotted) = spot(ticks)
+            && let Some(spotted) = spot(ticks, self.place.take())
         {
             self.look(spotted, end.is_some(), archive)?;
         }
@@ -190,27 +204,38 @@ impl Visit {
         }
     }
 
-    /// Notes the cell that the agent is in.
+    /// Notes the cell that the agent is in, and those that it has passed.
     fn look(&mut self, spotted: Spotted, is_last: bool, archive: &Archive) -> Result<(), Divergence> {
-        let Spotted { ticks, cell } = spotted;
-        let Destination { cell: wanted, way } = &self.visited.destination;
+        let Spotted { ticks, cell, place, passed } = spotted;
+        let Destination { cell: wanted, way, is_passed } = &self.visited.destination;
         if ticks < way.ticks {
             return Ok(());
         }
-        if let Some(wanted) = wanted.as_ref().filter(|wanted| ticks == way.ticks && **wanted != cell) {
+        // Whoever has passed a cell is in another one, and the state hash has said that it is the same one.
+        let is_there = ticks == way.ticks && !is_passed;
+        if let Some(wanted) = wanted.as_ref().filter(|wanted| is_there && **wanted != cell) {
             let what = format!("the agent is in cell {cell}, and the same actions led to cell {wanted} before");
             return Err(self.divergence(ticks.saturating_sub(1), what));
         }
         // What was seen before the last action was not the end.
-        let sight = Sight { ticks, is_over: is_last && ticks == self.ticks };
-        if self.visited.seen.contains_key(&cell) {
-            return Ok(());
+        let is_over = is_last && ticks == self.ticks;
+        for cell in passed {
+            self.see(cell, Sight { ticks, is_over, is_passed: true }, archive);
+        }
+        self.see(cell, Sight { ticks, is_over, is_passed: false }, archive);
+        self.place = place;
+        Ok(())
+    }
+
+    /// Notes a cell, unless the visit knows a better way to it.
+    fn see(&mut self, cell: Cell, sight: Sight, archive: &Archive) {
+        if self.visited.seen.get(&cell).is_some_and(|known| !sight.is_better_than(known)) {
+            return;
         }
         if archive.is_news(&cell, &sight) {
             self.left = self.job.patience;
         }
         self.visited.seen.insert(cell, sight);
-        Ok(())
     }
 
     fn divergence(&self, tick: u32, what: String) -> Divergence {

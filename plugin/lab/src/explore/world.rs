@@ -22,7 +22,7 @@ pub(super) struct ExploreWorld<'a> {
     world: World,
     agents: Vec<Entity>,
     draws: Draws,
-    lookout: Lookout,
+    lookout: Lookout<'a>,
 }
 
 impl<'a> ExploreWorld<'a> {
@@ -34,7 +34,7 @@ impl<'a> ExploreWorld<'a> {
     pub fn new(
         game: &'a dyn Game,
         plan: &'a ExplorePlan,
-        lookout: Lookout,
+        lookout: Lookout<'a>,
         first: u32,
         count: u32,
     ) -> Result<Self, VisionError> {
@@ -94,7 +94,7 @@ impl<'a> ExploreWorld<'a> {
                 let Some(running) = visit.as_mut() else { continue };
                 let end = ended.iter().find(|(entity, _)| *entity == agent).map(|(_, result)| *result);
                 let (game, world, lookout) = (self.game, &self.world, &mut self.lookout);
-                let spot = |ticks| lookout.spot(game, world, agent, ticks);
+                let spot = |ticks, before| lookout.spot(game, world, agent, ticks, before);
                 let diverged = |divergence| {
                     let mode = self.mode.to_owned();
                     ExploreError::Diverged { game: game.name(), mode, divergence }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{head::FindingHead, moment::Watcher, play::Replayed};
 use crate::{
+    detector::Detector,
     detectors::{LevelDetector, ShownBy},
     game::Game,
 };
@@ -17,6 +18,8 @@ pub enum Check {
     Episode(fn(&FindingHead, &Replayed) -> Option<u32>),
     /// In the World, tick by tick; each replay gets a watcher of its own.
     Ticks(Arc<dyn Fn(&FindingHead) -> Watcher + Send + Sync>),
+    /// By a detector that looks while somebody plays. It says anew what is wrong.
+    Detector(Arc<dyn Detector>),
     /// By a detector that looks at whole levels: in the level itself, or in what came of the episode, as it
     /// [says](LevelDetector::shown_by).
     WholeLevel(Arc<dyn LevelDetector>),
@@ -27,7 +30,7 @@ impl Check {
     pub fn needs_play(&self) -> bool {
         match self {
             Self::Level(_) => false,
-            Self::Episode(_) | Self::Ticks(_) => true,
+            Self::Episode(_) | Self::Ticks(_) | Self::Detector(_) => true,
             Self::WholeLevel(detector) => detector.shown_by() == ShownBy::Episode,
         }
     }

@@ -2,24 +2,36 @@
 
 use bevy_playbot::episode::EpisodeEnd;
 
-use super::{breakage::say_the_same, check::Check, head::FindingHead, play::Replayed};
+use super::{
+    breakage::say_the_same,
+    check::Check,
+    failure::{LOST, NOT_SOLVED},
+    head::FindingHead,
+    play::Replayed,
+};
 use crate::game::Game;
 
 /// Checks by the names of their detectors.
 #[derive(Clone)]
-pub struct Checks(Vec<(&'static str, Check)>);
+pub struct Checks {
+    checks: Vec<(&'static str, Check)>,
+    /// The detectors among them with all their settings, as [`Detectors::record`](crate::detectors::Detectors::record) has
+    /// them.
+    pub(super) records: Vec<String>,
+}
 
 impl Default for Checks {
     /// Those of what tests of levels find.
     fn default() -> Self {
-        Self(vec![
+        let checks = vec![
             ("panic", Check::Episode(is_broken)),
             ("fault", Check::Episode(is_broken)),
             ("endless", Check::Episode(is_broken)),
             ("unreachable-goal", Check::Level(is_unreachable)),
-            ("lost", Check::Episode(is_lost)),
-            ("not-solved", Check::Episode(is_not_solved)),
-        ])
+            (LOST, Check::Episode(is_lost)),
+            (NOT_SOLVED, Check::Episode(is_not_solved)),
+        ];
+        Self { checks, records: Vec::new() }
     }
 }
 
@@ -27,19 +39,19 @@ impl Checks {
     /// These and one more; it takes the place of the one that has its name.
     #[must_use]
     pub fn with(mut self, detector: &'static str, check: Check) -> Self {
-        self.0.retain(|(name, _)| *name != detector);
-        self.0.push((detector, check));
+        self.checks.retain(|(name, _)| *name != detector);
+        self.checks.push((detector, check));
         self
     }
 
     /// The check of a detector.
     pub fn of(&self, detector: &str) -> Option<Check> {
-        self.0.iter().find(|(name, _)| *name == detector).map(|(_, check)| check.clone())
+        self.checks.iter().find(|(name, _)| *name == detector).map(|(_, check)| check.clone())
     }
 
     /// Names of the detectors.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.0.iter().map(|(name, _)| *name)
+        self.checks.iter().map(|(name, _)| *name)
     }
 }
 

@@ -1,13 +1,12 @@
 //! Checks of detectors that look while somebody plays.
 
-use std::sync::Arc;
+use std::{cell::RefCell, rc::Rc, sync::Arc};
 
 use bevy_playbot::{action::Action, episode::Episode, observation::Observation, reward::Reward, state_hash::StateHash};
 
 use super::{
     check::Check,
     checks::Checks,
-    head::FindingHead,
     moment::{Moment, Watcher},
 };
 use crate::{
@@ -28,19 +27,26 @@ impl Checks {
     /// a level or the end of an episode [shows](ShownBy) what they find.
     #[must_use]
     pub fn with_detectors(self, detectors: &Detectors) -> Self {
-        let checks = detectors.ticks.iter().fold(self, |checks, detector| {
-            let (name, detector) = (detector.name(), Arc::clone(detector));
-            checks.with(name, Check::Ticks(Arc::new(move |_: &FindingHead| watcher(Arc::clone(&detector)))))
-        });
+        let checks = self.with_records(detectors.record());
+        let checks = detectors
+            .ticks
+            .iter()
+            .fold(checks, |checks, detector| checks.with(detector.name(), Check::Detector(Arc::clone(detector))));
         let shown = detectors.levels.iter().filter(|detector| detector.shown_by() != ShownBy::Nothing);
         shown.fold(checks, |checks, detector| checks.with(detector.name(), Check::WholeLevel(Arc::clone(detector))))
     }
 }
 
-/// Looks as the detector does in a test.
-fn watcher(detector: Arc<dyn Detector>) -> Watcher {
-    let mut looking = Looking::new(detector);
-    Box::new(move |moment: &Moment| looking.look(moment).map(|_| moment.tick))
+/// Looks as the detector does in a test. The second has what it says, once it has seen something.
+pub(super) fn watcher(detector: Arc<dyn Detector>) -> (Watcher, Rc<RefCell<Option<String>>>) {
+    let said = Rc::<RefCell<Option<String>>>::default();
+    let (mut looking, heard) = (Looking::new(detector), Rc::clone(&said));
+    let watcher: Watcher = Box::new(move |moment: &Moment| {
+        let words = looking.look(moment)?;
+        *heard.borrow_mut() = Some(words);
+        Some(moment.tick)
+    });
+    (watcher, said)
 }
 
 /// A detector at work in the World of one episode.

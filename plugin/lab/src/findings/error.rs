@@ -12,18 +12,15 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FindingError {
     /// The file cannot be read as a recording, or not be written.
-    #[error("{0}; a finding is one episode: if the file is damaged, test the level again with `playbot test`")]
+    #[error("{}", file_words(.0))]
     File(#[from] DemoFileError),
     /// It is a recording without a head.
-    #[error(
-        "{}: a recording, but of no finding ({why}): name a .finding that `playbot test` has written; recordings are shown by \
-         `playbot view` and checked by `playbot demo verify`", path.display()
-    )]
+    #[error("{}", no_finding_words(path, game))]
     NoFinding {
         /// The file.
         path: PathBuf,
-        /// What its note says.
-        why: String,
+        /// The game that was recorded.
+        game: String,
     },
     /// The head was written by a later version.
     #[error("{}: a finding in form {found}, but this program reads forms up to {newest}: update the program", path.display())]
@@ -95,6 +92,41 @@ impl FindingError {
             _ => true,
         }
     }
+}
+
+/// What is wrong with a file, and what helps. A finding is a single episode, so nothing of it can be repaired.
+fn file_words(error: &DemoFileError) -> String {
+    let path = error.path.display();
+    match &error.fault {
+        DemoFault::Io { source, .. } if source.kind() == io::ErrorKind::NotFound => format!(
+            "{path}: there is no such file: name a .finding that `playbot test` has written, as in \
+             runs/test/findings/NAME.finding"
+        ),
+        DemoFault::NewerFormat { .. }
+        | DemoFault::Io { .. }
+        | DemoFault::PushFailed { .. }
+        | DemoFault::PushTorn { .. } => error.to_string(),
+        fault => {
+            let what = fault.to_string();
+            let what = what.split("; run `playbot demo repair").next().unwrap_or_default();
+            format!("{path}: {what}; test the level again with `playbot test`, which writes its findings anew")
+        }
+    }
+}
+
+/// What helps with a recording that is no finding.
+fn no_finding_words(path: &Path, game: &str) -> String {
+    let (shown, word) = (path.display(), word(path));
+    format!(
+        "{shown}: a recording, but of no finding: `playbot demo show {word}` says what is in it, `playbot view {game} \
+         --demo {word}` shows it; a finding is a .finding that `playbot test` has written"
+    )
+}
+
+/// A path as one word of a command.
+fn word(path: &Path) -> String {
+    let name = path.display().to_string();
+    if name.contains(char::is_whitespace) { format!("'{name}'") } else { name }
 }
 
 pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FindingError {

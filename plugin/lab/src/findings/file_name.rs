@@ -11,7 +11,7 @@ const MOST_LETTERS: usize = 80;
 
 impl StoredFinding {
     /// The name of its file, such as `hard-7.panic.random-1f2e3d4c.finding`: it says which level, detector and tester, and
-    /// ends with letters that tell it from others. It does not change when the finding is minimised.
+    /// ends with letters that tell it from others. A test gives a minimised finding the name that it had before.
     pub fn file_name(&self) -> String {
         let head = &self.head;
         let parts = [Some(&head.level), Some(&head.detector), head.tester.as_ref()];

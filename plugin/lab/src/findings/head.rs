@@ -28,6 +28,9 @@ pub struct FindingHead {
     pub state_hash: Option<u32>,
     /// Ticks of the episode before any were left out.
     pub original_ticks: u32,
+    /// Settings of the detector that were not the usual ones, as `name.key=value`. Older files have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub settings: Vec<String>,
 }
 
 impl FindingHead {
@@ -43,6 +46,7 @@ impl FindingHead {
             message: message.into(),
             state_hash: None,
             original_ticks: 0,
+            settings: Vec::new(),
         }
     }
 }

@@ -2,11 +2,12 @@
 
 use std::{fs, path::PathBuf};
 
-use bevy_playbot::{action::ActionValue, episode::EpisodeEnd, vision::ObservationConfig};
+use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
 
 use super::{
     checks::Checks,
     error::{FindingError, io_error},
+    failure::failure_of,
     folder::FINDINGS,
     head::FindingHead,
     minimise::{Budget, minimise},
@@ -79,7 +80,8 @@ impl FindingFiles {
         if self.checks.of(seen.detector).is_none() {
             return Ok(None);
         }
-        let head = FindingHead::new(level.name, seen.detector, seen.message);
+        let settings = self.checks.settings_of(game, seen.detector);
+        let head = FindingHead { settings, ..FindingHead::new(level.name, seen.detector, seen.message) };
         let (mode, number) = alone(game, level);
         match seen.played {
             None => self.store(game, &mode, number, head, &[]),
@@ -109,11 +111,7 @@ impl FindingFiles {
         let setting = Setting { game, mode: &mode, level: number, seed: played.seed };
         let again = play_player(setting, played.player, played.observation_config);
         let Ok((actions, replayed)) = again else { return Ok(None) };
-        let Some(end) = replayed.end.filter(|end| !end.success) else { return Ok(None) };
-        let (detector, message) = match end.end {
-            EpisodeEnd::Terminated { .. } => ("lost", format!("lost after {} ticks", end.ticks)),
-            EpisodeEnd::Truncated => ("not-solved", format!("time was up after {} ticks", end.ticks)),
-        };
+        let Some((detector, message)) = replayed.end.as_ref().and_then(failure_of) else { return Ok(None) };
         let head = FindingHead::new(level.name, detector, message);
         self.store(game, &mode, number, by(head, played), &actions)
     }
@@ -128,6 +126,8 @@ impl FindingFiles {
     ) -> Result<Option<String>, FindingError> {
         let found = StoredFinding::of_actions(game, mode, level, head, actions, &self.checks);
         let Some(mut finding) = found else { return Ok(None) };
+        // A shorter way is the same finding, though its words may have other numbers.
+        let name = finding.file_name();
         if let Some(budget) = self.minimise
             && let Ok(shorter) = minimise(game, &finding, &self.checks, budget, &|_| {}, &|| false)
         {
@@ -139,7 +139,6 @@ impl FindingFiles {
         }
         let below = self.folder.join(FINDINGS);
         fs::create_dir_all(&below).map_err(io_error("create", &below))?;
-        let name = finding.file_name();
         finding.write(&below.join(&name))?;
         Ok(Some(format!("{FINDINGS}/{name}")))
     }

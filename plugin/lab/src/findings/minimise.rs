@@ -5,8 +5,8 @@ use std::cell::Cell;
 use bevy_playbot::action::ActionValue;
 
 use super::{
-    actions::efforts, check::Check, checks::Checks, ddmin::ddmin, head::FindingHead, look::look, playable::Unplayable,
-    solo::Setting, stored::StoredFinding,
+    actions::efforts, check::Check, checks::Checks, ddmin::ddmin, failure::NOT_SOLVED, head::FindingHead, look::look,
+    playable::Unplayable, solo::Setting, stored::StoredFinding,
 };
 use crate::{game::Game, idle::idle_action};
 
@@ -39,8 +39,9 @@ pub struct Minimised {
 }
 
 /// Leaves out actions as long as the finding is still there, at whatever tick: first with ddmin, then by idling in place of
-/// what cannot be left out without changing all that follows, then with ddmin again. The same finding and budget give the
-/// same result. `stop` ends it with the best so far.
+/// what cannot be left out without changing all that follows, then with ddmin again. Where nobody has to do anything, or
+/// time has to be up, nothing can be left out: this takes few replays. The same finding and budget give the same result. `stop`
+/// ends it with the best so far.
 ///
 /// # Errors
 ///
@@ -55,20 +56,21 @@ pub fn minimise(
 ) -> Result<Minimised, Unplayable> {
     finding.check_playable(game)?;
     let gone = || Unplayable("it does not happen any more, so there is nothing to minimise".to_owned());
-    let check = checks.of(&finding.head.detector).ok_or_else(gone)?;
+    let check = checks.of_finding(game, &finding.head).ok_or_else(gone)?;
     let (mode, level) = (finding.header.mode.as_str(), finding.episode.level_seed);
     let setting = Setting { game, mode, level, seed: finding.head.seed };
     let trial = Trial { setting, head: &finding.head, check, replays: Cell::new(0), ticks: Cell::new(0), progress };
     let actions_before = finding.actions();
     let Some(needed) = trial.needed(&actions_before) else { return Err(gone()) };
     let has_enough = || trial.replays.get() >= budget.replays || trial.ticks.get() >= budget.ticks || stop();
-    let mut actions = actions_before[..needed].to_vec();
-    actions = ddmin(actions, &has_enough, |shorter| trial.needed(shorter));
-    if trial.idle_instead(&mut actions, &has_enough) {
-        actions = ddmin(actions, &has_enough, |shorter| trial.needed(shorter));
-    }
-    let head = FindingHead { tick: None, state_hash: None, ..finding.head.clone() };
-    let shorter = StoredFinding::of_actions(game, mode, level, head, &actions, checks);
+    let actions = trial.shortened(actions_before[..needed].to_vec(), &has_enough);
+    let found = look(setting, &finding.head, &actions, &trial.check);
+    let shorter = found.is_there.then(|| {
+        // The episode is another one, and so are the numbers in its words.
+        let message = found.message.unwrap_or_else(|| finding.head.message.clone());
+        let head = FindingHead { tick: None, state_hash: None, message, ..finding.head.clone() };
+        StoredFinding::of_replay(setting, head, &actions, found.replayed, found.tick)
+    });
     let idle = idle_action(game);
     let size = |finding: &StoredFinding| (finding.episode.len(), efforts(&finding.actions(), &idle));
     let shorter = shorter.filter(|shorter| size(shorter) < size(finding));
@@ -98,6 +100,33 @@ impl Trial<'_> {
         found.is_there.then(needed)
     }
 
+    /// The actions without what is not needed.
+    fn shortened(&self, mut actions: Vec<ActionValue>, has_enough: &dyn Fn() -> bool) -> Vec<ActionValue> {
+        let nothing = idle_action(self.setting.game);
+        // Fewer actions of this kind are the beginning of the same episode, in which it was not there yet.
+        let is_idle = |actions: &[ActionValue]| actions.iter().all(|action| *action == nothing);
+        if is_idle(&actions) {
+            return actions;
+        }
+        if self.head.detector == NOT_SOLVED {
+            // No shorter way lasts until time is up.
+            if !has_enough() {
+                let mut idle = vec![nothing.clone(); actions.len()];
+                if let Some(needed) = self.needed(&idle) {
+                    idle.truncate(needed);
+                    return idle;
+                }
+            }
+            self.idle_instead(&mut actions, has_enough);
+            return actions;
+        }
+        actions = ddmin(actions, has_enough, |shorter| self.needed(shorter));
+        if !is_idle(&actions) && self.idle_instead(&mut actions, has_enough) && !is_idle(&actions) {
+            actions = ddmin(actions, has_enough, |shorter| self.needed(shorter));
+        }
+        actions
+    }
+
     /// Replaces actions by idling where the finding is still there, larger parts first; whether any was.
     fn idle_instead(&self, actions: &mut Vec<ActionValue>, has_enough: &dyn Fn() -> bool) -> bool {
         let nothing = idle_action(self.setting.game);
@@ -124,5 +153,48 @@ impl Trial<'_> {
             size = if size == 1 { 0 } else { size.div_ceil(2) };
         }
         has_changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{bugs::score::testing::Corridor, findings::failure::LOST};
+
+    /// A finding of this detector on a level of the corridor, where action 0 is idling, and goes to the end that loses.
+    fn stored(detector: &str, actions: &[u32]) -> StoredFinding {
+        let actions: Vec<ActionValue> = actions.iter().copied().map(ActionValue::Discrete).collect();
+        let head = FindingHead::new("plain:3", detector, "after 99 ticks");
+        let checks = Checks::default();
+        StoredFinding::of_actions(&Corridor::default(), "plain", 3, head, &actions, &checks).expect("it is there")
+    }
+
+    fn shorter(finding: &StoredFinding) -> Minimised {
+        let (game, checks) = (Corridor::default(), Checks::default());
+        minimise(&game, finding, &checks, Budget::default(), &|_| {}, &|| false).expect("it is there")
+    }
+
+    #[test]
+    fn a_shorter_finding_tells_of_its_own_episode() {
+        let actions = [[1, 0].repeat(4), vec![0; 3]].concat();
+        let found = shorter(&stored(LOST, &actions));
+        assert_eq!(found.finding.episode.len(), 3);
+        assert_eq!(found.finding.head.message, "the game ended the episode after 3 ticks");
+    }
+
+    #[test]
+    fn where_nothing_has_to_be_done_nothing_is_tried() {
+        let idle = stored(LOST, &[0; 3]);
+        let Minimised { finding, replays, is_minimal, .. } = shorter(&idle);
+        assert_eq!((replays, is_minimal), (1, true));
+        assert_eq!(finding, idle, "what could not be made shorter stays as it is");
+    }
+
+    #[test]
+    fn time_that_is_up_is_not_waited_for_in_shorter_episodes() {
+        let late = stored(NOT_SOLVED, &[1, 0].repeat(15));
+        let Minimised { finding, replays, is_minimal, .. } = shorter(&late);
+        assert!(is_minimal && replays < 80, "{replays}");
+        assert_eq!(finding.episode.len(), 30);
     }
 }

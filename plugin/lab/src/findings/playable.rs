@@ -59,11 +59,16 @@ impl StoredFinding {
 
 /// A level file that cannot be read. What is said of patterns elsewhere helps nobody here.
 fn gone(error: &LevelFileError) -> Unplayable {
-    let what = match error {
-        LevelFileError::NoFiles { pattern, folder } => format!("there is no file {pattern}, seen from {folder}"),
-        error => error.to_string(),
-    };
-    Unplayable(format!("the level no longer exists: {what}; bring the recorded file back, or remove the finding"))
+    Unplayable(match error {
+        // It may be there, seen from where the test was run.
+        LevelFileError::NoFiles { pattern, folder } => format!(
+            "there is no level file {pattern}, neither seen from {folder} nor from a folder above the finding: do this from \
+             the folder where the test was run, or bring the recorded file back"
+        ),
+        error => {
+            format!("the level cannot be read any more: {error}; bring the recorded file back, or remove the finding")
+        }
+    })
 }
 
 #[cfg(test)]
@@ -78,8 +83,8 @@ mod tests {
         let mut finding = stored();
         finding.header.mode = "files:none/gone.json".to_owned();
         let words = finding.check_playable(&game).expect_err("it is gone").to_string();
-        assert!(words.starts_with("the level no longer exists: there is no file none/gone.json"), "{words}");
-        assert!(words.ends_with("bring the recorded file back, or remove the finding"), "{words}");
+        assert!(words.starts_with("there is no level file none/gone.json, neither seen from "), "{words}");
+        assert!(words.ends_with("where the test was run, or bring the recorded file back"), "{words}");
         assert!(!words.contains('*'), "{words}");
     }
 

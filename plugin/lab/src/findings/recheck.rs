@@ -55,14 +55,14 @@ impl Recheck {
 /// [`Unplayable`]: another game or version, a level that is no longer there, or a detector that has no check.
 pub fn recheck(game: &dyn Game, finding: &StoredFinding, checks: &Checks) -> Result<Recheck, Unplayable> {
     let StoredFinding { header, head, episode } = finding;
-    let check = checks.of(&head.detector).ok_or_else(|| {
+    let check = checks.of_finding(game, head).ok_or_else(|| {
         let known = checks.names().collect::<Vec<_>>().join(", ");
         Unplayable(format!("this program has no check of the detector `{}`; it has {known}", head.detector))
     })?;
     finding.check_playable(game)?;
     let (mode, level) = (header.mode.as_str(), episode.level_seed);
     let setting = Setting { game, mode, level, seed: head.seed };
-    let Look { is_there, tick, replayed } = look(setting, head, &finding.actions(), &check);
+    let Look { is_there, tick, replayed, .. } = look(setting, head, &finding.actions(), &check);
     let state_hash = tick.and_then(|tick| replayed.state_hash(tick));
     Ok(Recheck { sighting: is_there.then_some(Sighting { tick, state_hash }), replayed })
 }

@@ -149,6 +149,8 @@ fn row(request: &Regress, name: &str, path: &Path) -> RegressRow {
         let message = format!("this program has no game `{}`, only {}", header.game, names.join(", "));
         return RegressRow { message, ..row };
     };
+    let finding = finding.seen_from(game, path);
+    let head = &finding.head;
     match recheck(game, &finding, &(request.checks)(game)) {
         Err(why) => RegressRow { message: why.to_string(), ..row },
         Ok(again) => {

@@ -57,11 +57,12 @@ impl StoredFinding {
         checks: &Checks,
     ) -> Option<Self> {
         let setting = Setting { game, mode, level, seed: head.seed };
-        let Look { is_there, tick, replayed } = look(setting, &head, actions, &checks.of(&head.detector)?);
+        let Look { is_there, tick, replayed, .. } = look(setting, &head, actions, &checks.of_finding(game, &head)?);
         is_there.then(|| Self::of_replay(setting, head, actions, replayed, tick))
     }
 
-    fn of_replay(
+    /// What was found in actions that were played.
+    pub(super) fn of_replay(
         setting: Setting,
         mut head: FindingHead,
         actions: &[ActionValue],
@@ -111,7 +112,7 @@ impl StoredFinding {
     pub fn read(path: &Path) -> Result<Self, FindingError> {
         let reader = DemoReader::open(path)?;
         let header = reader.header().clone();
-        let head = head_of(path, &header.note)?;
+        let head = head_of(path, &header)?;
         let mut episodes = reader.read_all()?;
         match (episodes.pop(), episodes.len()) {
             (Some(episode), 0) => Ok(Self { header, head, episode }),
@@ -145,8 +146,10 @@ impl StoredFinding {
     }
 }
 
-fn head_of(path: &Path, note: &str) -> Result<FindingHead, FindingError> {
-    let none = |error: ron::error::SpannedError| FindingError::NoFinding { path: path.into(), why: error.to_string() };
+fn head_of(path: &Path, header: &DemoHeader) -> Result<FindingHead, FindingError> {
+    let DemoHeader { note, game, .. } = header;
+    // What the parser says helps nobody: notes of recordings are free text.
+    let none = |_: ron::error::SpannedError| FindingError::NoFinding { path: path.into(), game: game.clone() };
     let FormOnly { finding } = ron::from_str(note).map_err(none)?;
     if finding > HEAD_FORMAT {
         return Err(FindingError::NewerForm { path: path.into(), found: finding, newest: HEAD_FORMAT });

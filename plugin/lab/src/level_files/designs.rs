@@ -83,7 +83,7 @@ impl LevelDesigns {
     pub fn get<T: Any + Send + Sync>(&self, level: u64) -> Result<Arc<T>, String> {
         let Some(DrawnLevel { path, design }) = self.drawn(level) else {
             let count = self.count();
-            return Err(format!("level {level} does not exist: there are {count} level files, counted from 0"));
+            return Err(format!("level {level} does not exist: the number of level files is {count}, counted from 0"));
         };
         design.level().ok_or_else(|| format!("{path} was read by another game"))
     }
@@ -151,10 +151,16 @@ mod tests {
         fs::write(folder.path().join("b"), "one").expect("writable");
         let error = LevelDesigns::read("numbers", &mode(folder.path()), &number).expect_err("no number").to_string();
         assert!(error.ends_with("/b, line 1: no number"), "{error}");
+        fs::write(folder.path().join("e"), "two").expect("writable");
+        let error = LevelDesigns::read("numbers", &mode(folder.path()), &number).expect_err("no numbers").to_string();
+        assert!(error.contains("/b, line 1: no number; and 1 more: ") && error.ends_with("/e"), "{error}");
         let path = folder.path().join("a").to_string_lossy().into_owned();
         let designs = LevelDesigns::of_file(&path, &number).expect("a number");
         assert!(
-            designs.get::<u32>(1).expect_err("one file").contains("level 1 does not exist: there are 1 level files")
+            designs
+                .get::<u32>(1)
+                .expect_err("one file")
+                .contains("level 1 does not exist: the number of level files is 1")
         );
         assert!(designs.get::<String>(0).expect_err("a number").contains("another game"));
         fs::write(folder.path().join("c"), b"1\n 2\xff").expect("writable");

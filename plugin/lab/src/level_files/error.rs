@@ -44,7 +44,7 @@ pub enum LevelFileError {
         pattern: String,
     },
     /// There are fewer files than levels were asked for.
-    #[error("there is no level {level} in {mode}: it has {count} files, so levels 0 to {}; leave out the numbers for all", count - 1)]
+    #[error("there is no level {level} in {mode}: it has {}; leave out the numbers for all", files(*count))]
     NoLevel {
         /// The mode.
         mode: String,
@@ -54,7 +54,7 @@ pub enum LevelFileError {
         count: u64,
     },
     /// The operating system refused.
-    #[error("cannot read {path}: {why}")]
+    #[error("cannot read {path}: {why}; name a level file that is there and may be read")]
     Unreadable {
         /// File or folder.
         path: String,
@@ -89,6 +89,14 @@ pub enum LevelFileError {
         /// Most bytes of a level file.
         most: u64,
     },
+    /// Several are no levels of the game.
+    #[error("{first}; and {} more: {}", others.len(), listed(others))]
+    Several {
+        /// What is wrong with the first one.
+        first: Box<LevelFileError>,
+        /// The paths of the others.
+        others: Vec<String>,
+    },
     /// It is no level of the game.
     #[error("{path}{}: {}", line(error), error.what)]
     Text {
@@ -97,6 +105,17 @@ pub enum LevelFileError {
         /// What is wrong with it.
         error: LevelTextError,
     },
+}
+
+fn files(count: u64) -> String {
+    if count == 1 { "1 file, level 0".to_owned() } else { format!("{count} files, so levels 0 to {}", count - 1) }
+}
+
+/// The first few paths.
+fn listed(paths: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let shown = paths.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    if paths.len() > SHOWN { format!("{shown}, …") } else { shown }
 }
 
 fn line(error: &LevelTextError) -> String {
@@ -115,5 +134,19 @@ mod tests {
         let row = LevelTextError::at(text, &[JsonStep::Key("rows"), JsonStep::Index(1)], "unknown letter `?`");
         assert_eq!(told(row), "a.json, line 4: unknown letter `?`");
         assert_eq!(told(LevelTextError::whole("no levels here")), "a.json: no levels here");
+    }
+
+    #[test]
+    fn of_several_broken_files_a_few_are_named() {
+        let told = |count: usize| {
+            let error = LevelTextError::whole("no levels here");
+            let first = Box::new(LevelFileError::Text { path: "a.json".to_owned(), error });
+            let others = (0..count).map(|number| format!("b{number}.json")).collect();
+            LevelFileError::Several { first, others }.to_string()
+        };
+        assert_eq!(told(2), "a.json: no levels here; and 2 more: b0.json, b1.json");
+        assert!(told(7).ends_with("; and 7 more: b0.json, b1.json, b2.json, b3.json, b4.json, …"), "{}", told(7));
+        let none = |count| LevelFileError::NoLevel { mode: "files:*".to_owned(), level: 7, count }.to_string();
+        assert!(none(1).contains("it has 1 file, level 0;") && none(3).contains("it has 3 files, so levels 0 to 2;"));
     }
 }

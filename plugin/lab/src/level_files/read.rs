@@ -60,10 +60,26 @@ impl Snapshot {
         if let Some(designs) = known.get(game) {
             return Ok(designs.clone());
         }
-        let drawn: Result<Vec<_>, _> = self.texts.iter().map(|(path, text)| understand(path, text, parse)).collect();
-        let designs = Arc::new(drawn?);
+        let designs = Arc::new(understand_all(&self.texts, parse)?);
         known.insert(game.to_owned(), designs.clone());
         Ok(designs)
+    }
+}
+
+/// All levels; where several are none, the error names them all.
+fn understand_all(texts: &[(String, String)], parse: Parse) -> Result<Vec<DrawnLevel>, LevelFileError> {
+    let (mut drawn, mut first, mut others) = (Vec::new(), None, Vec::new());
+    for (path, text) in texts {
+        match understand(path, text, parse) {
+            Ok(level) => drawn.push(level),
+            Err(error) if first.is_none() => first = Some(error),
+            Err(_) => others.push(path.clone()),
+        }
+    }
+    match first {
+        None => Ok(drawn),
+        Some(error) if others.is_empty() => Err(error),
+        Some(error) => Err(LevelFileError::Several { first: Box::new(error), others }),
     }
 }
 

@@ -30,7 +30,8 @@ const PAPER: Rgb = [255, 255, 255];
 const DOTS: [Rgb; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [178, 82, 155], [201, 133, 0], [58, 155, 220], [91, 91, 91]];
 
-/// The dots of charts, one chart below the other, on white paper. What joins points or stands around them is left out.
+/// The dots of charts, one chart below the other, on white paper, and lines that are no scatter. What stands around points is
+/// left out.
 pub fn draw_scatters(charts: &[Chart]) -> Drawing {
     let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
     let (mut shapes, mut top) = (Vec::new(), MARGIN);
@@ -72,13 +73,21 @@ fn draw(chart: &Chart, top: f32, shapes: &mut Vec<Shape>) -> f32 {
 
     // The first one is the subject: it is drawn last, above the others.
     for (index, curve) in chart.curves.iter().enumerate().rev() {
+        if !curve.is_scatter {
+            let points = curve.points.iter().copied().filter(is_point);
+            let points = points.map(|(right, high)| Vec2::new(across(right), up(high))).collect();
+            shapes.push(joined(points, index));
+            continue;
+        }
         for (right, high) in curve.points.iter().copied().filter(is_point) {
             shapes.push(dot(Vec2::new(across(right), up(high)), index));
         }
     }
     for (index, curve) in chart.curves.iter().enumerate() {
         below += LINE;
-        shapes.push(dot(Vec2::new(area.min.x + DOT, below - 4.5), index));
+        let key = Vec2::new(area.min.x + DOT, below - 4.5);
+        let reach = Vec2::new(2.0 * DOT, 0.0);
+        shapes.push(if curve.is_scatter { dot(key, index) } else { joined(vec![key - reach, key + reach], index) });
         text(shapes, Vec2::new(area.min.x + 4.0 * DOT, below), SIZE, INK, &curve.label);
     }
     below
@@ -86,6 +95,10 @@ fn draw(chart: &Chart, top: f32, shapes: &mut Vec<Shape>) -> f32 {
 
 fn dot(centre: Vec2, index: usize) -> Shape {
     Shape::Mark { form: MarkForm::Disc, centre, radius: DOT, fill: DOTS[index % DOTS.len()], outline: PAPER }
+}
+
+fn joined(points: Vec<Vec2>, index: usize) -> Shape {
+    Shape::Line { points, width: 1.5, colour: DOTS[index % DOTS.len()], opacity: 0.6 }
 }
 
 fn line(shapes: &mut Vec<Shape>, from: Vec2, to: Vec2, colour: Rgb) {
@@ -138,6 +151,17 @@ mod tests {
         assert!(["Deaths", "people", "testers", "bots", "others", "10"].into_iter().all(words), "{drawing:?}");
         let paper = Rect::from_corners(Vec2::ZERO, drawing.size);
         assert!(bots.iter().chain(&others).all(|dot| paper.contains(*dot)));
+    }
+
+    #[test]
+    fn a_line_among_dots_is_drawn_as_one() {
+        let mut chart = chart();
+        let dots_before = dots(&draw_scatters(std::slice::from_ref(&chart)), DOTS[2]).len();
+        chart.curves.push(Curve::new("equal", vec![(0.0, 0.0), (1.0, 1.0)]));
+        let drawing = draw_scatters(&[chart]);
+        let is_one = |shape: &&Shape| matches!(shape, Shape::Line { colour, .. } if *colour == DOTS[2]);
+        assert_eq!(drawing.shapes.iter().filter(is_one).count(), 2, "in the plot and in the legend");
+        assert_eq!((dots_before, dots(&drawing, DOTS[2]).len()), (0, 0));
     }
 
     #[test]

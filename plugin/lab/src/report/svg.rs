@@ -153,6 +153,10 @@ fn rule(out: &mut String, class: &str, from: (f64, f64), to: (f64, f64)) {
     );
 }
 
+fn circle(out: &mut String, class: &str, (x, y): (f64, f64)) {
+    let _ = writeln!(out, "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\"/>");
+}
+
 fn head(chart: &Chart, at: &Layout, out: &mut String) {
     for (i, line) in at.title.iter().enumerate() {
         text(out, "title", 0.0, 17.0 + 20.0 * i as f64, "start", line);
@@ -212,8 +216,9 @@ fn lines(chart: &Chart, at: &Layout, out: &mut String) {
                 if let Some((low, high)) = dot.band {
                     rule(out, &format!("line {class}"), (dot.x, low), (dot.x, high));
                 }
-                let _ =
-                    writeln!(out, "<circle class=\"dot {class}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\"/>", dot.x, dot.y);
+                // Dots of a scatter may lie on each other.
+                let kind = if chart.curves[i].is_scatter { "dot seen-through" } else { "dot" };
+                circle(out, &format!("{kind} {class}"), (dot.x, dot.y));
             } else {
                 let _ = writeln!(out, "<path class=\"line {class}\" d=\"{}\"/>", line_path(dots));
             }
@@ -238,7 +243,11 @@ fn labels(chart: &Chart, at: &Layout, out: &mut String) {
         let mut y = at.bottom + 19.0 + if chart.x_label.is_empty() { 0.0 } else { LINE };
         for (i, label, _) in &named {
             y += LINE;
-            rule(out, &format!("line {}", line_class(*i)), (at.left, y - 4.5), (at.left + 18.0, y - 4.5));
+            if chart.curves[*i].is_scatter {
+                circle(out, &format!("dot seen-through {}", line_class(*i)), (at.left + 9.0, y - 4.5));
+            } else {
+                rule(out, &format!("line {}", line_class(*i)), (at.left, y - 4.5), (at.left + 18.0, y - 4.5));
+            }
             text(out, "label", at.left + KEY, y, "start", label);
         }
         return;

@@ -168,7 +168,12 @@ fn a_report_is_written_whole_or_not_at_all() {
 fn a_scatter_is_dots_that_nothing_joins_with_its_name_below() {
     let points = vec![(0.0, 1.0), (5.0, 3.0), (f64::NAN, 2.0), (2.0, 9.0)];
     let svg = chart(vec![Curve::scatter("bot", points)]).to_svg();
-    assert_eq!(svg.matches("<circle class=\"dot c0 d0\"").count(), 3, "{svg}");
+    assert_eq!(
+        svg.matches("<circle class=\"dot seen-through c0 d0\"").count(),
+        4,
+        "three points, one in the legend: {svg}"
+    );
+    assert!(!svg.contains("<line class=\"line"), "{svg}");
     assert!(
         !svg.contains("<path class=\"line") && !svg.contains("class=\"leader") && svg.contains(">bot</text>"),
         "{svg}"

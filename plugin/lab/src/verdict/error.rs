@@ -37,11 +37,17 @@ pub enum TestError {
         "{} has results already: go on with --resume, choose another --out, or replace them with --force", .0.display()
     )]
     Exists(PathBuf),
+    /// There is a file where the folder should be.
+    #[error("{} is a file, and results need a folder: name another --out", .0.display())]
+    NotAFolder(PathBuf),
     /// Another process tests into the folder.
     #[error("{} is in use by another test: wait for it or stop it, or choose another --out", .0.display())]
     Busy(PathBuf),
     /// What is in the folder was tested in another way.
-    #[error("{} holds another test: {}; call with the same, or choose another --out", folder.display(), differences.join(", "))]
+    #[error(
+        "{} holds another test; what is there and what was asked for: {}; call with what is there, or choose another --out",
+        folder.display(), differences.join(", ")
+    )]
     OtherPlan {
         /// The folder.
         folder: PathBuf,
@@ -49,7 +55,7 @@ pub enum TestError {
         differences: Vec<String>,
     },
     /// There are no results.
-    #[error("{} has no results.json: {}", .0.display(), no_results(.0))]
+    #[error("{} has no results.json{}", .0.display(), no_results(.0))]
     NoResults(PathBuf),
     /// A file is not what it should be.
     #[error("{}, line {line}: {message}; make it again with `playbot test`", path.display())]
@@ -88,11 +94,11 @@ pub enum TestError {
         shard: Shard,
     },
     /// Not all folders are there.
-    #[error("missing {}: name their folders too, or test them with `playbot test --shard`", shards(.0))]
+    #[error("missing {} with `playbot test --shard`", shards(.0))]
     Missing(Vec<Shard>),
     /// Results that say nothing about each other.
     #[error(
-        "{} cannot be compared with: {}; name results of the same version of the game with a level and a tester in common, or \
+        "{} and this test cannot be compared: {}; name results of the same version of the game with a level and a tester in common, or \
          leave --against out", folder.display(), differences.join(", ")
     )]
     Incomparable {
@@ -180,9 +186,11 @@ fn shards_of(levels: u64) -> String {
 
 fn no_results(folder: &Path) -> &'static str {
     if folder.join(super::journal::JOURNAL).exists() {
-        "its test is not done, finish it with `playbot test --resume`"
+        ": its test is not done, finish it with `playbot test --resume`"
+    } else if folder.exists() {
+        ": name the --out of a `playbot test`"
     } else {
-        "name the --out of a `playbot test`"
+        ", since there is no such folder: name the --out of a `playbot test`"
     }
 }
 
@@ -191,7 +199,11 @@ fn shards(missing: &[Shard]) -> String {
     let names: Vec<String> = missing.iter().take(SHOWN).map(Shard::to_string).collect();
     let more = missing.len().saturating_sub(SHOWN);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{} {}{more}", if missing.len() == 1 { "shard" } else { "shards" }, names.join(", "))
+    let (shards, next) = match missing.len() {
+        1 => ("shard", "name its folder too, or test it"),
+        _ => ("shards", "name their folders too, or test them"),
+    };
+    format!("{shards} {}{more}: {next}", names.join(", "))
 }
 
 #[cfg(test)]
@@ -201,7 +213,8 @@ mod tests {
     #[test]
     fn missing_shards_are_named_up_to_a_few() {
         let shard = |index| Shard { index, count: 20 };
-        assert_eq!(shards(&[shard(3)]), "shard 3/20");
+        let one = TestError::Missing(vec![shard(3)]).to_string();
+        assert_eq!(one, "missing shard 3/20: name its folder too, or test it with `playbot test --shard`");
         let words = TestError::Missing((0..10).map(shard).collect()).to_string();
         assert!(words.starts_with("missing shards 0/20, 1/20,") && words.contains("7/20 and 2 more: "), "{words}");
     }
@@ -222,7 +235,10 @@ mod tests {
     fn what_does_not_go_together_has_a_next_step_and_one_is_no_plural() {
         let differences = || vec!["games `a` and `b`".to_owned()];
         let other = TestError::Incomparable { folder: "before".into(), differences: differences() }.to_string();
-        assert!(other.starts_with("before cannot be compared with: games `a` and `b`; name results"), "{other}");
+        assert!(
+            other.starts_with("before and this test cannot be compared: games `a` and `b`; name results"),
+            "{other}"
+        );
         let unlike = TestError::Unlike { first: "a".into(), second: "b".into(), differences: differences() };
         assert!(unlike.to_string().contains("games `a` and `b`; name shards of one test"), "{unlike}");
         let empty = |length| {
@@ -236,7 +252,9 @@ mod tests {
     fn an_unfinished_test_is_told_from_a_folder_without_one() {
         let folder = tempfile::tempdir().expect("a folder");
         let words = || TestError::NoResults(folder.path().into()).to_string();
-        assert!(words().contains("name the --out"), "{}", words());
+        assert!(words().contains("has no results.json: name the --out"), "{}", words());
+        let none = TestError::NoResults(folder.path().join("none")).to_string();
+        assert!(none.contains("no such folder"), "{none}");
         std::fs::write(folder.path().join(super::super::journal::JOURNAL), "").expect("writable");
         assert!(words().contains("--resume"), "{}", words());
     }

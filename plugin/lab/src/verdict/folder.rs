@@ -51,6 +51,9 @@ impl TestFolder {
     ///
     /// [`TestError::Exists`], [`TestError::OtherPlan`], [`TestError::Busy`]; or it cannot be written.
     pub fn open(path: &Path, record: &TestRecord, earlier: Earlier) -> Result<(Self, Option<String>), TestError> {
+        if path.is_file() {
+            return Err(TestError::NotAFolder(path.into()));
+        }
         fs::create_dir_all(path).map_err(io_error("create", path))?;
         let (record_file, results) = (path.join(RECORD), path.join(RESULTS));
         let is_known = record_file.exists();
@@ -169,7 +172,13 @@ mod tests {
         assert!(matches!(open(&record(), Earlier::Keep), Err(TestError::Exists(_))));
         let other = TestRecord { seed: 1, shard: Some("0/2".parse().expect("a shard")), ..record() };
         let error = open(&other, Earlier::Resume).map(drop).expect_err("another test").to_string();
-        assert!(error.contains("seeds 0 and 1, all levels and shard 0/2"), "{error}");
+        assert!(
+            error.contains("what is there and what was asked for: seeds 0 and 1, all levels and shard 0/2"),
+            "{error}"
+        );
+        let file = path.join(RECORD);
+        let error = TestFolder::open(&file, &record(), Earlier::Replace).map(drop).expect_err("a file");
+        assert!(error.is_usage() && error.to_string().contains("test.json is a file"), "{error}");
 
         let journal = path.join(JOURNAL);
         let torn = [fs::read(&journal).expect("written"), b"{\"ind".to_vec()].concat();

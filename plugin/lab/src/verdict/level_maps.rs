@@ -18,7 +18,7 @@ pub struct LevelMaps {
     pub columns: u64,
     /// Rows.
     pub rows: u64,
-    /// Ticks that agents were there.
+    /// Ticks that agents were there. An open square that an episode only passes between two ticks counts one.
     pub visits: Vec<[u64; 2]>,
     /// Those among them that came more than two seconds after the agent was last in a square that was new in its episode: it
     /// rested, or went back and forth.

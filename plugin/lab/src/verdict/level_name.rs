@@ -30,7 +30,7 @@ pub fn hash_of_files(game: &dyn Game, split: &LevelSplit) -> Option<String> {
     Some(format!("{:016x}", StateHash::of(words).0))
 }
 
-fn drawn(game: &dyn Game, split: &LevelSplit) -> Option<LevelDesigns> {
+pub(super) fn drawn(game: &dyn Game, split: &LevelSplit) -> Option<LevelDesigns> {
     let is_drawn = is_level_files(&split.mode);
     is_drawn.then(|| level_designs(game, &split.mode).ok()).flatten()
 }

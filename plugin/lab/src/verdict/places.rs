@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Where gravity has a say, nobody may be able to reach some of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Places {
-    /// Open squares that were visited.
+    /// Open squares that were visited, or passed between two ticks.
     pub visited: u64,
     /// All open squares.
     pub open: u64,

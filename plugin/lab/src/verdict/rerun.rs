@@ -4,14 +4,24 @@ use super::{level_name::level_argument, level_verdict::LevelVerdict, plan::TestR
 
 /// Most findings that are shown by their files.
 const MOST_FILES: usize = 3;
+/// Where findings are replayed: their files are named as the results name them.
+const OF_RESULTS: &str = "# from the folder of the results:";
+/// Where the rest is run: recordings, policies and level files are named as the test named them.
+const OF_TEST: &str = "# from the folder where the test was run:";
 
-/// The commands that show a level's findings in the folder of the results, play its failed episodes again, and show them: for
-/// people, of the program with this name.
+/// The commands that show a level's findings, play its failed episodes again, and show them: for people, of the program with
+/// this name. Where they are meant from different folders, comments of the shell say which.
 pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
     let files = level.findings.iter().filter_map(|finding| finding.file.as_ref());
-    let mut commands: Vec<String> = files.take(MOST_FILES).map(|file| format!("{program} replay {file}")).collect();
-    commands.extend(played_again(program, record, level));
-    commands
+    let replays: Vec<String> = files.take(MOST_FILES).map(|file| format!("{program} replay {file}")).collect();
+    let again = played_again(program, record, level);
+    let [of_results, of_test] = match (replays.is_empty(), again.is_empty()) {
+        (true, _) => [None, None],
+        (false, true) => [Some(OF_RESULTS), None],
+        (false, false) => [Some(OF_RESULTS), Some(OF_TEST)],
+    };
+    let comment = |words: Option<&str>| words.map(str::to_owned);
+    comment(of_results).into_iter().chain(replays).chain(comment(of_test)).chain(again).collect()
 }
 
 /// The episodes of a tester that failed, if one did.
@@ -74,6 +84,12 @@ mod tests {
         let findings = ["a", "b", "c", "d"].map(finding).to_vec();
         let walled = LevelVerdict { findings, ..perfect };
         let shown = ["a", "b", "c"].map(|name| format!("jump replay findings/{name}.finding"));
-        assert_eq!(rerun_commands("jump", &record, &walled), shown, "three of them");
+        let commands = rerun_commands("jump", &record, &walled);
+        assert_eq!((commands[0].as_str(), &commands[1..]), (OF_RESULTS, &shown[..]), "three of them");
+        let failed = LevelVerdict { testers: level.testers.clone(), ..walled };
+        let commands = rerun_commands("jump", &record, &failed);
+        assert_eq!(commands[1..4], shown);
+        assert_eq!(commands[4], OF_TEST);
+        assert!(commands[5].starts_with("jump test garden ") && commands[6].starts_with("jump view garden "));
     }
 }

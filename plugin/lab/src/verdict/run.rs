@@ -20,6 +20,9 @@ use bevy_playbot::fault::Fault;
 
 /// Levels are handed out in about so many portions, so that no thread waits long for the last one.
 const PORTIONS: usize = 64;
+/// Levels of the first portion, so that the first results come soon; each portion has twice as many as the one before until
+/// they are as large as they become.
+const FIRST: usize = 4;
 /// Most episodes of a portion, so that little is in memory and little is lost when somebody stops.
 const MOST_EPISODES: usize = 128;
 /// Most arenas of a World.
@@ -91,7 +94,7 @@ pub fn run_tests_keeping(
     let places: Vec<u64> = plan.places().into_iter().filter(|place| !finished.contains(place)).collect();
     let most = (MOST_EPISODES / plan.episodes.max(1) as usize).max(1);
     let size = places.len().div_ceil(PORTIONS).clamp(1, most);
-    let portions: Vec<&[u64]> = places.chunks(size).collect();
+    let portions = portions(&places, size);
     let shared = Shared { next: 0, open: BTreeMap::new(), keep, failure: None, is_stopped: false };
     let shared = Mutex::new(shared);
     let threads = plan.threads.clamp(1, (portions.len() * plan.testers.len()).max(1));
@@ -107,6 +110,17 @@ pub fn run_tests_keeping(
         None if is_stopped => Ok(TestEnd::Stopped),
         None => Ok(TestEnd::Done),
     }
+}
+
+/// The places in portions that grow up to this size. What is found on a level does not depend on its portion.
+fn portions(places: &[u64], largest: usize) -> Vec<&[u64]> {
+    let (mut portions, mut rest, mut size) = (Vec::new(), places, FIRST.min(largest));
+    while !rest.is_empty() {
+        let (portion, others) = rest.split_at(size.min(rest.len()));
+        portions.push(portion);
+        (rest, size) = (others, (2 * size).min(largest));
+    }
+    portions
 }
 
 fn lock<'a, 'b>(shared: &'a Mutex<Shared<'b>>) -> MutexGuard<'a, Shared<'b>> {
@@ -213,4 +227,19 @@ fn judge_portion(game: &dyn Game, plan: &TestPlan, places: &[u64], complete: &[V
         judge(game, plan, *place, name, &played)
     };
     places.iter().enumerate().map(verdict).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn portions_grow_and_leave_nothing_out() {
+        let places: Vec<u64> = (0..100).collect();
+        let sizes = |largest| portions(&places, largest).iter().map(|portion| portion.len()).collect::<Vec<_>>();
+        assert_eq!(sizes(32), [4, 8, 16, 32, 32, 8]);
+        assert_eq!(sizes(1), [1; 100]);
+        assert_eq!(portions(&places, 32).concat(), places);
+        assert!(portions(&[], 32).is_empty());
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use bevy::math::Vec2;
 
 use crate::{
-    explore::{Cell, CellGrid, open_cells},
+    explore::{Cell, CellGrid, cells_between, open_cells, reach},
     floor_plan::FloorPlan,
 };
 
@@ -20,6 +20,8 @@ pub(super) struct LevelSquares {
     pub grid: CellGrid,
     pub columns: usize,
     pub rows: usize,
+    /// How far an agent goes in a tick at most.
+    reach: f32,
 }
 
 impl LevelSquares {
@@ -36,7 +38,7 @@ impl LevelSquares {
         }
         let count = (size / side - SLACK).ceil().max(Vec2::ONE);
         let grid = CellGrid::new(Some(plan), Some(side));
-        Some(Self { grid, columns: count.x as usize, rows: count.y as usize })
+        Some(Self { grid, columns: count.x as usize, rows: count.y as usize, reach: reach(tile) })
     }
 
     /// How many there are.
@@ -52,6 +54,11 @@ impl LevelSquares {
         is_inside.then(|| at.y as usize * self.columns + at.x as usize)
     }
 
+    /// Those that an agent passes which was in one place a tick ago and is in another one now; none if it has been put there.
+    pub fn between(self, from: Vec2, to: Vec2) -> impl Iterator<Item = usize> {
+        cells_between(self.grid, from, to, self.reach).filter_map(move |cell| self.index(cell))
+    }
+
     /// Those that no wall cuts off from the start, if the plan says it.
     pub fn open(&self, plan: &FloorPlan) -> Option<BTreeSet<usize>> {
         let cells = open_cells(plan, &self.grid)?;
@@ -60,6 +67,10 @@ impl LevelSquares {
 
     fn of_cell(&self, cell: &Cell) -> Option<usize> {
         let &[column, row] = cell.0.as_slice() else { return None };
+        self.index([column, row])
+    }
+
+    fn index(&self, [column, row]: [i32; 2]) -> Option<usize> {
         let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
         (column < self.columns && row < self.rows).then_some(row * self.columns + column)
     }
@@ -89,6 +100,9 @@ mod tests {
         for outside in [Vec2::new(-1.1, 2.5), Vec2::new(3.1, 2.5), Vec2::new(0.0, 5.0), Vec2::NAN] {
             assert_eq!(squares.at(outside), None, "{outside}");
         }
+        let passed = |to| squares.between(Vec2::new(-0.5, 2.5), to).collect::<Vec<_>>();
+        assert_eq!(passed(Vec2::new(2.5, 2.5)), [1, 2]);
+        assert!(passed(Vec2::new(3.75, 4.5)).is_empty(), "farther than four tiles");
         // The wall in the third column cuts the fourth off.
         let open = squares.open(&plan(4.0, 3.0, 1.0)).expect("the start is free");
         assert_eq!(open.into_iter().collect::<Vec<_>>(), [0, 1, 4, 5, 8, 9]);

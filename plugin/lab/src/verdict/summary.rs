@@ -15,13 +15,15 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     let mut lines = vec![format!("# {} {}", record.game, cell(&record.range.to_string())), String::new()];
     let solved = Trials { successes: overview.solved, trials: overview.levels };
     lines.push(format!(
-        "**{} levels**: {} solved{}, {} not solved by any tester, {} proved unsolvable; {} findings.",
+        "**{} level{}**: {} solved{}, {} not solved by any tester, {} proved unsolvable; {} finding{}.",
         overview.levels,
+        if overview.levels == 1 { "" } else { "s" },
         overview.solved,
         interval(solved),
         overview.bot_failed,
         overview.proved_unsolvable,
-        overview.findings
+        overview.findings,
+        if overview.findings == 1 { "" } else { "s" }
     ));
     if overview.places.percent().is_some() {
         lines.push(format!("{} of the open places were visited.", overview.places.describe()));

@@ -1,5 +1,7 @@
 //! Where an agent was in an episode, counted tick by tick.
 
+use std::collections::BTreeSet;
+
 use bevy::prelude::*;
 use bevy_playbot::{episode::Episode, skill_prior::ActiveSkill};
 
@@ -29,7 +31,7 @@ pub(super) struct Walk {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SquareCount {
     pub square: usize,
-    /// Ticks.
+    /// Ticks; one for a square that was only passed between two of them.
     pub ticks: u32,
     /// Ticks that were lost.
     pub lost: u32,
@@ -44,6 +46,10 @@ pub(super) struct WalkCounter {
     patience: u32,
     /// The level that is played, and its squares.
     level: Option<(u64, Option<LevelSquares>)>,
+    /// A level, and which of its squares are open: looked at once something is passed.
+    open: Option<(u64, BTreeSet<usize>)>,
+    /// Where the agent was after the last tick of this episode.
+    last: Option<Vec2>,
     /// For each square.
     ticks: Vec<u32>,
     lost: Vec<u32>,
@@ -64,6 +70,8 @@ impl WalkCounter {
             agent,
             patience: (PATIENCE * tick_hz).ceil() as u32,
             level: None,
+            open: None,
+            last: None,
             ticks: Vec::new(),
             lost: Vec::new(),
             skills: Vec::new(),
@@ -85,9 +93,37 @@ impl WalkCounter {
             self.level = Some((episode.level, squares));
         }
         let Some((_, Some(squares))) = self.level else { return };
-        let Some(square) = game.whereabouts(world, self.agent).and_then(|place| squares.at(place)) else { return };
+        let before = self.last.take().filter(|_| episode.tick > 1);
+        let Some(place) = game.whereabouts(world, self.agent) else { return };
+        let Some(square) = squares.at(place) else { return };
         let skill = world.get::<ActiveSkill>(self.agent);
-        self.count(squares.count(), square, skill.map_or(&[][..], |skill| skill.z.as_slice()));
+        let z = skill.map_or(&[][..], |skill| skill.z.as_slice());
+        if let Some(before) = before.filter(|before| squares.between(*before, place).next().is_some()) {
+            if self.open.as_ref().is_none_or(|(level, _)| *level != episode.level) {
+                let open = game.floor_plan(mode, episode.level).and_then(|plan| squares.open(&plan));
+                self.open = Some((episode.level, open.unwrap_or_default()));
+            }
+            self.pass(squares, before, place, z);
+        }
+        self.count(squares.count(), square, z);
+        self.last = Some(place);
+    }
+
+    /// Counts the open squares that were passed on the way to a place, as one tick each if they are new in the episode. A tick
+    /// has been counted before.
+    fn pass(&mut self, squares: LevelSquares, from: Vec2, to: Vec2, z: &[f32]) {
+        let Some((_, open)) = &self.open else { return };
+        for square in squares.between(from, to).filter(|square| open.contains(square)) {
+            if self.ticks[square] > 0 {
+                continue;
+            }
+            self.visited.push(square);
+            self.since_new = 0;
+            self.ticks[square] = 1;
+            if let Some(skill) = skill_number(z).filter(|skill| *skill < self.names) {
+                self.skills[square * self.names + skill] += 1;
+            }
+        }
     }
 
     /// Counts a tick in a square, one of so many, under a skill, which may be empty.
@@ -126,6 +162,7 @@ impl WalkCounter {
     /// What was counted in the episode, which is over; `None` if the game does not say where its agents are. From here on the
     /// next one is counted.
     pub fn take(&mut self) -> Option<Walk> {
+        self.last = None;
         let (_, squares) = self.level?;
         let squares = squares?;
         self.visited.sort_unstable();
@@ -201,6 +238,24 @@ mod tests {
         assert_eq!(walk.counts[1].skills, [(1, 1)]);
         let without = walked(&mut counter, &[5, 6], &[]);
         assert!(without.counts.iter().all(|count| count.skills.is_empty()), "{without:?}");
+    }
+
+    #[test]
+    fn open_squares_between_two_ticks_are_passed() {
+        let mut counter = counter();
+        let (_, squares) = counter.level.expect("a level");
+        let squares = squares.expect("it has an extent");
+        counter.open = Some((0, BTreeSet::from([0, 1, 2, 4, 5])));
+        let place = |square: usize| Vec2::new(square as f32 + 0.5, 0.5);
+        for (from, to) in [(0, 0), (0, 4), (4, 0), (0, 5)] {
+            counter.pass(squares, place(from), place(to), &[0.1, -2.0]);
+            counter.count(16, to, &[0.1, -2.0]);
+        }
+        let walk = counter.take().expect("it went somewhere");
+        // Square 3 is closed, and the last leap is too far for an agent: it has been put there.
+        assert_eq!(lost(&walk), [(0, 2, 0), (1, 1, 0), (2, 1, 0), (4, 1, 0), (5, 1, 0)]);
+        assert!(walk.counts.iter().all(|count| count.skills == [(3, count.ticks)]), "{walk:?}");
+        assert_eq!(walk.trail, [[0, 1], [4, 1], [0, 1], [5, 1]]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub fn numbers(overview: &Overview) -> String {
     ] {
         number(class, what, count, &interval_of(Trials { successes: count, trials: levels }));
     }
-    number("found", "findings", overview.findings, "");
+    number("found", if overview.findings == 1 { "finding" } else { "findings" }, overview.findings, "");
     if overview.places.percent().is_some() {
         let [visited, open] = [overview.places.visited, overview.places.open].map(|count| whole(count as f64));
         let (share, note) = (overview.places.describe(), format!("{visited} of {open}"));

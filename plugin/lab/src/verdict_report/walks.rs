@@ -31,7 +31,8 @@ pub fn walks(level: &LevelVerdict) -> String {
         let _ = writeln!(out, "<p>Visited {} of the open places ({}).</p>", places.describe(), each.join(", "));
     }
     let Some(maps) = &level.maps else { return out };
-    let sum = |counts: &[[u64; 2]]| counts.iter().map(|[_, ticks]| *ticks as f64).sum::<f64>();
+    // The sum of no numbers at all would be -0.
+    let sum = |counts: &[[u64; 2]]| counts.iter().fold(0.0, |sum, [_, ticks]| sum + *ticks as f64);
     let all = sum(&maps.visits).max(1.0);
     let _ = writeln!(out, "<p>Time lost: {:.1} % of the ticks.</p>", 100.0 * sum(&maps.lost) / all);
     if !maps.skills.is_empty() {
@@ -112,5 +113,7 @@ mod tests {
         }
         assert_eq!(crate::verdict_report::words::causes(&level), "saw 5, time 2, &lt;saw&gt; 1");
         assert_eq!(walks(&crate::verdict_report::testing::level(0, 1, 1, 3)), "", "older results say nothing");
+        level.maps = Some(LevelMaps { visits: vec![[0, 100]], ..LevelMaps::default() });
+        assert!(walks(&level).contains("<p>Time lost: 0.0 % of the ticks.</p>"), "{}", walks(&level));
     }
 }

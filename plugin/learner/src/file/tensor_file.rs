@@ -97,6 +97,12 @@ impl TensorFile {
             SafeTensorError::HeaderTooSmall
             | SafeTensorError::InvalidHeaderLength
             | SafeTensorError::MetadataIncompleteBuffer => FileError::CutOff { path: path.to_owned(), advice: "" },
+            // What stands where the length of the header should be is of another kind of file, and says nothing.
+            SafeTensorError::HeaderTooLarge
+            | SafeTensorError::InvalidHeader(_)
+            | SafeTensorError::InvalidHeaderDeserialization(_) => {
+                format(format!("not safetensors, the form of policies and skill models: {FOREIGN}"))
+            }
             error => format(format!("not safetensors ({error}): {FOREIGN}")),
         };
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(foreign)?;

@@ -6,9 +6,9 @@ use std::{
 };
 
 use super::{
-    bins::{BINS, Bins},
+    bins::Bins,
     ground::Ground,
-    loose::{self, Loose},
+    loose::{self, Loose, out_of_wall},
     state::{Exact, State},
     step::step,
 };
@@ -24,23 +24,18 @@ const MOST_STEPS: usize = 100_000;
 /// full speed. It knows walls, crates, lava and saws, and neither enemies nor the time.
 pub fn coin_is_unreachable(sim: &Sim) -> bool {
     let (level, player, memory) = (sim.level(), sim.player(), sim.player_state());
-    if level.tiles.blocks_player(&corners(player, player.x, player.y)) {
-        // Who starts in a wall moves as nobody else.
-        return false;
-    }
     let mut ground = Ground::new(level);
     let mut known = Known::default();
-    let is_held = memory.on_crate || memory.lent_support;
-    let start = State::Exact(Exact { y: player.y, vy: player.vy + 0.0, is_held });
-    let coin = level.coin[0] as f32 + 0.5;
-    let mut open = BinaryHeap::from([Open { state: start, places: Bins::at(player.x), distance: BINS }]);
+    let (place, coin) = (Bins::at(player.x), level.coin[0] as f32 + 0.5);
     let mut after = Vec::new();
+    if level.tiles.blocks_player(&corners(player, player.x, player.y)) {
+        out_of_wall(&mut ground, player.y, place, &mut after);
+    } else {
+        let is_held = memory.on_crate || memory.lent_support;
+        after.push((State::Exact(Exact { y: player.y, vy: player.vy + 0.0, is_held }), place));
+    }
+    let mut open = BinaryHeap::new();
     for _ in 0..MOST_STEPS {
-        let Some(Open { state, places, .. }) = open.pop() else { return true };
-        match state {
-            State::Exact(state) => step(&mut ground, state, places, &mut after),
-            State::Loose(state) => loose::step(&mut ground, state, places, &mut after),
-        }
         for (next, places) in after.drain(..) {
             let touched = match next {
                 State::Exact(state) => ground.touched(state.y),
@@ -53,6 +48,11 @@ pub fn coin_is_unreachable(sim: &Sim) -> bool {
             if !new.is_empty() {
                 open.push(Open { state: next, places: new, distance: new.distance(coin) });
             }
+        }
+        let Some(Open { state, places, .. }) = open.pop() else { return true };
+        match state {
+            State::Exact(state) => step(&mut ground, state, places, &mut after),
+            State::Loose(state) => loose::step(&mut ground, state, places, &mut after),
         }
     }
     false
@@ -202,6 +202,17 @@ mod tests {
         assert!(coin_is_unreachable(&level("##.C##", "##..##")));
         assert!(coin_is_unreachable(&level("##.C..", "##..##")), "a hole too low to pass");
         assert!(!coin_is_unreachable(&level("##.C..", "##....")));
+    }
+
+    #[test]
+    fn who_starts_where_there_is_no_room_stays_there_unless_a_wall_ends() {
+        let level = |roof: &str| {
+            let air = "#...........#\n".repeat(8);
+            start(&format!("{air}{roof}\n#A........C.#\n#===========#\n"))
+        };
+        assert!(coin_is_unreachable(&level("#####.......#")));
+        assert!(coin_is_unreachable(&level("###.........#")));
+        assert!(!coin_is_unreachable(&level("#...........#")));
     }
 
     /// A level of random walls, ledges, crates, saws and lava, with room at the start.

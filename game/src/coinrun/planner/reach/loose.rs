@@ -20,8 +20,9 @@ pub(super) const FASTEST: i32 = (JUMP_SPEED * TENTHS) as i32;
 const SLOWED: i32 = (GRAVITY * TENTHS) as i32;
 /// Who stands on something is in the middle of a tenth.
 const OFFSET: f32 = PLAYER_HALF_HEIGHT - 0.55;
-/// Bins between two places in the same columns, and one more for a part of a step.
-const LEDGE_REACH: usize = 12;
+/// Bins that a player with a corner in a wall may move before all are free again: a tile, an eighth of one for a part of a
+/// step, and some more.
+const WALL_REACH: usize = 12;
 /// A player who overlaps a crate is at most so far below its top, tenths of a tile.
 const CRATE_DEPTH: i32 = 22;
 
@@ -51,15 +52,18 @@ impl Loose {
     }
 }
 
-/// A player whose corners have got into a ledge at this height, after having stood across it: until all of them are free
-/// again, it stays in the same columns and near the same height, and may have any speed then.
-pub(super) fn out_of_ledge(ground: &mut Ground, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
-    let ledge = y.floor();
-    let half = ledge + PLAYER_HALF_HEIGHT;
-    for y in [half, ledge + 0.5, ledge + 1.0 - PLAYER_HALF_HEIGHT] {
-        let rows = ground.rows(y);
-        let out = places.spread(LEDGE_REACH) & ground.room(rows);
-        put(after, State::Loose(Loose { level: level_of(y), lift: FASTEST }), out);
+/// A player with a corner in a wall: who starts there, or has stood across a ledge and moved up or down. Until all corners are
+/// free again, such a player stays in the same columns, or one beside, and at two heights between two rows; it may have any
+/// speed then.
+pub(super) fn out_of_wall(ground: &mut Ground, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
+    let row = y.floor();
+    let heights = [row + 1.0 - PLAYER_HALF_HEIGHT, row + PLAYER_HALF_HEIGHT];
+    // A part of a step makes at most a quarter of a tile.
+    let [lowest, highest] = [level_of(heights[0] - 0.26), level_of(heights[1] + 0.26)];
+    for level in lowest..=highest {
+        // The coin is touched by who is still in the wall, too.
+        let out = places.spread(WALL_REACH) & (room(ground, level) | touched(ground, level).coin);
+        put(after, State::Loose(Loose { level, lift: FASTEST }), out);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{
     bins::{Bins, STEP_BINS},
     ground::Ground,
-    loose::{Loose, out_of_ledge},
+    loose::{Loose, out_of_wall},
     state::{Exact, State, put},
     vertical::{Stopped, displace},
 };
@@ -75,7 +75,7 @@ fn play(ground: &mut Ground, act: &Act, parts: u32, after: &mut Vec<(State, Bins
             }
             for (y, stopped, places) in displace(ground, places, part.y, act.vy * share, held_from) {
                 if stopped == Stopped::ByLedge {
-                    out_of_ledge(ground, y, places, after);
+                    out_of_wall(ground, y, places, after);
                     continue;
                 }
                 let is_free = stopped == Stopped::Not;

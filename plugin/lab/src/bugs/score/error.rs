@@ -114,7 +114,7 @@ pub enum ScoreError {
     #[error("there is nothing to join: name at least one file that `playbot bugs score` has written")]
     Nothing,
     /// The operating system refused.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}: {source}; {}", path.display(), next_step(action))]
     Io {
         /// What was tried.
         action: &'static str,
@@ -135,6 +135,14 @@ impl ScoreError {
             Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
             _ => true,
         }
+    }
+}
+
+/// What to do where the system refused.
+fn next_step(action: &str) -> &'static str {
+    match action {
+        "read" => "name a file that is there, as `playbot bugs score` has written it",
+        _ => "make room or rights there, or name another file, and call this again",
     }
 }
 

@@ -112,6 +112,8 @@ mod tests {
             fs::write(&path, text).expect("writable");
             Score::read(&path).expect_err("no score").to_string()
         };
+        let none = Score::read(&folder.path().join("none.json")).expect_err("no file").to_string();
+        assert!(none.contains("none.json") && none.contains("name a file that is there"), "{none}");
         assert!(said("{").contains("score.json: line 1: "));
         assert!(said("{\"format\":1}").contains("missing field"));
         assert!(said("{\"format\":9}").contains("a score in form 9, but this program reads form 1"));

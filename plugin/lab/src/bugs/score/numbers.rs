@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::verdict::wilson;
+use crate::{report::whole, verdict::wilson};
 
 /// So many of so many, with the 95 % Wilson interval of the share.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -49,6 +49,20 @@ impl Share {
     }
 }
 
+/// A number with the two or three digits that say something.
+pub(super) fn short_number(value: f64) -> String {
+    let size = value.abs();
+    let decimals = match size {
+        _ if size >= 100.0 || size == 0.0 || !size.is_finite() => return whole(value),
+        _ if size >= 10.0 => 1,
+        _ if size >= 1.0 => 2,
+        _ if size < 0.001 => return "under 0.001".to_owned(),
+        // Two digits behind the zeros.
+        _ => (1.0 - size.log10().floor()) as usize,
+    };
+    format!("{value:.decimals$}")
+}
+
 /// The middle of these numbers, or half-way between the two in the middle; `None` of nothing.
 pub(super) fn median(mut numbers: Vec<f64>) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
@@ -68,6 +82,12 @@ mod tests {
         assert_eq!(share.describe(), "80.0 % (8 of 10; 49.0 to 94.3)");
         let nothing = Share::of([]);
         assert_eq!((nothing.share(), nothing.describe().as_str(), nothing.short().as_str()), (None, "–", "–"));
+    }
+
+    #[test]
+    fn numbers_have_two_or_three_digits() {
+        let told = [2160.0, 12.345, 1.234, 0.1234, 0.005_526, 0.000_02, 0.0].map(short_number);
+        assert_eq!(told, ["2,160", "12.3", "1.23", "0.12", "0.0055", "under 0.001", "0"]);
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! Tables of a score, for the console and for Markdown.
 
 use super::{
-    numbers::Share,
+    numbers::{Share, short_number},
     table::{FEW_FALSE, ScoreTable},
     tester_row::TesterRow,
 };
-use crate::report::{PlainTable, readable};
+use crate::report::PlainTable;
 
 impl ScoreTable {
     /// What it comes to, in a few lines.
@@ -13,13 +13,13 @@ impl ScoreTable {
         let mix = |row: &TesterRow| {
             let names = if row.testers.is_empty() { "nobody".to_owned() } else { row.testers.join(" + ") };
             let first =
-                row.first_seconds.map_or_else(String::new, |s| format!("; median to the first {} s", readable(s)));
+                row.first_seconds.map_or_else(String::new, |s| format!("; median to the first {} s", short_number(s)));
             format!(
                 "{names}: recall {}, something found on {} sound levels, {} called unsolvable; {} defects per hour{first}",
                 row.recall.describe(),
                 row.false_findings.short(),
                 row.called_unsolvable,
-                row.found_per_hour.map_or_else(|| "–".to_owned(), readable)
+                row.found_per_hour.map_or_else(|| "–".to_owned(), short_number)
             )
         };
         let mut lines = vec![
@@ -40,6 +40,20 @@ impl ScoreTable {
             self.only_skills_of_found.describe()
         ));
         lines
+    }
+
+    /// What the columns mean, a line each.
+    pub fn meanings() -> Vec<String> {
+        vec![
+            "best mix: the fewest testers that together find most".to_owned(),
+            format!(
+                "careful mix: the same, with something found on at most {} % of the sound levels and none called unsolvable",
+                100.0 * FEW_FALSE
+            ),
+            "beside a sound build: found as before, or by a difference from the sound level or game, with the best mix"
+                .to_owned(),
+            "skills alone: found by testers with learned skills and by no other".to_owned(),
+        ]
     }
 
     /// Each class.
@@ -70,7 +84,7 @@ impl ScoreTable {
             "minimised actions",
             "of the original",
         ];
-        let number = |number: Option<f64>| number.map_or_else(|| "–".to_owned(), readable);
+        let number = |number: Option<f64>| number.map_or_else(|| "–".to_owned(), short_number);
         let row = |name: String, row: &TesterRow| {
             vec![
                 name,

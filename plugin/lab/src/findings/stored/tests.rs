@@ -52,7 +52,9 @@ fn a_file_that_is_cut_anywhere_is_refused() {
         let _ = fs::remove_file(&path);
         fs::write(&path, &bytes[..cut]).expect("writable");
         let error = StoredFinding::read(&path).expect_err("cut");
-        assert!(error.to_string().contains("a.finding: "), "{error}");
+        let words = error.to_string();
+        assert!(words.contains("a.finding: ") && words.contains("test the level again"), "{words}");
+        assert!(!words.contains("repair"), "one piece of advice: {words}");
     }
 }
 
@@ -62,6 +64,8 @@ fn files_of_others_are_told_what_they_are() {
     let path = folder.path().join("a.finding");
     let missing = StoredFinding::read(&path).expect_err("not there");
     assert!(missing.is_usage(), "{missing}");
+    let words = missing.to_string();
+    assert!(words.contains("there is no such file: name a .finding") && !words.contains("damage"), "{words}");
     fs::write(&path, "{\"game\": \"garden\"}").expect("writable");
     let foreign = StoredFinding::read(&path).expect_err("JSON");
     assert!(matches!(&foreign, FindingError::File(error) if matches!(error.fault, DemoFault::NotADemo { .. })));
@@ -72,7 +76,9 @@ fn files_of_others_are_told_what_they_are() {
         drop(writer);
         StoredFinding::read(&path).expect_err(note).to_string()
     };
-    assert!(with_note("played on Sunday", 1).contains("a recording, but of no finding"));
+    let words = with_note("played on Sunday", 1);
+    assert!(words.contains("a recording, but of no finding") && words.contains("`playbot demo show "), "{words}");
+    assert!(words.contains("`playbot view garden --demo ") && !words.contains("FormOnly"), "{words}");
     assert!(with_note("(finding: 1, level: \"a\")", 1).contains("a recording, but of no finding"));
     assert!(with_note("(finding: 9, colour: \"red\")", 1).contains("form 9, but this program reads forms up to 1"));
     let sound = ron::ser::to_string(&stored().head).expect("text");
@@ -84,5 +90,8 @@ fn files_of_others_are_told_what_they_are() {
 fn what_a_newer_program_adds_to_a_head_is_left_aside() {
     let note = ron::ser::to_string(&stored().head).expect("text");
     let more = format!("{},mood:Some(\"bad\"))", note.strip_suffix(')').expect("a struct"));
-    assert_eq!(head_of(Path::new("a"), &more).expect("known fields"), stored().head);
+    assert_eq!(
+        head_of(Path::new("a"), &DemoHeader { note: more, ..stored().header }).expect("known fields"),
+        stored().head
+    );
 }

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     drawing::{Drawing, Rgb, Shape},
     floor_plan::FloorPlan,
-    report::text_width::text_width,
+    report::text_width::{text_width, wrap},
 };
 
 /// Space around everything, pixels.
@@ -19,8 +19,10 @@ const TITLE: f32 = 16.0;
 const TEXT: f32 = 13.0;
 /// Distance of lines, pixels.
 const LINE: f32 = 19.0;
-/// Letters of pictures made of pixels are wider than those of drawings by this.
-const WIDEST: f64 = 1.4;
+/// Width of the letters of pictures made of pixels, in font sizes.
+const PIXEL_LETTER: f64 = 0.58;
+/// Lines of text are at least so long before they are broken, pixels.
+const SHORTEST: f32 = 360.0;
 /// Pixels of the longer side of a floor.
 const LENGTH: f32 = 640.0;
 /// Space between two cells, pixels.
@@ -49,16 +51,35 @@ impl CellChart {
         let mut shapes = Vec::new();
         let mut right = write(0.0, TITLE, INK, &self.title, &mut shapes);
         let mut y = LINE;
-        for caption in &self.captions {
-            right = right.max(write(y, TEXT, SOFT, caption, &mut shapes));
-            y += LINE;
-        }
         let extent = self.extent();
         let share = extent.width() / extent.size().max_element().max(f32::MIN_POSITIVE);
+        // No line is longer than the floor is wide, unless that is narrow.
+        let room = f64::from((LENGTH * share).max(SHORTEST));
+        for caption in self.captions.iter().flat_map(|caption| wrap(caption, room, f64::from(TEXT))) {
+            right = right.max(write(y, TEXT, SOFT, &caption, &mut shapes));
+            y += LINE;
+        }
+        right = right.max(self.legend(y, &mut shapes));
+        y += LINE;
         let frame = Frame::new(extent, Vec2::new(GAP, GAP + y + GAP / 2.0), LENGTH * share);
         self.floor(&frame, &mut shapes);
         let corner = frame.whole().max;
         Drawing { label: self.title.clone(), size: Vec2::new(right.max(corner.x), corner.y) + GAP, shapes }
+    }
+
+    /// Says what the marks are, and returns where that ends.
+    fn legend(&self, y: f32, out: &mut Vec<Shape>) -> f32 {
+        let middle = GAP + y + TEXT - 4.5;
+        out.push(start_mark(Vec2::new(GAP + 8.0, middle), 6.0));
+        let right = write_at(GAP + 20.0, y, TEXT, SOFT, "start", out);
+        out.push(goal_mark(Vec2::new(right + 24.0, middle), 6.0));
+        let right = write_at(right + 36.0, y, TEXT, SOFT, "goal", out);
+        if self.way.is_empty() {
+            return right;
+        }
+        let ends = [right + 16.0, right + 40.0].map(|x| Vec2::new(x, middle));
+        out.push(line(ends.to_vec(), 2.0, LINES[0]));
+        write_at(right + 48.0, y, TEXT, SOFT, "way", out)
     }
 
     /// The bounds of the plan, and around them whatever else was reached.
@@ -97,9 +118,14 @@ impl CellChart {
 
 /// Writes a line of text and returns where it ends.
 fn write(y: f32, size: f32, colour: Rgb, words: &str, out: &mut Vec<Shape>) -> f32 {
-    let at = Vec2::new(GAP, GAP + y + TEXT);
+    write_at(GAP, y, size, colour, words, out)
+}
+
+fn write_at(x: f32, y: f32, size: f32, colour: Rgb, words: &str, out: &mut Vec<Shape>) -> f32 {
+    let at = Vec2::new(x, GAP + y + TEXT);
     out.push(Shape::Text { at, size, colour, words: words.to_owned() });
-    GAP + (text_width(words, f64::from(size)) * WIDEST) as f32
+    let pixels = PIXEL_LETTER * f64::from(size) * words.chars().count() as f64;
+    x + text_width(words, f64::from(size)).max(pixels) as f32
 }
 
 fn line(points: Vec<Vec2>, width: f32, colour: Rgb) -> Shape {
@@ -142,7 +168,18 @@ mod tests {
         assert!(blocks[0].0.max.x < blocks[1].0.min.x && blocks[0].0.min.y == blocks[1].0.min.y);
         assert!((blocks[2].0.width() - LENGTH / 4.0).abs() < 0.01);
         let lines = drawing.shapes.iter().filter(|shape| matches!(shape, Shape::Line { .. })).count();
-        assert_eq!(lines, 2 + 1 + 1, "a cross, the way and the border");
+        assert_eq!(lines, 2 + 1 + 1 + 1, "a cross, the way, the border, and the way in the legend");
+        let is_there = |wanted: &str| {
+            drawing.shapes.iter().any(|shape| matches!(shape, Shape::Text { words, .. } if words == wanted))
+        };
+        assert!(["start", "goal", "way"].into_iter().all(is_there));
+    }
+
+    #[test]
+    fn long_lines_are_broken_instead_of_leaving_the_paper_blank_beside_the_floor() {
+        let mut chart = chart();
+        chart.captions = vec!["words ".repeat(60)];
+        assert!(chart.draw().size.x <= LENGTH + 2.0 * GAP + 1.0, "{}", chart.draw().size);
     }
 
     #[test]

@@ -1,0 +1,33 @@
+//! The level that is explored, as it is written.
+
+use playbot_lab::split::{LevelSplit, SplitError};
+
+/// Reads a level.
+///
+/// # Errors
+///
+/// It is none, in words that say how one is written.
+pub fn one_level(text: &str) -> Result<LevelSplit, String> {
+    text.parse::<LevelSplit>().map_err(|error| match error {
+        SplitError::NotARange(_) => {
+            let mode = text.split(':').next().filter(|mode| !mode.is_empty()).unwrap_or("MODE");
+            format!("`{text}` names no level: write its mode and its number, such as {mode}:7")
+        }
+        other => other.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_read_and_others_are_told_how_to_write_one() {
+        assert_eq!(one_level("plain:7").map(|level| (level.first, level.len())), Ok((7, 1)));
+        for (text, example) in [("plain", "plain:7"), ("plain:x", "plain:7"), ("", "MODE:7"), (":3", "MODE:7")] {
+            let error = one_level(text).expect_err(text);
+            assert!(error.contains(&format!("`{text}` names no level")) && error.ends_with(example), "{error}");
+        }
+        assert!(one_level("plain:9..3").is_err_and(|error| error.contains("write plain:3..9")));
+    }
+}

@@ -1,0 +1,98 @@
+//! Settings of detectors under which findings were made.
+
+use super::{check::Check, checks::Checks, head::FindingHead};
+use crate::{
+    detectors::{DetectorChoice, Detectors, list},
+    game::Game,
+};
+
+impl Checks {
+    /// Notes how detectors are set. What was known of them before no longer counts.
+    pub(super) fn with_records(mut self, records: &[String]) -> Self {
+        self.records.retain(|old| !records.iter().any(|new| name_of(new) == name_of(old)));
+        self.records.extend_from_slice(records);
+        self
+    }
+
+    /// The settings of a detector that are not the usual ones, as `name.key=value`.
+    pub(super) fn settings_of(&self, game: &dyn Game, detector: &str) -> Vec<String> {
+        let Some(record) = self.records.iter().find(|record| name_of(record) == detector) else { return Vec::new() };
+        let usual = list(game).into_iter().find(|known| known.name == detector);
+        let usual: Vec<String> = usual.map_or_else(Vec::new, |known| {
+            known.settings.iter().map(|(key, value, _)| format!("{key}={value}")).collect()
+        });
+        let values = record.split(' ').skip(1).filter(|value| !usual.iter().any(|known| known == value));
+        values.map(|value| format!("{detector}.{value}")).collect()
+    }
+
+    /// The check of a finding: its detector is set as it was when it found this, but for what is set in another way here.
+    pub(super) fn of_finding(&self, game: &dyn Game, head: &FindingHead) -> Option<Check> {
+        let check = self.of(&head.detector)?;
+        let has_settings = matches!(check, Check::Detector(_) | Check::WholeLevel(_));
+        if head.settings.is_empty() || !has_settings {
+            return Some(check);
+        }
+        // The last one counts.
+        let settings = [head.settings.clone(), self.settings_of(game, &head.detector)].concat();
+        let choice = DetectorChoice { with: vec!["all".to_owned()], settings, ..DetectorChoice::default() };
+        // A setting that the detector no longer has cannot be used.
+        let set = Detectors::choose(game, &choice).ok();
+        let set = set.and_then(|all| Self::default().with_detectors(&all).of(&head.detector));
+        Some(set.unwrap_or(check))
+    }
+}
+
+fn name_of(record: &str) -> &str {
+    record.split_once(' ').map_or(record, |(name, _)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_playbot::action::ActionValue;
+
+    use super::*;
+    use crate::{
+        bugs::score::testing::{Corridor, Rule},
+        findings::{FindingStatus, StoredFinding, recheck},
+    };
+
+    fn set(settings: &[&str]) -> Checks {
+        let settings = settings.iter().map(|text| (*text).to_owned()).collect();
+        let choice = DetectorChoice { with: vec!["all".to_owned()], settings, ..DetectorChoice::default() };
+        let detectors = Detectors::choose(&Corridor::default(), &choice).expect("there are such");
+        Checks::default().with_detectors(&detectors)
+    }
+
+    #[test]
+    fn only_settings_that_are_not_the_usual_ones_are_kept() {
+        let game = Corridor::default();
+        assert_eq!(set(&["stuck.ticks=20"]).settings_of(&game, "stuck"), ["stuck.ticks=20"]);
+        for checks in [set(&["stuck.ticks=20"]), Checks::of_game(&game), Checks::default()] {
+            assert!(checks.settings_of(&game, "frozen-world").is_empty());
+        }
+        let reset = set(&["stuck.ticks=20"]).with_detectors(&Detectors::usual(&game));
+        assert!(reset.settings_of(&game, "stuck").is_empty());
+    }
+
+    #[test]
+    fn a_finding_is_looked_for_as_it_was_found_unless_somebody_says_otherwise() {
+        // Whoever walks against the end of the corridor changes nothing.
+        let game = Corridor { rule: Rule::NoExit };
+        let actions: Vec<ActionValue> = [1, 2].repeat(10).into_iter().map(ActionValue::Discrete).collect();
+        let strict = set(&["frozen-world.ticks=8"]);
+        let head = FindingHead::new("plain:3", "frozen-world", "nothing has changed");
+        let usual = Checks::of_game(&game);
+        let found = |head: &FindingHead, checks: &Checks| {
+            StoredFinding::of_actions(&game, "plain", 3, head.clone(), &actions, checks)
+        };
+        assert_eq!(found(&head, &usual), None, "the usual setting is larger than the episode");
+        let head = FindingHead { settings: strict.settings_of(&game, "frozen-world"), ..head };
+        assert_eq!(head.settings, ["frozen-world.ticks=8"]);
+        let stored = found(&head, &strict).expect("nothing changes");
+        let status = |checks: &Checks| recheck(&game, &stored, checks).expect("playable").status(&stored);
+        assert_eq!(status(&usual), FindingStatus::StillThere);
+        assert_eq!(status(&set(&["frozen-world.ticks=100"])), FindingStatus::Gone, "somebody says otherwise");
+        let unknown = FindingHead { settings: vec!["frozen-world.colour=4".to_owned()], ..head };
+        assert!(found(&unknown, &strict).is_some(), "a setting that is no more is left aside");
+    }
+}
