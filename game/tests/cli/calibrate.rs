@@ -39,7 +39,11 @@ fn bots_are_held_beside_people() {
     assert!(tables.contains("agreement with people") && tables.contains("easy:11"), "{tables}");
     assert!(words.contains("12 levels of easy:0..11 were played by 1 person (alice) in 12 tries"), "{words}");
     let page = fs::read_to_string(folder.join("pages/people.html")).expect("written");
-    assert_eq!(page.matches("<circle class=\"dot").count(), 36, "a dot for each level and measure");
+    assert_eq!(
+        page.matches("<circle class=\"dot").count(),
+        39,
+        "a dot for each level and measure, and one in each legend"
+    );
     for file in ["plots/people.png", "people.svg"] {
         let (_, words) = done(folder, &["report", "calibrate", "out", "people.demo", "--plot", file]);
         assert!(words.contains(&format!("plot: {file}")), "{words}");

@@ -110,7 +110,11 @@ fn the_rank_correlation_with_several_people_is_known() {
     assert!(words.contains("1 level not played by people, 1 level played by people and not tested"), "{words}");
     assert!(!words.contains("too few"), "{words}");
     let page = found.to_html();
-    assert_eq!(page.matches("<circle class=\"dot").count(), 36, "a dot for each level and measure");
+    assert_eq!(
+        page.matches("<circle class=\"dot").count(),
+        39,
+        "a dot for each level and measure, and one in each legend"
+    );
     assert!(page.contains("0.99 (") && page.contains("Bonett and Wright"), "{page}");
     let text = found.to_markdown();
     assert!(text.contains("| ppo | time | 12 | 0.99 (") && text.contains("| bed:0 | 2 | 3 | 75.0 % | 200"), "{text}");

@@ -56,7 +56,7 @@ fn kinds() -> [DefectKind; 4] {
                 let is_missed = match variant {
                     0 => true,
                     1 => run.gems > 0,
-                    _ => run.gems < 3,
+                    _ => run.gems >= 3,
                 };
                 if is_missed && matches!(*next, NextState::Pending(Screen::Won)) {
                     next.reset();

@@ -91,13 +91,14 @@ fn sets_for_another_version_and_changed_levels_are_refused() {
     let other = BugSet { games: vec![BugGame { name: "track".to_owned(), version: 9 }], ..set() };
     let words = other.check(folder.path(), &Track).expect_err("another version").to_string();
     assert!(words.contains("version 9") && words.contains("has version 1"), "{words}");
-    let words = set().check(folder.path(), &Track).expect_err("an unknown kind").to_string();
-    assert!(words.contains("has no defect `panic` like `track-hole-00`"), "{words}");
+    let words = set().check(folder.path(), &Track).expect_err("a level is gone").to_string();
+    assert!(words.contains("cannot read") && words.contains("track-hole-00.json"), "{words}");
     let mut rules = set();
     rules.mutants.truncate(1);
     rules.check(folder.path(), &Track).expect("there is such a variant");
     rules.mutants[0].planted = PlantedPart::Rules { variant: 99 };
-    assert!(rules.check(folder.path(), &Track).is_err());
+    let words = rules.check(folder.path(), &Track).expect_err("no such variant").to_string();
+    assert!(words.contains("has no defect `panic` like `track-panic-00`"), "{words}");
 }
 
 #[test]
