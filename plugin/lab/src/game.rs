@@ -77,7 +77,8 @@ pub trait Game: Send + Sync {
     }
 
     /// Reads a level that somebody drew, in the game's own format. Worlds of level files have what was read as the resource
-    /// [`LevelDesigns`] before the game is built, and the game plays level number i of it instead of making one.
+    /// [`LevelDesigns`](crate::level_files::LevelDesigns) before the game is built, and the game plays level number i of it
+    /// instead of making one.
     ///
     /// # Errors
     ///

@@ -8,8 +8,8 @@ use std::{
 use super::{
     bins::Bins,
     ground::Ground,
-    loose::{self, Loose, out_of_wall},
-    state::{Exact, State},
+    loose::{self, out_of_wall},
+    state::{Exact, Loose, State},
     step::step,
 };
 use crate::coinrun::{rules::corners, sim::Sim};

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::{
     bins::{Bins, STEP_BINS},
     ground::{Ground, Touched},
-    state::{Exact, State, put},
+    state::{Exact, Loose, State, put},
 };
 use crate::coinrun::rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT};
 
@@ -25,15 +25,6 @@ const OFFSET: f32 = PLAYER_HALF_HEIGHT - 0.55;
 const WALL_REACH: usize = 12;
 /// A player who overlaps a crate is at most so far below its top, tenths of a tile.
 const CRATE_DEPTH: i32 = 22;
-
-/// A height and an upper limit of the speed upwards, in tenths.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub(super) struct Loose {
-    /// Which tenth of a tile the centre is in.
-    pub level: i32,
-    /// The most that it rises in the last step.
-    pub lift: i32,
-}
 
 /// Which tenth of a tile a height is in.
 fn level_of(y: f32) -> i32 {

@@ -1,6 +1,6 @@
 //! What the search knows of a player apart from the place along x.
 
-use super::{bins::Bins, loose::Loose};
+use super::bins::Bins;
 
 /// A state of the search.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,6 +27,15 @@ impl Exact {
     pub fn key(&self) -> (u32, u32, bool) {
         (self.y.to_bits(), self.vy.to_bits(), self.is_held)
     }
+}
+
+/// A height and an upper limit of the speed upwards, in tenths of a tile.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(super) struct Loose {
+    /// Which tenth of a tile the centre is in.
+    pub level: i32,
+    /// The most that it rises in the last step.
+    pub lift: i32,
 }
 
 /// Adds places to those that are known of the same thing.

@@ -3,8 +3,8 @@
 use super::{
     bins::{Bins, STEP_BINS},
     ground::Ground,
-    loose::{Loose, out_of_wall},
-    state::{Exact, State, put},
+    loose::out_of_wall,
+    state::{Exact, Loose, State, put},
     vertical::{Stopped, displace},
 };
 use crate::coinrun::rules::{WALK_SPEED, fall, part_count};
