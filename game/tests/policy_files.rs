@@ -111,7 +111,10 @@ fn torn_and_foreign_files_are_explained() {
         assert!(error.ends_with("the file is cut off: export the policy again"), "{length}: {error}");
     }
     let error = read(&[b'x'; 100]).expect_err("something else").to_string();
-    assert!(error.contains("not safetensors, the form") && error.contains("name one that playbot has written"), "{error}");
+    assert!(
+        error.contains("not safetensors, the form") && error.contains("name one that playbot has written"),
+        "{error}"
+    );
     let renamed = edit_header(&path, |header| {
         let tensor = header["critic.l1.bias"].take();
         header.as_object_mut().expect("a map").remove("critic.l1.bias");
