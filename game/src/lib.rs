@@ -12,6 +12,7 @@ pub mod ant;
 pub mod antmaze;
 mod arena_grid;
 pub mod coinrun;
+mod defect_variant;
 pub mod maze;
 pub mod maze2d;
 pub mod registry;

@@ -53,6 +53,7 @@ pub mod proof;
 pub mod report;
 pub mod runs;
 pub mod sensors;
+mod shell_word;
 pub mod space_view;
 pub mod split;
 pub mod stage_clock;

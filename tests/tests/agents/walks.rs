@@ -3,19 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::prelude::*;
-use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{
     detectors::Detectors,
     eval::Player,
     floor_plan::FloorPlan,
     prelude::*,
     verdict::{
-        EndPlace, FailureWay, LevelMaps, LevelVerdict, Places, TestError, TestPlan, TestWatch, Tester, TesterRecord,
-        run_tests,
+        EndPlace, FailureWay, LevelMaps, LevelVerdict, Places, TestError, TestPlan, TestWatch, Tester, run_tests,
     },
 };
 use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner, Prior, SkillDraw};
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
+
+use crate::corridor_defects::tester;
 
 /// The corridor with a plan: seven squares of side 1 below a wall. Agents start in square 3 or 4 and are through in square 6;
 /// in square 0 is an abyss.
@@ -66,10 +66,6 @@ impl Game for Charted {
     fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {
         (world.get::<Cell>(agent)?.0 == 0).then_some("abyss")
     }
-}
-
-fn tester(name: &str, player: Player) -> Tester {
-    Tester { record: TesterRecord::bot(name), player, observation_config: ObservationConfig::default() }
 }
 
 /// Who always does the same: 0 goes left, 1 goes right, 2 rests.

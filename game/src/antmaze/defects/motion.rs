@@ -10,7 +10,7 @@ use crate::{
         geometry::distance,
         plugin::AntMazeSystems,
     },
-    maze::defects::{pick, place, variants},
+    defect_variant::{pick, place, variants},
 };
 
 /// Vertical speed that is added in each tick, m/s. Gravity makes -0.98.

@@ -10,27 +10,15 @@ use crate::{
         plugin::AntMazeSystems,
         walls::wall_boxes,
     },
-    maze::{
-        Cell, Maze,
-        defects::{PLACES, wall_gone_beside_the_way, walled_on_the_way},
-    },
+    maze::defects::{ChangeMaze, of_walls},
 };
 
-/// Another maze for the physics, by start, goal and variant; `None` where there is no place for the defect.
-type Change = fn(&Maze, Cell, Cell, u32) -> Option<Maze>;
-
 pub(super) fn defects() -> Vec<DefectKind> {
-    let kind = |class, about, change: Change| {
-        DefectKind::rules(class, about, PLACES, move |app: &mut App, variant: u32| stand(app, variant, change))
-    };
-    vec![
-        kind("invisible-wall", "nobody gets past where nothing is", walled_on_the_way),
-        kind("missing-collider", "a wall can be gone through", wall_gone_beside_the_way),
-    ]
+    of_walls(stand)
 }
 
 /// Gives the physics other walls as soon as a level has been built.
-fn stand(app: &mut App, variant: u32, change: Change) {
+fn stand(app: &mut App, variant: u32, change: ChangeMaze) {
     let exchange = move |mut ants: Query<(&InMaze, &mut MazeAnt), Changed<InMaze>>| {
         for (level, mut ant) in &mut ants {
             let level = &level.0;
@@ -53,6 +41,8 @@ mod tests {
     use crate::{
         ant::WallBox,
         antmaze::{AntMaze, game::spawn_agent},
+        defect_variant::PLACES,
+        maze::Maze,
     };
 
     /// The level of an agent and the walls around its ant, where this defect is planted.

@@ -3,16 +3,16 @@
 use bevy::prelude::*;
 use playbot_lab::defect::DefectKind;
 
-use super::{
-    edit::surface,
-    way::{PLACES, column, strength, variants},
-};
-use crate::coinrun::{
-    components::{Arena, PlayerBody, Tiles},
-    level::Level,
-    rules::Body,
-    systems::CoinRunSystems,
-    tile::{SIZE, Tile},
+use super::{edit::surface, way::column};
+use crate::{
+    coinrun::{
+        components::{Arena, PlayerBody, Tiles},
+        level::Level,
+        rules::Body,
+        systems::CoinRunSystems,
+        tile::{SIZE, Tile},
+    },
+    defect_variant::{PLACES, pick, variants},
 };
 
 /// Height of an invisible wall, rows above the ground: as high as the level, and what a jump clears.
@@ -32,12 +32,12 @@ pub(super) fn defects() -> Vec<DefectKind> {
             "nobody gets past where nothing is",
             variants(HEIGHTS.len()),
             |app, variant| {
-                let height = strength(&HEIGHTS, variant);
+                let height = pick(&HEIGHTS, variant);
                 while_played(app, move |level, _| invisible_wall(level, column(level, variant), height));
             },
         ),
         DefectKind::rules("missing-collider", "ground does not hold", variants(HOLES.len()), |app, variant| {
-            let width = strength(&HOLES, variant);
+            let width = pick(&HOLES, variant);
             while_played(app, move |level, _| missing_ground(level, column(level, variant), width));
         }),
         // Its places are all the same, the coin: variants differ in who does not get it.
@@ -103,8 +103,8 @@ mod tests {
             let level = generate(Mode::Hard, seed);
             for variant in 0..6 {
                 let x = column(&level, variant);
-                let wall = invisible_wall(&level, x, strength(&HEIGHTS, variant));
-                let holes = missing_ground(&level, x, strength(&HOLES, variant));
+                let wall = invisible_wall(&level, x, pick(&HEIGHTS, variant));
+                let holes = missing_ground(&level, x, pick(&HOLES, variant));
                 assert!(!wall.is_empty() && !holes.is_empty(), "{seed} {variant}");
                 assert!(wall.iter().all(|([x, y], tile)| level.tiles.get(*x, *y) != *tile), "{seed} {variant}");
                 assert!(holes.iter().all(|([x, y], _)| level.tiles.get(*x, *y).is_wall()), "{seed} {variant}");

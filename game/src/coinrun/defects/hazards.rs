@@ -3,15 +3,15 @@
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
 
-use super::{
-    cells::while_played,
-    way::{PLACES, begins, strength, variants},
-};
-use crate::coinrun::{
-    components::{Arena, ArenaBody, ArenaEntities, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
-    rules::{BLOCK_HALF, Body},
-    systems::CoinRunSystems,
-    tile::{SIZE, Tile, TileGrid},
+use super::{cells::while_played, way::begins};
+use crate::{
+    coinrun::{
+        components::{Arena, ArenaBody, ArenaEntities, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
+        rules::{BLOCK_HALF, Body},
+        systems::CoinRunSystems,
+        tile::{SIZE, Tile, TileGrid},
+    },
+    defect_variant::{PLACES, pick, variants},
 };
 
 /// How far from a hazard one dies, tiles.
@@ -29,11 +29,11 @@ pub(super) fn defects() -> Vec<DefectKind> {
             "saws, enemies and lava kill from afar",
             variants(FAR.len()),
             |app, variant| {
-                far(app, variant, strength(&FAR, variant));
+                far(app, variant, pick(&FAR, variant));
             },
         ),
         DefectKind::rules("stray-enemy", "enemies leave their lanes", variants(STRAY.len()), |app, variant| {
-            stray(app, variant, strength(&STRAY, variant));
+            stray(app, variant, pick(&STRAY, variant));
         }),
     ]
 }

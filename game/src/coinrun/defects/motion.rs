@@ -2,10 +2,8 @@
 
 use playbot_lab::defect::DefectKind;
 
-use super::{
-    player::after_each_tick,
-    way::{strength, variants},
-};
+use super::player::after_each_tick;
+use crate::defect_variant::{pick, variants};
 
 /// What is added to the vertical speed of who is in the air, in each tick, tiles per tick: half of the gravity less, and
 /// three quarters more.
@@ -26,7 +24,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
             "gravity is too weak or too strong",
             variants(LIFT.len()),
             |app, variant| {
-                let lift = strength(&LIFT, variant);
+                let lift = pick(&LIFT, variant);
                 after_each_tick(app, variant, move |body, _, _| {
                     // Who stands has no vertical speed at all.
                     if body.vy != 0.0 {
@@ -36,7 +34,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
             },
         ),
         DefectKind::rules("wrong-jump", "jumps are too low or too high", variants(JUMP.len()), |app, variant| {
-            let factor = strength(&JUMP, variant);
+            let factor = pick(&JUMP, variant);
             after_each_tick(app, variant, move |body, memory, _| {
                 if memory.supported && body.vy > RISES {
                     body.vy *= factor;
@@ -44,7 +42,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
             });
         }),
         DefectKind::rules("slow-player", "players run too slowly", variants(DRAG.len()), |app, variant| {
-            let factor = strength(&DRAG, variant);
+            let factor = pick(&DRAG, variant);
             after_each_tick(app, variant, move |body, _, _| body.vx *= factor);
         }),
         DefectKind::rules(
@@ -52,7 +50,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
             "something pushes players in the air sideways",
             variants(WIND.len()),
             |app, variant| {
-                let wind = strength(&WIND, variant);
+                let wind = pick(&WIND, variant);
                 after_each_tick(app, variant, move |body, memory, _| {
                     if !memory.supported {
                         body.vx += wind;

@@ -1,29 +1,15 @@
 //! Where along a level a defect of the rules acts: its variants begin at the start, further on and late, so that who gets
 //! further finds more.
 
-use crate::coinrun::level::Level;
-
-/// Places along a level.
-pub(super) const PLACES: u32 = 3;
+use crate::{
+    coinrun::level::Level,
+    defect_variant::{PLACES, place},
+};
 
 /// Shares of the way to the coin from which on a defect acts.
 const FROM: [f32; PLACES as usize] = [0.0, 0.35, 0.7];
 /// Shares of the way at which something stands.
 const AT: [f32; PLACES as usize] = [0.25, 0.5, 0.75];
-
-fn place(variant: u32) -> usize {
-    (variant % PLACES) as usize
-}
-
-/// How strong the defect is, from 0: the variants go through all places first.
-pub(super) fn strength<T: Copy>(of: &[T], variant: u32) -> T {
-    of[(variant / PLACES) as usize % of.len()]
-}
-
-/// The variants of a defect that comes in so many strengths.
-pub(super) const fn variants(strengths: usize) -> u32 {
-    PLACES * strengths as u32
-}
 
 /// Where the defect begins to act, in tiles from the left.
 pub(super) fn begins(level: &Level, variant: u32) -> f32 {
@@ -42,12 +28,11 @@ mod tests {
     use crate::coinrun::{Mode, generate};
 
     #[test]
-    fn variants_go_through_the_places_and_then_through_the_strengths() {
+    fn variants_go_through_the_places() {
         let level = generate(Mode::Hard, 1);
         let coin = level.coin[0];
         assert_eq!(begins(&level, 3), 0.0);
         assert!(begins(&level, 1) < begins(&level, 2) && begins(&level, 5) == begins(&level, 2));
         assert!(column(&level, 0) < column(&level, 1) && column(&level, 2) < coin);
-        assert_eq!((variants(2), [2, 3].map(|variant| strength(&['a', 'b'], variant))), (6, ['a', 'b']));
     }
 }

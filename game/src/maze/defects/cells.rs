@@ -1,17 +1,19 @@
 //! Walls that are there to the rules only, and walls that are not.
 
-use super::variant::place;
-use crate::maze::{Cell, Maze};
+use crate::{
+    defect_variant::place,
+    maze::{Cell, Maze},
+};
 
 /// The maze with one more wall, on the shortest way from one cell to another; `None` if the way has no cell between.
-pub(crate) fn walled_on_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
+pub(super) fn walled_on_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
     let path = maze.shortest_path_between(start, goal)?;
     let last = path.len().checked_sub(2).filter(|&last| last > 0)?;
     redrawn(maze, path[on_the_way(variant, path.len()).clamp(1, last)], '#')
 }
 
 /// The maze without one of its walls: one between two free cells, the first from the variant's place on along the way.
-pub(crate) fn wall_gone_beside_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
+pub(super) fn wall_gone_beside_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
     let path = maze.shortest_path_between(start, goal)?;
     let from = on_the_way(variant, path.len()).min(path.len() - 1);
     let cells = path[from..].iter().chain(path[..from].iter().rev());

@@ -3,9 +3,8 @@
 mod cells;
 mod levels;
 mod success;
-mod variant;
+mod walls;
 
-pub(crate) use cells::{wall_gone_beside_the_way, walled_on_the_way};
 pub(crate) use levels::of_levels;
 pub(crate) use success::take_back;
-pub(crate) use variant::{PLACES, pick, place, variants};
+pub(crate) use walls::{ChangeMaze, of_walls};

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
 
 use crate::{
-    maze::defects::{pick, place, variants},
+    defect_variant::{pick, place, variants},
     maze2d::{
         ball::{Ball, FORCE, MASS, STEP, Vec2d, clip_action, length, sub},
         components::{MazeArena, MazeBall, PlaysIn},

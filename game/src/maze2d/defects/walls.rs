@@ -6,31 +6,19 @@ use bevy::prelude::*;
 use playbot_lab::defect::DefectKind;
 
 use crate::{
-    maze::{
-        Cell, Maze,
-        defects::{PLACES, wall_gone_beside_the_way, walled_on_the_way},
-    },
+    maze::defects::{ChangeMaze, of_walls},
     maze2d::{
         components::MazeArena, level::Maze2dLevel, mode::Contact, physics::MazePhysics, plugin::Maze2dSystems,
         walls::Walls,
     },
 };
 
-/// Another maze for the rules, by start, goal and variant; `None` where there is no place for the defect.
-type Change = fn(&Maze, Cell, Cell, u32) -> Option<Maze>;
-
 pub(super) fn defects() -> Vec<DefectKind> {
-    let kind = |class, about, change: Change| {
-        DefectKind::rules(class, about, PLACES, move |app: &mut App, variant: u32| stand(app, variant, change))
-    };
-    vec![
-        kind("invisible-wall", "nobody gets past where nothing is", walled_on_the_way),
-        kind("missing-collider", "a wall can be gone through", wall_gone_beside_the_way),
-    ]
+    of_walls(stand)
 }
 
 /// Gives the rules other walls as soon as a level has been built.
-fn stand(app: &mut App, variant: u32, change: Change) {
+fn stand(app: &mut App, variant: u32, change: ChangeMaze) {
     let exchange = move |mut arenas: Query<(&mut MazeArena, Option<&mut MazePhysics>), Changed<MazeArena>>| {
         for (mut arena, physics) in &mut arenas {
             let arena = arena.bypass_change_detection();

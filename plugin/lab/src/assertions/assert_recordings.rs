@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bevy_playbot::demo::file::{DemoFault, find_demos};
 
-use super::commands::{replay, word};
+use super::commands::replay;
 use crate::{
     demo::verify::verify_file,
     findings::{
@@ -14,6 +14,7 @@ use crate::{
     game::Game,
     games::Games,
     parallel::default_threads,
+    shell_word::shell_word,
 };
 
 /// How the program with the game is called.
@@ -101,7 +102,7 @@ fn check_recording(game: &dyn Game, path: &Path) -> Result<(), String> {
     lines.extend(told.map(|(episode, what)| format!("  episode {episode}: {what}")));
     let more = wrong.saturating_sub(MOST_EPISODES);
     lines.extend((more > 0).then(|| format!("  and {more} more")));
-    lines.push(format!("    {PROGRAM} demo verify {}", word(&path.display().to_string())));
+    lines.push(format!("    {PROGRAM} demo verify {}", shell_word(&path.display().to_string())));
     Err(lines.join("\n"))
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::{
     detectors::DetectorChoice,
+    shell_word::shell_word,
     verdict::{LevelVerdict, TestRecord, rerun_commands},
 };
 
@@ -29,7 +30,7 @@ impl Commands<'_> {
         let tests = format!("{} test ", self.program);
         for command in &mut commands {
             for (name, path) in &self.policies {
-                *command = command.replace(&format!("--policy {name} "), &format!("--policy {} ", word(path)));
+                *command = command.replace(&format!("--policy {name} "), &format!("--policy {} ", shell_word(path)));
             }
             if command.starts_with(&tests) {
                 *command += &options(self.detectors);
@@ -46,20 +47,14 @@ impl Commands<'_> {
 
 /// The command that plays a finding again.
 pub(super) fn replay(program: &str, file: &Path) -> String {
-    format!("{program} replay {}", word(&file.display().to_string()))
-}
-
-/// A text as one word of a shell.
-pub(super) fn word(text: &str) -> String {
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=,:+".contains(letter);
-    if text.chars().all(is_plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }
+    format!("{program} replay {}", shell_word(&file.display().to_string()))
 }
 
 fn options(choice: &DetectorChoice) -> String {
     let list = |option: &str, names: &[String]| {
-        if names.is_empty() { String::new() } else { format!(" {option} {}", word(&names.join(","))) }
+        if names.is_empty() { String::new() } else { format!(" {option} {}", shell_word(&names.join(","))) }
     };
-    let settings = choice.settings.iter().map(|setting| format!(" --detector {}", word(setting)));
+    let settings = choice.settings.iter().map(|setting| format!(" --detector {}", shell_word(setting)));
     list("--detect", &choice.with) + &list("--no-detect", &choice.without) + &settings.collect::<String>()
 }
 

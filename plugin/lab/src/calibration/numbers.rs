@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::verdict::Score;
+use crate::{report::statistics::median, verdict::Score};
 
 /// How a tester, or people, did on a level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -54,13 +54,6 @@ impl Numbers {
     }
 }
 
-/// The value in the middle, or the mean of the two there.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some(f64::midpoint(values[last / 2], values[last.div_ceil(2)]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,13 +64,5 @@ mod tests {
         let all = [person(9, 1.0, Some(30.0), 0.0), person(1, 0.0, None, 1.0), person(2, 0.5, Some(50.0), 0.5)];
         assert_eq!(Numbers::of_people(&all), person(12, 0.5, Some(40.0), 0.5));
         assert_eq!(Numbers::of_people(&all[1..2]), all[1]);
-    }
-
-    #[test]
-    fn a_median_lies_in_the_middle() {
-        assert_eq!(median(vec![9.0, 1.0, 4.0]), Some(4.0));
-        assert_eq!(median(vec![9.0, 1.0, 4.0, 5.0]), Some(4.5));
-        assert_eq!(median(vec![7.0]), Some(7.0));
-        assert_eq!(median(Vec::new()), None);
     }
 }

@@ -3,7 +3,7 @@
 use super::{agreement::Measure, read::Calibration};
 use crate::{
     drawing::Drawing,
-    report::{Chart, Curve, PlainTable, Report, Section, draw_scatters},
+    report::{Chart, Curve, PlainTable, Report, Section, draw_scatters, markdown_cell, markdown_row},
 };
 
 /// Most levels in the tables of a page.
@@ -34,8 +34,12 @@ impl Calibration {
 
     /// The same without charts, for a pull request.
     pub fn to_markdown(&self) -> String {
-        let mut parts = vec![format!("# Bots beside people: {} {}", cell(&self.game), cell(&self.range.to_string()))];
-        parts.extend(self.words().iter().map(|words| cell(words)));
+        let mut parts = vec![format!(
+            "# Bots beside people: {} {}",
+            markdown_cell(&self.game),
+            markdown_cell(&self.range.to_string())
+        )];
+        parts.extend(self.words().iter().map(|words| markdown_cell(words)));
         parts.push(markdown(&self.agreement_table()));
         parts.push(self.method().to_owned());
         parts.push("## Levels".to_owned());
@@ -87,26 +91,9 @@ fn diagonal(curves: &[Curve]) -> Option<Curve> {
 }
 
 fn markdown(table: &PlainTable) -> String {
-    let row = |cells: &[String]| {
-        let cells: Vec<String> = cells.iter().map(|text| cell(text)).collect();
-        format!("| {} |", cells.join(" | "))
-    };
     let ruler = format!("|{}", "---|".repeat(table.columns.len()));
-    let rows = table.rows.iter().map(|cells| row(cells));
-    [row(&table.columns), ruler].into_iter().chain(rows).collect::<Vec<_>>().join("\n")
-}
-
-/// Text that neither ends a cell of a table nor begins anything in Markdown.
-fn cell(text: &str) -> String {
-    let mut out = String::new();
-    for letter in text.chars() {
-        match letter {
-            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
-            letter if letter.is_control() => out.push(' '),
-            letter => out.push(letter),
-        }
-    }
-    out
+    let rows = table.rows.iter().map(|cells| markdown_row(cells));
+    [markdown_row(&table.columns), ruler].into_iter().chain(rows).collect::<Vec<_>>().join("\n")
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use bevy_playbot::demo::file::{DemoEnd, DemoEpisode};
 
-use super::numbers::{Numbers, median};
+use super::numbers::Numbers;
+use crate::report::statistics::median;
 
 /// A try that came to its end.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,6 +17,7 @@ mod chart;
 mod document;
 mod line;
 mod mark;
+mod markdown;
 mod number;
 mod plain_text;
 mod result;
@@ -35,6 +36,7 @@ mod trails;
 
 pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
+pub(crate) use markdown::{markdown_cell, markdown_row};
 pub use number::{percent, readable, readable_with_spread, whole};
 pub use result::{ResultRow, ResultTable};
 pub use scatter::draw_scatters;

@@ -15,6 +15,13 @@ pub fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0)).sqrt())
 }
 
+/// The value in the middle, or the mean of the two there; `None` without any value.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some(f64::midpoint(values[last / 2], values[last.div_ceil(2)]))
+}
+
 /// The first step at which a learning curve of `(step, value)` is at `threshold` or above; `None` if it never is.
 ///
 /// A single good value counts, so the curve should be a moving mean, as `charts/success_rate` and
@@ -112,5 +119,16 @@ mod tests {
         // 1, 3 and 8: mean 4, squares 9 + 1 + 16 = 26.
         assert_eq!((at_10.mean, at_10.low, at_10.high), (4.0, 4.0 - 13f64.sqrt(), 4.0 + 13f64.sqrt()));
         assert!(mean_curve(&[]).is_empty() && mean_curve(&[vec![]]).is_empty());
+    }
+
+    #[test]
+    fn a_median_lies_in_the_middle() {
+        assert_eq!(median(vec![9.0, 1.0, 4.0]), Some(4.0));
+        assert_eq!(median(vec![9.0, 1.0, 4.0, 5.0]), Some(4.5));
+        assert_eq!(median(vec![7.0]), Some(7.0));
+        assert_eq!(median(Vec::new()), None);
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!((median(vec![7.0]), median(Vec::new())), (Some(7.0), None));
     }
 }

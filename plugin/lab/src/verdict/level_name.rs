@@ -5,6 +5,7 @@ use bevy_playbot::state_hash::StateHash;
 use crate::{
     game::{Game, level_designs},
     level_files::{LevelDesigns, is_level_files, level_files_mode},
+    shell_word::shell_word,
     split::LevelSplit,
 };
 
@@ -18,8 +19,7 @@ pub fn level_name(game: &dyn Game, split: &LevelSplit, level: u64) -> String {
 /// What `--levels` says for the level with this name alone, as a word for the shell.
 pub(super) fn level_argument(split: &LevelSplit, name: &str) -> String {
     let word = if is_level_files(&split.mode) { level_files_mode(name) } else { name.to_owned() };
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=,:+".contains(letter);
-    if word.chars().all(is_plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    shell_word(&word)
 }
 
 /// A hash of the files of these levels and of what is played in them; `None` for levels that are no files.

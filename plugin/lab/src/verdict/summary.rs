@@ -5,6 +5,7 @@ use std::fmt::Display;
 use super::{
     compare::Comparison, fisher::Trials, interval::wilson, junit::message, overview::Overview, rerun::rerun_commands,
 };
+use crate::report::markdown_cell;
 
 /// Most changes of a kind that are listed.
 const MOST_CHANGES: usize = 20;
@@ -12,7 +13,7 @@ const MOST_CHANGES: usize = 20;
 /// The page.
 pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, program: &str) -> String {
     let record = &overview.record;
-    let mut lines = vec![format!("# {} {}", record.game, cell(&record.range.to_string())), String::new()];
+    let mut lines = vec![format!("# {} {}", record.game, markdown_cell(&record.range.to_string())), String::new()];
     let solved = Trials { successes: overview.solved, trials: overview.levels };
     lines.push(format!(
         "**{} level{}**: {} solved{}, {} not solved by any tester, {} proved unsolvable; {} finding{}.",
@@ -33,7 +34,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     for tester in &overview.testers {
         let share = |of: Trials| format!("{} of {}{}", of.successes, of.trials, interval(of));
         let (levels, episodes, places) = (share(tester.levels), share(tester.episodes), tester.places.describe());
-        lines.push(format!("| {} | {levels} | {episodes} | {places} |", cell(&tester.name)));
+        lines.push(format!("| {} | {levels} | {episodes} | {places} |", markdown_cell(&tester.name)));
     }
     if let Some(comparison) = comparison {
         lines.extend(compared(comparison));
@@ -42,8 +43,8 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         lines
             .extend(["", "## Levels to look at", "", "| level | outcome | what |", "|---|---|---|"].map(str::to_owned));
         for level in &overview.worst {
-            let what = cell(&message(level));
-            lines.push(format!("| {} | {} | {what} |", cell(&level.level), level.outcome.name()));
+            let what = markdown_cell(&message(level));
+            lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.level), level.outcome.name()));
         }
         let shown = overview.worst.first().map(|level| rerun_commands(program, record, level)).unwrap_or_default();
         if !shown.is_empty() {
@@ -66,14 +67,14 @@ fn compared(comparison: &Comparison) -> Vec<String> {
     let mut lines = vec![String::new(), "## Since the earlier results".to_owned(), String::new()];
     let Comparison { levels, only_now, only_before, .. } = comparison;
     lines.push(format!("{levels} levels in both, {only_now} only now, {only_before} only before."));
-    lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", cell(why))));
+    lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", markdown_cell(why))));
     let mut list = |title: &str, changes: Vec<String>| {
         if changes.is_empty() {
             return;
         }
         lines.extend([String::new(), format!("{title} ({}):", changes.len()), String::new()]);
         let more = changes.len().saturating_sub(MOST_CHANGES);
-        lines.extend(changes.into_iter().take(MOST_CHANGES).map(|change| format!("- {}", cell(&change))));
+        lines.extend(changes.into_iter().take(MOST_CHANGES).map(|change| format!("- {}", markdown_cell(&change))));
         lines.extend((more > 0).then(|| format!("- and {more} more")));
     };
     list("Unsolvable", texts(&comparison.unsolvable));
@@ -89,19 +90,6 @@ fn compared(comparison: &Comparison) -> Vec<String> {
 
 fn texts(changes: &[impl Display]) -> Vec<String> {
     changes.iter().map(ToString::to_string).collect()
-}
-
-/// Text that neither ends a cell of a table nor begins anything in Markdown.
-fn cell(text: &str) -> String {
-    let mut out = String::new();
-    for letter in text.chars() {
-        match letter {
-            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
-            letter if letter.is_control() => out.push(' '),
-            letter => out.push(letter),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

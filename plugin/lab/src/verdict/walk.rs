@@ -9,7 +9,7 @@ use super::{
     skill_name::{skill_count, skill_number},
     squares::LevelSquares,
 };
-use crate::game::Game;
+use crate::{floor_plan::FloorPlan, game::Game};
 
 /// Seconds without a square that is new in the episode, after which time counts as lost.
 const PATIENCE: f64 = 2.0;
@@ -46,8 +46,10 @@ pub(super) struct WalkCounter {
     patience: u32,
     /// The level that is played, and its squares.
     level: Option<(u64, Option<LevelSquares>)>,
-    /// A level, and which of its squares are open: looked at once something is passed.
-    open: Option<(u64, BTreeSet<usize>)>,
+    /// The level from above, until it is asked which squares are open.
+    plan: Option<FloorPlan>,
+    /// Which of the level's squares are open: looked at once something is passed.
+    open: Option<BTreeSet<usize>>,
     /// Where the agent was after the last tick of this episode.
     last: Option<Vec2>,
     /// For each square.
@@ -70,6 +72,7 @@ impl WalkCounter {
             agent,
             patience: (PATIENCE * tick_hz).ceil() as u32,
             level: None,
+            plan: None,
             open: None,
             last: None,
             ticks: Vec::new(),
@@ -89,8 +92,8 @@ impl WalkCounter {
             return;
         }
         if self.level.is_none_or(|(level, _)| level != episode.level) {
-            let squares = game.floor_plan(mode, episode.level).and_then(|plan| LevelSquares::of(&plan));
-            self.level = Some((episode.level, squares));
+            (self.plan, self.open) = (game.floor_plan(mode, episode.level), None);
+            self.level = Some((episode.level, self.plan.as_ref().and_then(LevelSquares::of)));
         }
         let Some((_, Some(squares))) = self.level else { return };
         let before = self.last.take().filter(|_| episode.tick > 1);
@@ -99,9 +102,8 @@ impl WalkCounter {
         let skill = world.get::<ActiveSkill>(self.agent);
         let z = skill.map_or(&[][..], |skill| skill.z.as_slice());
         if let Some(before) = before.filter(|before| squares.between(*before, place).next().is_some()) {
-            if self.open.as_ref().is_none_or(|(level, _)| *level != episode.level) {
-                let open = game.floor_plan(mode, episode.level).and_then(|plan| squares.open(&plan));
-                self.open = Some((episode.level, open.unwrap_or_default()));
+            if self.open.is_none() {
+                self.open = Some(self.plan.take().and_then(|plan| squares.open(&plan)).unwrap_or_default());
             }
             self.pass(squares, before, place, z);
         }
@@ -112,7 +114,7 @@ impl WalkCounter {
     /// Counts the open squares that were passed on the way to a place, as one tick each if they are new in the episode. A tick
     /// has been counted before.
     fn pass(&mut self, squares: LevelSquares, from: Vec2, to: Vec2, z: &[f32]) {
-        let Some((_, open)) = &self.open else { return };
+        let Some(open) = &self.open else { return };
         for square in squares.between(from, to).filter(|square| open.contains(square)) {
             if self.ticks[square] > 0 {
                 continue;
@@ -245,7 +247,7 @@ mod tests {
         let mut counter = counter();
         let (_, squares) = counter.level.expect("a level");
         let squares = squares.expect("it has an extent");
-        counter.open = Some((0, BTreeSet::from([0, 1, 2, 4, 5])));
+        counter.open = Some(BTreeSet::from([0, 1, 2, 4, 5]));
         let place = |square: usize| Vec2::new(square as f32 + 0.5, 0.5);
         for (from, to) in [(0, 0), (0, 4), (4, 0), (0, 5)] {
             counter.pass(squares, place(from), place(to), &[0.1, -2.0]);

@@ -1,13 +1,13 @@
 //! A page of Markdown.
 
 use super::{record::ScoreBudget, table::ScoreTable};
-use crate::report::PlainTable;
+use crate::report::{PlainTable, markdown_cell, markdown_row};
 
 impl ScoreTable {
     /// The page: headline numbers, classes, testers, and how it was measured.
     pub fn to_markdown(&self) -> String {
         let mut lines = vec!["# Planted defects".to_owned(), String::new()];
-        lines.extend(self.headlines().iter().map(|line| format!("- {}", cell(line))));
+        lines.extend(self.headlines().iter().map(|line| format!("- {}", markdown_cell(line))));
         for table in [self.class_table(), self.tester_table()] {
             lines.extend([String::new(), format!("## {}", heading(&table.caption)), String::new()]);
             lines.extend(rows(&table));
@@ -28,9 +28,9 @@ impl ScoreTable {
         let sets: Vec<String> = self.sets.iter().map(|set| format!("{} (seed {})", set.hash, set.seed)).collect();
         let skilled: Vec<&str> =
             self.testers.iter().filter(|row| row.skilled).flat_map(|row| &row.testers).map(String::as_str).collect();
-        let skilled = if skilled.is_empty() { "nobody".to_owned() } else { cell(&skilled.join(", ")) };
+        let skilled = if skilled.is_empty() { "nobody".to_owned() } else { markdown_cell(&skilled.join(", ")) };
         vec![
-            format!("Games and versions: {}. Sets: {}.", cell(&self.games.join(", ")), sets.join(", ")),
+            format!("Games and versions: {}. Sets: {}.", markdown_cell(&self.games.join(", ")), sets.join(", ")),
             format!(
                 "Each tester has the same budget on each mutant and sound level: {episodes} episodes for whoever plays, \
                  {steps} steps and {routes} ways played again for whoever explores; seed {seed}."
@@ -56,28 +56,13 @@ impl ScoreTable {
 }
 
 fn rows(table: &PlainTable) -> Vec<String> {
-    let line =
-        |cells: &[String]| format!("| {} |", cells.iter().map(|text| cell(text)).collect::<Vec<_>>().join(" | "));
     let rule = table.columns.iter().enumerate().map(|(index, _)| if index == 0 { "---" } else { "---:" });
     let rule = format!("|{}|", rule.collect::<Vec<_>>().join("|"));
-    [line(&table.columns), rule].into_iter().chain(table.rows.iter().map(|row| line(row))).collect()
+    [markdown_row(&table.columns), rule].into_iter().chain(table.rows.iter().map(|row| markdown_row(row))).collect()
 }
 
 /// With a capital.
 fn heading(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
-/// Text that neither ends a cell of a table nor begins anything in Markdown.
-fn cell(text: &str) -> String {
-    let mut out = String::new();
-    for letter in text.chars() {
-        match letter {
-            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
-            letter if letter.is_control() => out.push(' '),
-            letter => out.push(letter),
-        }
-    }
-    out
 }

@@ -63,14 +63,6 @@ pub(super) fn short_number(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// The middle of these numbers, or half-way between the two in the middle; `None` of nothing.
-pub(super) fn median(mut numbers: Vec<f64>) -> Option<f64> {
-    numbers.sort_by(f64::total_cmp);
-    let high = *numbers.get(numbers.len() / 2)?;
-    let low = *numbers.get((numbers.len() - 1) / 2)?;
-    Some((low + high) / 2.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,12 +80,5 @@ mod tests {
     fn numbers_have_two_or_three_digits() {
         let told = [2160.0, 12.345, 1.234, 0.1234, 0.005_526, 0.000_02, 0.0].map(short_number);
         assert_eq!(told, ["2,160", "12.3", "1.23", "0.12", "0.0055", "under 0.001", "0"]);
-    }
-
-    #[test]
-    fn the_median_lies_in_the_middle() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
-        assert_eq!((median(vec![7.0]), median(Vec::new())), (Some(7.0), None));
     }
 }

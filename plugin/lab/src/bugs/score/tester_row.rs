@@ -4,11 +4,8 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use super::{
-    mix::Catch,
-    numbers::{Share, median},
-    rows::Rows,
-};
+use super::{mix::Catch, numbers::Share, rows::Rows};
+use crate::report::statistics::median;
 
 /// What a tester finds, and what it costs; or several testers together.
 #[derive(Clone, Debug, PartialEq, Serialize)]

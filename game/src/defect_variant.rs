@@ -1,4 +1,4 @@
-//! What the variants of a defect are: places along the way first, and then strengths.
+//! What the variants of a defect are: places along the way first, so that who gets further finds more, and then strengths.
 
 /// Places: at the start, further on and late.
 pub(crate) const PLACES: u32 = 3;
@@ -16,4 +16,15 @@ pub(crate) fn pick<T: Copy>(strengths: &[T], variant: u32) -> T {
 /// The variants of a defect that comes in so many strengths.
 pub(crate) const fn variants(strengths: usize) -> u32 {
     PLACES * strengths as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variants_go_through_the_places_and_then_through_the_strengths() {
+        assert_eq!((0..6).map(place).collect::<Vec<_>>(), [0, 1, 2, 0, 1, 2]);
+        assert_eq!((variants(2), [2, 3].map(|variant| pick(&['a', 'b'], variant))), (6, ['a', 'b']));
+    }
 }

@@ -1,0 +1,31 @@
+//! Tables in Markdown.
+
+/// Text that neither ends a cell of a table nor begins anything in Markdown.
+pub(crate) fn markdown_cell(text: &str) -> String {
+    let mut out = String::new();
+    for letter in text.chars() {
+        match letter {
+            '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
+            letter if letter.is_control() => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out
+}
+
+/// The cells of a row.
+pub(crate) fn markdown_row(cells: &[String]) -> String {
+    let cells: Vec<String> = cells.iter().map(|text| markdown_cell(text)).collect();
+    format!("| {} |", cells.join(" | "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_ends_its_cell_or_begins_anything() {
+        let cells = ["a|b", "*c*\n<d>"].map(str::to_owned);
+        assert_eq!(markdown_row(&cells), r"| a\|b | \*c\* \<d> |");
+    }
+}
