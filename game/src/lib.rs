@@ -16,4 +16,6 @@ mod defect_variant;
 pub mod maze;
 pub mod maze2d;
 pub mod registry;
+#[cfg(test)]
+mod watched;
 pub mod with_rays;

@@ -4,6 +4,7 @@ Called by run.sh with the program `playbot`. Nothing of GitHub, Kubernetes or Sl
 with the variables that they would set. `gh` and `sbatch` are scripts that do what the real ones are asked for.
 """
 
+import copy
 import os
 import pathlib
 import re
@@ -15,6 +16,7 @@ import tempfile
 import time
 
 import yaml
+from kubernetes_fields import mistakes
 
 FILES = pathlib.Path(__file__).parents[2] / "docs/how-to/many-machines"
 GAME, LEVELS, TESTERS = "coinrun", "hard:0..39", "--bot right-jump,random --episodes 2"
@@ -107,8 +109,29 @@ def github(folder, playbot, whole):
     check("it uses known actions", used == expected)
 
 
+def fields(documents):
+    found = mistakes(documents)
+    check("Kubernetes knows all fields, and they fit one another" + "".join(f"; {words}" for words in found), not found)
+    planted = {
+        "is not known": lambda _, shards: shards["spec"].update(completionsMode="Indexed"),
+        "has no restartPolicy": lambda _, shards: shards["spec"]["template"]["spec"].pop("restartPolicy"),
+        "completions is '16'": lambda _, shards: shards["spec"].update(completions="16"),
+        "restartPolicy Never for its backoffLimitPerIndex": lambda _, shards: shards["spec"].pop("completionMode"),
+        "podReplacementPolicy Failed": lambda _, shards: shards["spec"].update(podReplacementPolicy="TerminatingOrFailed"),
+        "container that is not there": lambda _, shards: shards["spec"]["template"]["spec"]["containers"][0].update(name="a"),
+        "there is no volume": lambda _, shards: shards["spec"]["template"]["spec"].pop("volumes"),
+        "nobody sets $LEVELS": lambda settings, _: settings["data"].pop("LEVELS"),
+        "ConfigMap.data is": lambda settings, _: settings["data"].update(SHARDS=16),
+    }
+    for words, plant in planted.items():
+        broken = copy.deepcopy(documents)
+        plant(broken[0], broken[2])
+        check(f"a mistake there is told: {words}", any(words in told for told in mistakes(broken)))
+
+
 def kubernetes(folder, playbot, whole):
     documents = list(yaml.safe_load_all((FILES / "kubernetes.yaml").read_text()))
+    fields(documents)
     settings, claim, shards, merge = documents
     kinds = [document["kind"] for document in documents]
     check("there are settings, a volume and two Jobs", kinds == ["ConfigMap", "PersistentVolumeClaim", "Job", "Job"])
@@ -122,6 +145,11 @@ def kubernetes(folder, playbot, whole):
     sources = {container["envFrom"][0]["configMapRef"]["name"] for container in containers}
     check("all with the settings", sources == {settings["metadata"]["name"]})
     check("restarted by the Job", {pod["restartPolicy"] for pod in pods} == {"Never"})
+    disruption = [{"type": "DisruptionTarget", "status": "True"}]
+    for job in (shards, merge):
+        [evicted] = [rule for rule in job["spec"]["podFailurePolicy"]["rules"] if "onPodConditions" in rule]
+        is_ignored = evicted == {"action": "Ignore", "onPodConditions": disruption}
+        check("an eviction does not count", is_ignored and job["spec"]["podReplacementPolicy"] == "Failed")
     [failures] = [rule["onExitCodes"] for rule in spec["podFailurePolicy"]["rules"] if "onExitCodes" in rule]
     check("rules are about its container", failures["containerName"] == pods[0]["containers"][0]["name"])
 

@@ -5,6 +5,8 @@
 # Called with the program `playbot` and a folder for Python packages that stays between calls:
 #   tests/many_machines/run.sh target/release/playbot target/python
 set -euo pipefail
+# Nothing is written beside the scripts.
+export PYTHONDONTWRITEBYTECODE=1
 playbot=$(realpath "$1")
 mkdir -p "$2"
 packages="$(realpath "$2")/ray"

@@ -146,6 +146,11 @@ impl AntBody {
         self.warm = Coordinates::default();
     }
 
+    /// Takes over where another ant is and how it moves, to the last digit: among the same walls both go on alike.
+    pub fn follow(&mut self, other: &Self) {
+        (self.place, self.rates, self.warm) = (other.place, other.rates, other.warm);
+    }
+
     /// Where the ant is and how it moves.
     pub fn state(&self) -> AntState {
         let (p, o) = (self.place.position, self.place.orientation);
@@ -243,6 +248,24 @@ mod tests {
     use bevy::reflect::GetPath;
 
     use super::*;
+
+    #[test]
+    fn an_ant_that_follows_goes_on_like_the_other() {
+        let (mut one, mut other) = (AntBody::new(&[]), AntBody::new(&[]));
+        for _ in 0..40 {
+            one.step(&[0.7; JOINTS]);
+        }
+        other.follow(&one);
+        for _ in 0..10 {
+            one.step(&[-0.3; JOINTS]);
+            other.step(&[-0.3; JOINTS]);
+            assert_eq!(one.state(), other.state());
+        }
+        other.set_state(&one.state());
+        one.step(&[0.5; JOINTS]);
+        other.step(&[0.5; JOINTS]);
+        assert_ne!(one.state(), other.state(), "rounded numbers are not enough");
+    }
 
     /// So that `playbot doctor` can name what differs.
     #[test]

@@ -167,12 +167,18 @@ pub(super) fn walk(
 
 /// The action within -1..=1, and a note if it was not.
 pub(crate) fn torques(action: &Action, episode: &mut Episode) -> [f32; JOINTS] {
-    let mut torques = [0.0; JOINTS];
-    for (torque, asked) in torques.iter_mut().zip(action.continuous().unwrap_or_default()) {
-        *torque = asked.clamp(-1.0, 1.0);
-    }
+    let torques = within_reach(action.continuous().unwrap_or_default());
     if action.continuous() != Some(&torques[..]) {
         episode.note_clipped();
+    }
+    torques
+}
+
+/// What is asked of the joints, each within -1..=1.
+pub(crate) fn within_reach(asked: &[f32]) -> [f32; JOINTS] {
+    let mut torques = [0.0; JOINTS];
+    for (torque, asked) in torques.iter_mut().zip(asked) {
+        *torque = asked.clamp(-1.0, 1.0);
     }
     torques
 }

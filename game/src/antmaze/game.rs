@@ -19,6 +19,7 @@ use playbot_lab::{
 };
 
 use super::{
+    against_rules::AgainstRules,
     components::{MazeAnt, PlaysIn},
     defects,
     demonstrator_bot::DemonstratorBot,
@@ -157,7 +158,8 @@ impl Game for AntMaze {
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
         // Tiles: the goal reaches half a metre, and walls are as thick as a tile.
         let (ignored, far) = (GoalIgnored::within(0.11), FarGoal::beyond(0.2));
-        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3))]
+        let walls = ThroughWall::deeper_than(0.3);
+        vec![Box::new(ignored), Box::new(far), Box::new(walls), Box::<AgainstRules>::default()]
     }
 
     fn defects(&self) -> Vec<DefectKind> {

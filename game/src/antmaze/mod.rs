@@ -4,6 +4,7 @@
 //! seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at the time
 //! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal.
 
+mod against_rules;
 mod arena;
 pub mod components;
 mod defects;

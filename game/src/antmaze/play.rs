@@ -50,7 +50,8 @@ pub(super) fn play(
     }
 }
 
-fn pay(pay: Pay, away: f32) -> f32 {
+/// What a tick pays that ends so far from the goal, in metres.
+pub(super) fn pay(pay: Pay, away: f32) -> f32 {
     match pay {
         Pay::Distance => -away,
         Pay::Exponential => ops::exp(-away),

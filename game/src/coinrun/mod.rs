@@ -5,6 +5,7 @@
 //! functions in [`rules`] are the single steps of play for those who keep the state elsewhere.
 
 pub mod arena;
+mod cells;
 pub mod components;
 mod creation_order;
 mod defects;

@@ -8,6 +8,7 @@ use super::{
     components::{
         Arena, ArenaBody, ArenaEntities, Crate, Enemy, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
     },
+    paths::Surroundings,
     rules::{Body, COIN_REWARD, begin_step, hash_state, move_player, patrol, touch},
 };
 
@@ -116,6 +117,7 @@ pub(super) fn observe(
     mut players: Query<(&Episode, &PlaysIn, &PlayerBody, &PlayerMemory, &mut Observation), With<VectorSensor>>,
     arenas: Arenas,
     mut bodies: Local<ArenaBodies>,
+    mut surroundings: Local<Surroundings>,
 ) {
     for (episode, plays_in, body, memory, mut observation) in &mut players {
         if !episode.is_running() {
@@ -131,6 +133,6 @@ pub(super) fn observe(
             saws: &bodies.saws,
             enemies: &bodies.enemies,
         };
-        scene.fill(&mut observation.vector);
+        scene.fill(&mut surroundings, &mut observation.vector);
     }
 }

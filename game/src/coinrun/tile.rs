@@ -78,6 +78,10 @@ pub struct TileGrid {
     walls: Box<[u64; SIZE as usize]>,
     /// For each row, bit `x` is set where enemies turn around. Kept for speed.
     turns: Box<[u64; SIZE as usize]>,
+    /// For each row, bit `x` is set where lava is. Kept for speed.
+    lava: Box<[u64; SIZE as usize]>,
+    /// For each row, bit `x` is set where the player's touch ends the episode: lava and coin. Kept for speed.
+    ends: Box<[u64; SIZE as usize]>,
 }
 
 impl fmt::Debug for TileGrid {
@@ -94,6 +98,8 @@ impl Default for TileGrid {
             tiles: Box::new([Tile::Empty; CELLS]),
             walls: Box::new([0; SIZE as usize]),
             turns: Box::new([0; SIZE as usize]),
+            lava: Box::new([0; SIZE as usize]),
+            ends: Box::new([0; SIZE as usize]),
         }
     }
 }
@@ -126,6 +132,25 @@ impl Corners {
         }
         let columns = 1 << (self.left as u32 & 63) | 1 << (self.right as u32 & 63);
         (rows[self.low as usize & 63] | rows[self.high as usize & 63]) & columns != 0
+    }
+
+    /// Whether the rectangle lies inside and no cell that it reaches into has its bit set.
+    #[inline]
+    fn misses(&self, rows: &[u64; SIZE as usize]) -> bool {
+        if !self.is_inside() {
+            return false;
+        }
+        let (low, high) = (self.low as usize & 63, self.high as usize & 63);
+        // A player spans up to four rows in a step.
+        let few = rows[low] | rows[high.min(low + 1)] | rows[high.min(low + 2)] | rows[high];
+        let more = if high > low + 3 { (low + 3..high).fold(0, |more, row| more | rows[row]) } else { 0 };
+        (few | more) & self.columns() == 0
+    }
+
+    /// The columns from left to right of a rectangle inside.
+    #[inline]
+    fn columns(&self) -> u64 {
+        (u64::MAX << (self.left as u32 & 63)) & (u64::MAX >> (63 - (self.right as u32 & 63)))
     }
 }
 
@@ -164,6 +189,28 @@ impl TileGrid {
         corners.hit(&self.turns)
     }
 
+    /// Whether the rectangle lies inside and nowhere in a wall.
+    #[inline]
+    pub fn is_clear(&self, rectangle: &Corners) -> bool {
+        rectangle.misses(&self.walls)
+    }
+
+    /// Whether the rectangle lies inside and touches neither lava nor the coin.
+    #[inline]
+    pub fn has_no_ends(&self, rectangle: &Corners) -> bool {
+        rectangle.misses(&self.ends)
+    }
+
+    /// For each row, bit `x` is set where ground is.
+    pub fn wall_rows(&self) -> &[u64; SIZE as usize] {
+        &self.walls
+    }
+
+    /// For each row, bit `x` is set where lava is.
+    pub fn lava_rows(&self) -> &[u64; SIZE as usize] {
+        &self.lava
+    }
+
     /// Whether one of the corners lies in a tile of the same kind as the outside: inner ground.
     #[inline]
     pub fn is_outside(&self, corners: &Corners) -> bool {
@@ -179,6 +226,8 @@ impl TileGrid {
             let assign = |row: &mut u64, on: bool| *row = *row & !(1 << x) | u64::from(on) << x;
             assign(&mut self.walls[y as usize], tile.is_wall());
             assign(&mut self.turns[y as usize], tile.turns_enemies());
+            assign(&mut self.lava[y as usize], tile.is_lava());
+            assign(&mut self.ends[y as usize], tile.is_lava() || tile == Tile::Coin);
         }
     }
 

@@ -17,9 +17,10 @@
 
 pub use super::view_size::{REACH, SIDE};
 use super::{
+    cells::Cells,
     paths,
     rules::{Body, ENEMY_SPEED, JUMP_SPEED, PlayerState, WALK_SPEED, is_supported},
-    tile::{Tile, TileGrid},
+    tile::TileGrid,
 };
 
 /// Cells in view.
@@ -68,8 +69,8 @@ pub fn names() -> Vec<String> {
 }
 
 impl Scene<'_> {
-    /// Writes the observation, `[LENGTH]`, over whatever was in `out`.
-    pub fn fill(&self, out: &mut Vec<f32>) {
+    /// Writes the observation, `[LENGTH]`, over whatever was in `out`. The surroundings are room to work in.
+    pub fn fill(&self, surroundings: &mut paths::Surroundings, out: &mut Vec<f32>) {
         out.clear();
         out.resize(LENGTH, 0.0);
         let (walls, rest) = out.split_at_mut(CELLS);
@@ -78,60 +79,22 @@ impl Scene<'_> {
         let (coin, rest) = rest.split_at_mut(3);
         let (listed, rest) = rest.split_at_mut(3 * LISTED_ENEMIES);
         let (motion, rays) = rest.split_at_mut(MOTION);
-        self.fill_tiles(walls, danger);
-        self.fill_bodies(crates, danger);
+        self.fill_cells(walls, crates, danger);
         self.fill_coin(coin);
         self.list_enemies(listed);
         self.fill_motion(motion);
-        let around = paths::Surroundings::new(self.player, self.tiles, self.crates, self.saws, self.enemies);
-        for (slot, action) in rays.chunks_exact_mut(paths::VALUES).zip(paths::HELD) {
-            around.follow(self.player, &self.memory, action, slot);
-        }
+        surroundings.follow(self.player, &self.memory, self.tiles, self.crates, self.saws, self.enemies, rays);
     }
 
-    /// Left and bottom edge of the view.
-    fn corner(&self) -> (f32, f32) {
-        let reach = REACH as f32 + 0.5;
-        (self.player.x - reach, self.player.y - reach)
-    }
-
-    fn fill_tiles(&self, walls: &mut [f32], danger: &mut [f32]) {
-        let (left, bottom) = self.corner();
-        // One more than the cells, since the edge of the view cuts through tiles.
-        for row in 0..=SIDE as i32 {
-            for column in 0..=SIDE as i32 {
-                let (x, y) = (left.floor() as i32 + column, bottom.floor() as i32 + row);
-                match self.tiles.get(x, y) {
-                    Tile::Wall | Tile::WallTop => self.cover(x as f32, y as f32, walls),
-                    Tile::Lava | Tile::LavaTop => self.cover(x as f32, y as f32, danger),
-                    Tile::Empty | Tile::Coin | Tile::Barrier => {}
-                }
-            }
-        }
-    }
-
-    fn fill_bodies(&self, crates: &mut [f32], danger: &mut [f32]) {
+    fn fill_cells(&self, walls: &mut [f32], crates: &mut [f32], danger: &mut [f32]) {
+        let cells = Cells::around(self.player.x, self.player.y);
+        cells.fill(self.tiles.wall_rows(), u64::MAX, walls);
+        cells.fill(self.tiles.lava_rows(), 0, danger);
         for body in self.crates {
-            self.cover(body.x - body.rx, body.y - body.ry, crates);
+            cells.cover(body.x - body.rx, body.y - body.ry, crates);
         }
         for body in self.saws.iter().chain(self.enemies) {
-            self.cover(body.x - body.rx, body.y - body.ry, danger);
-        }
-    }
-
-    /// Adds the square of one tile whose bottom left corner is (x, y) to the up to four cells it lies in, by area.
-    fn cover(&self, x: f32, y: f32, plane: &mut [f32]) {
-        let (left, bottom) = self.corner();
-        let (column, row) = ((x - left).floor(), (y - bottom).floor());
-        let (right_share, upper_share) = (x - left - column, y - bottom - row);
-        let side = SIDE as i32;
-        for (row, height) in [(row as i32, 1.0 - upper_share), (row as i32 + 1, upper_share)] {
-            for (column, width) in [(column as i32, 1.0 - right_share), (column as i32 + 1, right_share)] {
-                if (0..side).contains(&row) && (0..side).contains(&column) {
-                    let cell = &mut plane[(row * side + column) as usize];
-                    *cell = (*cell + width * height).min(1.0);
-                }
-            }
+            cells.cover(body.x - body.rx, body.y - body.ry, danger);
         }
     }
 
@@ -149,16 +112,20 @@ impl Scene<'_> {
     }
 
     fn list_enemies(&self, out: &mut [f32]) {
-        let mut seen: Vec<(f32, [f32; 3])> = self
-            .enemies
-            .iter()
-            .filter_map(|enemy| {
-                let (dx, dy) = self.in_view(enemy.x, enemy.y)?;
-                Some((dx * dx + dy * dy, [dx, dy, enemy.vx / ENEMY_SPEED]))
-            })
-            .collect();
-        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (slot, (_, values)) in out.chunks_exact_mut(3).zip(seen) {
+        let mut nearest = [(f32::INFINITY, [0.0; 3]); LISTED_ENEMIES];
+        for enemy in self.enemies {
+            let Some((dx, dy)) = self.in_view(enemy.x, enemy.y) else { continue };
+            let mut seen = (dx * dx + dy * dy, [dx, dy, enemy.vx / ENEMY_SPEED]);
+            let mut is_in_front = false;
+            for place in &mut nearest {
+                // Of two as near as each other, the first stays in front. All behind move on by one place.
+                is_in_front |= seen.0 < place.0;
+                if is_in_front {
+                    std::mem::swap(place, &mut seen);
+                }
+            }
+        }
+        for (slot, (_, values)) in out.chunks_exact_mut(3).zip(nearest) {
             slot.copy_from_slice(&values);
         }
     }
@@ -195,7 +162,7 @@ mod tests {
             saws: &[Body::block([4, 1])],
             enemies: &[Body { x: 5.75, ..Body::enemy([5, 1], -1) }],
         };
-        scene.fill(&mut out);
+        scene.fill(&mut paths::Surroundings::default(), &mut out);
         out
     }
 
@@ -251,10 +218,31 @@ mod tests {
             saws: &saw,
             enemies: &[],
         };
-        scene.fill(&mut out);
+        scene.fill(&mut paths::Surroundings::default(), &mut out);
         assert_eq!(value(&out, "hold_7_dies"), 1.0, "walking on meets the saw");
         assert_eq!(value(&out, "hold_8_dies"), 0.0, "a jump clears it");
         assert_eq!(value(&out, "hold_1_dies"), 0.0, "turning back is safe");
+    }
+
+    #[test]
+    fn the_nearest_enemies_are_listed_in_order() {
+        let level = generate(Mode::Hard, 0);
+        let player = Body { x: 20.5, y: 1.5, ..Body::player() };
+        let enemies = [24, 18, 27, 22, 21].map(|x| Body::enemy([x, 1], if x == 18 { -1 } else { 1 }));
+        let mut out = Vec::new();
+        let scene = Scene {
+            tiles: &level.tiles,
+            player: &player,
+            memory: PlayerState::default(),
+            coin: level.coin,
+            crates: &[],
+            saws: &[],
+            enemies: &enemies,
+        };
+        scene.fill(&mut paths::Surroundings::default(), &mut out);
+        let listed = [0, 1, 2].map(|enemy| (value(&out, &format!("enemy_{enemy}_dx")) * 6.5).round());
+        assert_eq!(listed, [1.0, -2.0, 2.0], "of two as near as each other, the first made comes first");
+        assert_eq!(value(&out, "enemy_1_vx"), -1.0);
     }
 
     #[test]

@@ -19,6 +19,7 @@ use playbot_lab::{
 };
 
 use super::{
+    against_rules::AgainstRules,
     components::{MazeBall, PlaysIn},
     defects,
     demonstrator_bot::DemonstratorBot,
@@ -166,7 +167,7 @@ impl Game for Maze2d {
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
         // Tiles: the goal reaches half a metre, and walls are as thick as a tile.
         let (ignored, far) = (GoalIgnored::within(0.45), FarGoal::beyond(0.6));
-        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3))]
+        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3)), Box::new(AgainstRules)]
     }
 
     fn defects(&self) -> Vec<DefectKind> {

@@ -5,6 +5,7 @@
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
 //! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal.
 
+mod against_rules;
 pub mod arena;
 pub mod ball;
 pub mod components;

@@ -6,6 +6,7 @@ mod eval;
 mod explore;
 mod findings;
 mod merging;
+mod named_policies;
 mod paths;
 mod planting;
 #[path = "../shared/program.rs"]

@@ -31,6 +31,7 @@ mod log;
 mod mesa;
 mod methods;
 mod missing_demos;
+mod named;
 mod number;
 mod one_level;
 mod open;

@@ -79,8 +79,8 @@ fn rewards_for_doing_nothing_are_found() {
     let testers = || vec![always(1), always(2)];
     let found = findings(&Defect::PaidRest, "plain:1", testers(), only(&Defect::PaidRest, &names, &[]));
     let who: Vec<_> = found.iter().map(|(_, finding)| (finding.detector.as_str(), finding.tick)).collect();
-    // The tenth payment comes in tick 9; time is up after 20 ticks.
-    assert_eq!(who, [("reward-loop", Some(9)), ("reward-farm", Some(19))], "{found:?}");
+    // Who stays is paid for the tenth time in tick 10; time is up after 20 ticks.
+    assert_eq!(who, [("reward-loop", Some(10)), ("reward-farm", Some(19))], "{found:?}");
     assert_silent(&findings(&Defect::None, "plain:1", testers(), only(&Defect::None, &names, &[])));
 }
 

@@ -16,7 +16,7 @@ pub use body::Body;
 pub use constants::*;
 pub use enemy::patrol;
 pub(in crate::coinrun) use motion::{corners, flush, part_count};
-pub(in crate::coinrun) use player::{MAX_PUSHES, directions, fall, rise_to_top};
+pub(in crate::coinrun) use player::{MAX_PUSHES, directions, fall, rise_to_top, walk};
 pub use player::{PlayerState, PlayerStep, begin_step, is_supported, move_player};
 pub use state_hash::hash_state;
 pub use touch::{Outcome, touch};

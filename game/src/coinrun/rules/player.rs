@@ -92,7 +92,7 @@ fn stands_on_wall(player: &Body, tiles: &TileGrid) -> bool {
 /// The horizontal velocity approaches the wanted one. Less than what one step of full
 /// acceleration adds counts as standing still; exactly that much does not.
 #[inline]
-fn walk(vx: f32, ax: i8, supported: bool) -> f32 {
+pub(in crate::coinrun) fn walk(vx: f32, ax: i8, supported: bool) -> f32 {
     let control = if supported { GROUND_CONTROL } else { GROUND_CONTROL * AIR_CONTROL };
     let vx = (1.0 - control) * vx + control * WALK_SPEED * f32::from(ax);
     if vx.abs() < control * WALK_SPEED { 0.0 } else { vx }

@@ -1,9 +1,6 @@
 //! Who is scored, as the command line names them.
 
-use std::{
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::path::Path;
 
 use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName};
 use playbot_lab::{
@@ -16,7 +13,7 @@ use playbot_lab::{
 };
 use playbot_learner::DeviceKind;
 
-use crate::{error::CliError, explore::Talents, open, player::Chosen};
+use crate::{error::CliError, explore::Talents, named::Named, open, player::Chosen};
 
 /// What stands for the demonstrators of all games.
 const DEMONSTRATOR: &str = "demonstrator";
@@ -40,23 +37,6 @@ pub struct ContestantArgs {
     /// of that one.
     #[arg(long, value_name = "FILE")]
     skills: Vec<String>,
-}
-
-/// A file with a name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Named {
-    name: String,
-    path: PathBuf,
-}
-
-impl FromStr for Named {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('=').filter(|(name, file)| !name.is_empty() && !file.is_empty());
-        let (name, file) = parts.ok_or("write a name in front of the file, as in ppo=bot.policy")?;
-        Ok(Self { name: name.to_owned(), path: file.into() })
-    }
 }
 
 impl ContestantArgs {
@@ -206,12 +186,5 @@ mod tests {
         assert!(names(&["demonstrator"]).is_empty(), "it has none");
         let words = load(&["choas"]).map(drop).expect_err("unknown").to_string();
         assert!(words.contains("did you mean `chaos`?"), "{words}");
-    }
-
-    #[test]
-    fn a_policy_has_a_name() {
-        let named = Named { name: "ppo".to_owned(), path: "a=b.policy".into() };
-        assert_eq!("ppo=a=b.policy".parse(), Ok(named));
-        assert!("bot.policy".parse::<Named>().is_err() && "=bot.policy".parse::<Named>().is_err());
     }
 }

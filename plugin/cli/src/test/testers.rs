@@ -14,7 +14,7 @@ use playbot_lab::{
 };
 use playbot_learner::DeviceKind;
 
-use crate::{error::CliError, player::Chosen};
+use crate::{error::CliError, named::Named, player::Chosen};
 
 /// Bots, policies and runs.
 #[derive(clap::Args, Clone, Debug)]
@@ -23,8 +23,9 @@ pub struct TesterArgs {
     /// else its first bot, if nobody is named.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     bot: Vec<String>,
-    /// Policy file, as written by `playbot policy export`; may be given several times.
-    #[arg(long, value_name = "FILE")]
+    /// Policy file, as written by `playbot policy export`; may be given several times. Results know it by the name of the
+    /// file, or by a name in front of it, as in ppo=runs/bot.policy: under one name --against knows a file again that was moved.
+    #[arg(long, value_name = "[NAME=]FILE")]
     policy: Vec<PathBuf>,
     /// Folder of a run; may be given several times.
     #[arg(long, value_name = "DIR")]
@@ -38,21 +39,28 @@ pub struct TesterArgs {
 }
 
 impl TesterArgs {
-    /// The testers. Policies and runs have the names of their files and folders.
+    /// The testers. Policies and runs have the names of their files and folders, unless a policy is given another name.
     ///
     /// # Errors
     ///
-    /// One of them does not exist, or was made for another game.
+    /// One of them does not exist, or was made for another game, or two have one name.
     pub fn load(&self, game: &dyn Game, device: DeviceKind) -> Result<Vec<Tester>, CliError> {
         let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
         let mut testers = Vec::new();
         for name in &self.bot {
             testers.push(of_bot(Chosen::bot(game, name)?));
         }
-        for path in &self.policy {
+        for given in &self.policy {
+            let named = Named::given(given);
+            let path = named.as_ref().map_or(given.as_path(), |named| named.path.as_path());
             let chosen = Chosen::policy_file(game, path, draw, device)?;
             chosen.check_fit(game)?;
-            testers.push(self.of_policy(chosen, path, file_checksum(path)?));
+            let mut tester = self.of_policy(chosen, path, file_checksum(path)?);
+            if let Some(Named { name, path }) = named {
+                tester.record.file = Some(path.display().to_string());
+                tester.record.name = name;
+            }
+            testers.push(tester);
         }
         for path in &self.run {
             let OpenedRun { run, experiment, info } = RunDir::open(path)?;
@@ -72,12 +80,13 @@ impl TesterArgs {
         if testers.is_empty() {
             testers.push(of_bot(Chosen::usual(game)?));
         }
+        check_names(testers.iter().map(|tester| &tester.record))?;
         Ok(testers)
     }
 
     fn of_policy(&self, chosen: Chosen, path: &Path, checksum: String) -> Tester {
         let name = path.file_name().map_or(chosen.name, |name| name.to_string_lossy().into_owned());
-        let record = TesterRecord { name, checksum: Some(checksum), greedy: self.greedy };
+        let record = TesterRecord { name, checksum: Some(checksum), greedy: self.greedy, file: None };
         Tester { record, player: chosen.player, observation_config: chosen.observation_config }
     }
 }
@@ -85,4 +94,43 @@ impl TesterArgs {
 fn of_bot(chosen: Chosen) -> Tester {
     let Chosen { name, player, observation_config } = chosen;
     Tester { record: TesterRecord::bot(name), player, observation_config }
+}
+
+/// Results could not tell two testers of one name apart.
+fn check_names<'a>(testers: impl Iterator<Item = &'a TesterRecord>) -> Result<(), CliError> {
+    let mut known: Vec<&TesterRecord> = Vec::new();
+    for tester in testers {
+        let name = &tester.name;
+        if let Some(other) = known.iter().find(|other| other.name == *name) {
+            let next = if other.checksum.is_none() && tester.checksum.is_none() {
+                "name each bot once"
+            } else {
+                "write a name of its own in front of a policy's file, as in --policy other=bot.policy; a run has the name of \
+                 its folder"
+            };
+            return Err(CliError::Usage(format!("two testers are called `{name}`: {next}")));
+        }
+        known.push(tester);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_testers_of_one_name_are_told_what_to_write() {
+        let policy = |name: &str| TesterRecord { checksum: Some("0f".to_owned()), ..TesterRecord::bot(name) };
+        let bot = TesterRecord::bot;
+        let said = |testers: &[TesterRecord]| check_names(testers.iter()).map_err(|error| error.to_string());
+        assert_eq!(said(&[bot("random"), policy("bot.policy"), policy("ppo")]), Ok(()));
+        let bots = "two testers are called `random`: name each bot once".to_owned();
+        assert_eq!(said(&[bot("random"), policy("ppo"), bot("random")]), Err(bots));
+        for other in [policy("ppo"), bot("ppo")] {
+            let words = said(&[policy("ppo"), other]).expect_err("one name");
+            assert!(words.contains("two testers are called `ppo`: "), "{words}");
+            assert!(words.contains("--policy other=bot.policy"), "{words}");
+        }
+    }
 }

@@ -46,6 +46,7 @@ use crate::{
   playbot test GAME --levels MODE:0..99 --out runs/test
   playbot test GAME --levels MODE:0..99 --bot BOT,random --episodes 5 --out runs/test
   playbot test GAME --levels MODE:0..99 --policy bot.policy --out runs/test --resume
+  playbot test GAME --levels MODE:0..99 --policy ppo=old/bot.policy --against runs/before --out runs/after
   playbot test GAME --levels MODE:0..99 --against runs/before --out runs/after
   playbot test GAME --levels MODE:0..99 --detect reward-loop --detector stuck.ticks=200 --out runs/test
   playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test

@@ -1,12 +1,12 @@
 //! All detectors that there are.
 
 use super::{
-    blank_picture::BlankPicture, clock_end::ClockEnd, determinism::Determinism, entity_leak::EntityLeak,
-    error_log::ErrorLog, explosion::PhysicsExplosion, far_goal::FarGoal, fell_through::FellThrough,
-    frozen::FrozenWorld, goal_ignored::GoalIgnored, level_detector::LevelDetector, out_of_bounds::OutOfBounds,
-    reward_farm::RewardFarm, reward_loop::RewardLoop, runaway::Runaway, short_time::ShortTime, shortcut::Shortcut,
-    soft_lock::SoftLock, stuck::Stuck, through_wall::ThroughWall, tick_time::TickTime, too_long::TooLong,
-    uneven_time::UnevenTime, unreachable_region::UnreachableRegion,
+    blank_picture::BlankPicture, clock_end::ClockEnd, dead_action::DeadAction, determinism::Determinism,
+    entity_leak::EntityLeak, error_log::ErrorLog, explosion::PhysicsExplosion, far_goal::FarGoal,
+    fell_through::FellThrough, frozen::FrozenWorld, goal_ignored::GoalIgnored, level_detector::LevelDetector,
+    out_of_bounds::OutOfBounds, reward_farm::RewardFarm, reward_loop::RewardLoop, runaway::Runaway,
+    short_time::ShortTime, shortcut::Shortcut, soft_lock::SoftLock, stuck::Stuck, through_wall::ThroughWall,
+    tick_time::TickTime, too_long::TooLong, uneven_time::UnevenTime, unreachable_region::UnreachableRegion,
 };
 use crate::{
     detector::{Detector, Setting},
@@ -65,8 +65,8 @@ impl Known {
     }
 }
 
-/// All detectors for a game, its own included. Its own one takes the place of another with its name.
-pub(super) fn all(game: &dyn Game) -> Vec<Known> {
+/// Those of all games.
+fn general() -> impl Iterator<Item = Known> {
     let ticks: Vec<Box<dyn Detector>> = vec![
         Box::<Stuck>::default(),
         Box::<SoftLock>::default(),
@@ -91,15 +91,27 @@ pub(super) fn all(game: &dyn Game) -> Vec<Known> {
         Box::<UnevenTime>::default(),
         Box::<UnreachableRegion>::default(),
         Box::<Determinism>::default(),
+        Box::<DeadAction>::default(),
         Box::<RewardFarm>::default(),
     ];
+    let known = ticks.into_iter().map(Known::Ticks).chain(levels.into_iter().map(Known::Level));
+    known.chain([Known::Clock(TickTime::default())])
+}
+
+/// All detectors for a game, its own included. Its own one takes the place of another with its name.
+pub(super) fn all(game: &dyn Game) -> Vec<Known> {
     let own = game.detectors();
     let is_own = |name: &str| own.iter().any(|detector| detector.name() == name);
-    let known = ticks.into_iter().map(Known::Ticks).chain(levels.into_iter().map(Known::Level));
-    let known = known.chain([Known::Clock(TickTime::default())]);
-    let mut known: Vec<Known> = known.filter(|known| !is_own(known.name())).collect();
+    let mut known: Vec<Known> = general().filter(|known| !is_own(known.name())).collect();
     known.extend(own.into_iter().map(Known::Ticks));
     known
+}
+
+/// Names of the detectors that only this game has.
+pub(crate) fn own_detectors(game: &dyn Game) -> Vec<String> {
+    let is_general = |name: &str| general().any(|known| known.name() == name);
+    let names = game.detectors().into_iter().map(|detector| detector.name());
+    names.filter(|name| !is_general(name)).map(str::to_owned).collect()
 }
 
 /// What is said of a detector.

@@ -54,16 +54,22 @@ fn is_loading(probe: &Probe) -> bool {
     probe.world.get::<Episode>(probe.agent).is_some_and(Episode::is_loading)
 }
 
-/// All that is known of the state.
+/// All that is known of the state, and what was done.
 fn hash(world: &World, agent: Entity) -> u64 {
-    let state = world.get::<StateHash>(agent).map_or(0, |hash| hash.0);
-    let reward = world.get::<Reward>(agent).map_or(0.0, Reward::get);
-    let seen = world.get::<Observation>(agent).map_or(&[][..], |observation| observation.vector.as_slice());
     let action = world.get::<Action>(agent);
     let done = action.and_then(Action::continuous).unwrap_or(&[]);
     let choice = action.and_then(Action::discrete).unwrap_or(0);
-    let numbers = seen.iter().chain(done).chain([&reward]).map(|number| u64::from(number.to_bits()));
-    StateHash::of([state, u64::from(choice)].into_iter().chain(numbers)).0
+    let done = done.iter().map(|number| u64::from(number.to_bits()));
+    StateHash::of([hash_of_state(world, agent), u64::from(choice)].into_iter().chain(done)).0
+}
+
+/// All that is known of the state.
+pub(super) fn hash_of_state(world: &World, agent: Entity) -> u64 {
+    let state = world.get::<StateHash>(agent).map_or(0, |hash| hash.0);
+    let reward = world.get::<Reward>(agent).map_or(0.0, Reward::get);
+    let seen = world.get::<Observation>(agent).map_or(&[][..], |observation| observation.vector.as_slice());
+    let numbers = seen.iter().chain([&reward]).map(|number| u64::from(number.to_bits()));
+    StateHash::of([state].into_iter().chain(numbers)).0
 }
 
 impl LevelDetector for Determinism {

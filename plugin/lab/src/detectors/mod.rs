@@ -7,6 +7,7 @@
 mod blank_picture;
 mod catalogue;
 mod clock_end;
+mod dead_action;
 mod determinism;
 mod ear;
 mod efforts;
@@ -39,6 +40,7 @@ mod too_long;
 mod uneven_time;
 mod unreachable_region;
 
+pub(crate) use catalogue::own_detectors;
 pub use catalogue::{ALWAYS, DetectorInfo, list};
 pub(crate) use ear::Ear;
 pub use far_goal::FarGoal;

@@ -35,6 +35,31 @@ impl Probe {
         observation_config: &ObservationConfig,
         seeds: Vec<u64>,
     ) -> Result<Self, VisionError> {
+        let mut probe = Self::empty(game, mode, level, observation_config, seeds)?;
+        let control = player.seat(game, &mut probe.world, probe.agent);
+        probe.world.entity_mut(probe.agent).insert(control);
+        player.install(&mut probe.world);
+        Ok(probe)
+    }
+
+    /// A World for one episode, in which the caller writes what the agent does before each tick.
+    ///
+    /// # Errors
+    ///
+    /// Its World cannot be made.
+    pub fn led(game: &dyn Game, mode: &str, level: u64, seed: u64) -> Result<Self, VisionError> {
+        let mut probe = Self::empty(game, mode, level, &ObservationConfig::default(), vec![seed])?;
+        probe.world.entity_mut(probe.agent).insert(Control::Bot);
+        Ok(probe)
+    }
+
+    fn empty(
+        game: &dyn Game,
+        mode: &str,
+        level: u64,
+        observation_config: &ObservationConfig,
+        seeds: Vec<u64>,
+    ) -> Result<Self, VisionError> {
         let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
         if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
             // The detector's findings say how to see it again.
@@ -43,9 +68,6 @@ impl Probe {
         let agent = agents.into_iter().next().expect("one agent was asked for");
         let queue = LevelQueue::list(vec![level; seeds.len()]);
         world.entity_mut(agent).insert((queue, EpisodeSeeds::new(seeds)));
-        let control = player.seat(game, &mut world, agent);
-        world.entity_mut(agent).insert(control);
-        player.install(&mut world);
         Ok(Self { world, agent })
     }
 

@@ -7,23 +7,37 @@ use crate::{
     explore::CellGrid,
 };
 
-/// The same reward is paid again and again on the same tile, and the aim is not reached. A game that pays for each tick does
-/// so everywhere, so it is not usual.
+/// An agent comes back to the same spot, or stays there, and has earned something, again and again. A reward for getting
+/// nearer to something pays nothing on the way back to where one was; a game that pays for each tick does so everywhere, so it
+/// is not usual.
 pub struct RewardLoop {
     times: f64,
+    spot: f64,
 }
 
 impl Default for RewardLoop {
     fn default() -> Self {
-        Self { times: 10.0 }
+        Self { times: 10.0, spot: 0.02 }
     }
 }
 
-struct Paid {
+/// Least sum of rewards that is more than rounding.
+const SOMETHING: f32 = 1e-4;
+
+/// What an agent has earned between its visits to a spot.
+#[derive(Default)]
+struct Visits {
+    /// The sum of all rewards at the last visit.
+    last: f32,
+    /// How often it had become more.
+    paid: u32,
+}
+
+struct Earning {
     times: u32,
     grid: CellGrid,
-    /// By tile and bits of the reward.
-    payments: BTreeMap<(i32, i32, u32), u32>,
+    sum: f32,
+    spots: BTreeMap<(i32, i32), Visits>,
 }
 
 impl Detector for RewardLoop {
@@ -32,7 +46,7 @@ impl Detector for RewardLoop {
     }
 
     fn describe(&self) -> &'static str {
-        "the same reward is paid again and again on the same tile"
+        "whoever comes back to the same spot, or stays there, is paid again and again"
     }
 
     fn is_usual(&self) -> bool {
@@ -40,26 +54,38 @@ impl Detector for RewardLoop {
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("times", &mut self.times, "payments on one tile that are too many").at_least(2.0)]
+        vec![
+            Setting::new("times", &mut self.times, "payments for one spot that are too many").at_least(2.0),
+            Setting::new("spot", &mut self.spot, "side of a spot, in tiles").at_least(0.001),
+        ]
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
-        let grid = CellGrid::new(level.plan.as_ref(), None);
-        Some(Box::new(Paid { times: self.times as u32, grid, payments: BTreeMap::new() }))
+        let tile = CellGrid::new(level.plan.as_ref(), None).size;
+        let grid = CellGrid::new(level.plan.as_ref(), Some(self.spot as f32 * tile));
+        Some(Box::new(Earning { times: self.times as u32, grid, sum: 0.0, spots: BTreeMap::new() }))
     }
 }
 
-impl Watch for Paid {
+impl Watch for Earning {
     fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
-        if moment.is_success || moment.reward <= 0.0 {
+        if moment.is_success {
             return None;
         }
-        let cell = self.grid.cell_at(moment.place?)?;
+        self.sum += moment.reward;
+        let place = moment.place?;
+        let cell = self.grid.cell_at(place)?;
         let &[column, row] = cell.0.as_slice() else { return None };
-        let payments = self.payments.entry((column, row, moment.reward.to_bits())).or_default();
-        *payments += 1;
-        (*payments >= self.times)
-            .then(|| format!("a reward of {} was paid {payments} times on tile {cell}", moment.reward))
+        let is_first = !self.spots.contains_key(&(column, row));
+        let visits = self.spots.entry((column, row)).or_default();
+        let earned = self.sum - std::mem::replace(&mut visits.last, self.sum);
+        visits.paid += u32::from(!is_first && earned > SOMETHING);
+        (visits.paid >= self.times).then(|| {
+            format!(
+                "the agent was paid {} times for coming back to {:.1}, {:.1} or staying there, {earned} the last time",
+                visits.paid, place.x, place.y
+            )
+        })
     }
 }
 
@@ -77,8 +103,8 @@ mod tests {
         let paid = |tick: usize| if tick.is_multiple_of(5) { 1.0 } else { 0.0 };
         let farm = steps(100, |tick| Step { reward: paid(tick), ..Step::at(tick, 4.5, 4.5) });
         let (tick, message) = found(&RewardLoop::default(), &room(), &farm).expect("it comes back");
-        assert_eq!(tick, 45, "the tenth payment");
-        assert!(message.contains("10 times on tile 4,4"), "{message}");
+        assert_eq!(tick, 50, "the first payment is none for coming back");
+        assert!(message.contains("10 times for coming back to 4.5, 4.5"), "{message}");
     }
 
     #[test]
@@ -87,5 +113,15 @@ mod tests {
         assert_eq!(found(&RewardLoop::default(), &room(), &coins), None);
         let goal = steps(40, |tick| Step { reward: 1.0, is_success: true, ..Step::at(tick, 8.5, 8.5) });
         assert_eq!(found(&RewardLoop::default(), &room(), &goal), None);
+    }
+
+    #[test]
+    fn who_goes_to_and_fro_earns_nothing_where_the_way_back_costs_what_the_way_there_pays() {
+        let along = |tick: usize| [2.0, 3.0, 4.0, 3.0][tick % 4];
+        let paid = |tick: usize| if tick == 0 { 0.0 } else { along(tick) - along(tick - 1) };
+        let fro = steps(200, |tick| Step { reward: paid(tick), ..Step::at(tick, along(tick), 4.5) });
+        assert_eq!(found(&RewardLoop::default(), &room(), &fro), None);
+        let free = steps(200, |tick| Step { reward: paid(tick).max(0.0), ..Step::at(tick, along(tick), 4.5) });
+        assert!(found(&RewardLoop::default(), &room(), &free).is_some(), "the way back is free");
     }
 }

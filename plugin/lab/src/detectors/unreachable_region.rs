@@ -29,6 +29,8 @@ impl Default for UnreachableRegion {
 impl UnreachableRegion {
     /// What an explorer does not get to, in words.
     fn missed(&self, game: &dyn Game, mode: &str, level: u64) -> Option<String> {
+        // Without a plan nobody knows what is open.
+        game.floor_plan(mode, level)?;
         let plan =
             ExplorePlan { steps: self.steps as u64, arenas: 8, worlds: 1, threads: 1, ..ExplorePlan::new(mode, level) };
         // A game that breaks or does not replay is found by others.

@@ -16,7 +16,9 @@ use crate::{eval::Player, game::Game, idle::idle_action};
 /// Lengths of a finding, in actions that do something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lengths {
-    /// As it was found.
+    /// The whole episode.
+    pub played: u32,
+    /// Up to the finding.
     pub original: u32,
     /// With nothing in it that could be left out.
     pub minimised: u32,
@@ -38,8 +40,8 @@ pub(crate) fn lengths(
     }
     let found = StoredFinding::of_actions(game, mode, level, head, actions, checks)?;
     let shorter = minimise(game, &found, checks, budget, &|_| {}, stop).ok()?;
-    let [_, minimised] = shorter.efforts;
-    Some(Lengths { original: efforts(&found.actions(), &idle_action(game)), minimised })
+    let [original, minimised] = shorter.efforts;
+    Some(Lengths { played: efforts(actions, &idle_action(game)), original, minimised })
 }
 
 /// What a player does in the episode with this seed; `None` if what it sees cannot be drawn.

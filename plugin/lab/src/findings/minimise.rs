@@ -38,10 +38,10 @@ pub struct Minimised {
     pub is_minimal: bool,
 }
 
-/// Leaves out actions as long as the finding is still there, at whatever tick: first with ddmin, then by idling in place of
-/// what cannot be left out without changing all that follows, then with ddmin again. Where nobody has to do anything, or
-/// time has to be up, nothing can be left out: this takes few replays. The same finding and budget give the same result. `stop`
-/// ends it with the best so far.
+/// Leaves out actions as long as the finding is still there, at whatever tick: first by idling in place of large parts, since
+/// many findings need little or nothing to be done; then with ddmin; then by idling in place of whatever cannot be left out
+/// without changing all that follows, and with ddmin again. Where time has to be up, nothing can be left out, only idled. The
+/// same finding and budget give the same result. `stop` ends it with the best so far.
 ///
 /// # Errors
 ///
@@ -79,6 +79,9 @@ pub fn minimise(
     Ok(Minimised { finding: shorter, efforts, replays: trial.replays.get(), is_minimal: !has_enough() })
 }
 
+/// Parts into which the actions are cut at most before ddmin begins: 31 replays.
+const LARGE_PARTS: usize = 16;
+
 /// Tries out actions, and counts.
 struct Trial<'a> {
     setting: Setting<'a>,
@@ -108,31 +111,27 @@ impl Trial<'_> {
         if is_idle(&actions) {
             return actions;
         }
-        if self.head.detector == NOT_SOLVED {
+        let parts = if self.head.detector == NOT_SOLVED { usize::MAX } else { LARGE_PARTS };
+        self.idle_instead(&mut actions, parts, has_enough);
+        if self.head.detector == NOT_SOLVED || is_idle(&actions) {
             // No shorter way lasts until time is up.
-            if !has_enough() {
-                let mut idle = vec![nothing.clone(); actions.len()];
-                if let Some(needed) = self.needed(&idle) {
-                    idle.truncate(needed);
-                    return idle;
-                }
-            }
-            self.idle_instead(&mut actions, has_enough);
             return actions;
         }
         actions = ddmin(actions, has_enough, |shorter| self.needed(shorter));
-        if !is_idle(&actions) && self.idle_instead(&mut actions, has_enough) && !is_idle(&actions) {
+        if !is_idle(&actions) && self.idle_instead(&mut actions, usize::MAX, has_enough) && !is_idle(&actions) {
             actions = ddmin(actions, has_enough, |shorter| self.needed(shorter));
         }
         actions
     }
 
-    /// Replaces actions by idling where the finding is still there, larger parts first; whether any was.
-    fn idle_instead(&self, actions: &mut Vec<ActionValue>, has_enough: &dyn Fn() -> bool) -> bool {
+    /// Replaces actions by idling where the finding is still there: all, then halves, quarters and so on, down to so many
+    /// parts at most or to single actions. Whether any was.
+    fn idle_instead(&self, actions: &mut Vec<ActionValue>, parts: usize, has_enough: &dyn Fn() -> bool) -> bool {
         let nothing = idle_action(self.setting.game);
+        let least = (actions.len() / parts).max(1);
         let mut has_changed = false;
-        let mut size = actions.len().div_ceil(2);
-        while size > 0 {
+        let mut size = actions.len();
+        while size >= least {
             let mut start = 0;
             while start < actions.len() {
                 let end = actions.len().min(start + size);
@@ -180,6 +179,13 @@ mod tests {
         let found = shorter(&stored(LOST, &actions));
         assert_eq!(found.finding.episode.len(), 3);
         assert_eq!(found.finding.head.message, "the game ended the episode after 3 ticks");
+    }
+
+    #[test]
+    fn what_needs_nobody_is_found_to_do_so_in_one_replay_more() {
+        let actions = [[1, 0].repeat(4), vec![0; 3]].concat();
+        let found = shorter(&stored(LOST, &actions));
+        assert_eq!((found.efforts, found.replays), ([4, 0], 2));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::{
     input::Input,
     restart_kind::Restart,
 };
-use crate::{defect::DefectKind, detector::Detector};
+use crate::{defect::DefectKind, detector::Detector, floor_plan::FloorPlan};
 use bevy_playbot::{
     action::ActionSpace,
     episode::EpisodeEnd,
@@ -43,6 +43,8 @@ impl ForeignGame {
             observe: None,
             paths: Vec::new(),
             has_camera: false,
+            place: None,
+            plan: None,
             rewards: Vec::new(),
             end: None,
             limit: None,
@@ -198,6 +200,19 @@ impl ForeignGame {
     /// what agents see is refused.
     pub fn camera(self) -> Self {
         self.with(|description| description.has_camera = true)
+    }
+
+    /// Where the agent is, seen from above or from the side, in any units: for detectors that ask whether it gets on, for
+    /// explorers, and for pictures. The system may run more than once in a tick, so it must only look; while it is skipped,
+    /// since an entity that it asks for does not exist, nobody knows.
+    pub fn place<M: 'static>(self, system: impl IntoSystem<(), Vec2, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.place = Some(SystemFactory::new(system, |place| place)))
+    }
+
+    /// What a level looks like in the units of [`place`](Self::place), by its number: for pictures of where agents went, and
+    /// for detectors that ask for walls, bounds or the goal.
+    pub fn plan(self, plan: impl Fn(u64) -> FloorPlan + Send + Sync + 'static) -> Self {
+        self.with(|description| description.plan = Some(Arc::new(plan)))
     }
 
     /// Reward of each tick, on top of other rewards.

@@ -6,9 +6,9 @@ use bevy::{app::PluginGroupBuilder, prelude::*};
 
 use super::{
     demonstrator::ForeignBot, factory::SystemFactory, input::Input, install::ForeignPlugin, paths::ObservedPath,
-    restart_kind::Restart, runtime::Sensor,
+    place::ForeignPlace, restart_kind::Restart, runtime::Sensor,
 };
-use crate::{defect::DefectKind, detector::Detector, game::Game};
+use crate::{defect::DefectKind, detector::Detector, floor_plan::FloorPlan, game::Game};
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
@@ -48,6 +48,10 @@ pub(super) struct Description {
     pub(super) observe: Option<SystemFactory<Vec<f32>>>,
     pub(super) paths: Vec<String>,
     pub(super) has_camera: bool,
+    /// Where the agent is on the plan of its level.
+    pub(super) place: Option<SystemFactory<Vec2>>,
+    /// The plan of a level.
+    pub(super) plan: Option<Arc<dyn Fn(u64) -> FloorPlan + Send + Sync>>,
     /// With whether it pays the growth of its value.
     pub(super) rewards: Vec<(SystemFactory<f32>, bool)>,
     pub(super) end: Option<SystemFactory<Option<EpisodeEnd>>>,
@@ -91,6 +95,11 @@ impl ForeignGame {
     /// The number of levels, if the game has said it.
     pub fn level_count(&self) -> Option<u64> {
         self.description.levels
+    }
+
+    /// The level that is played when this one is asked for.
+    pub(super) fn level_of(&self, level: u64) -> u64 {
+        self.level_count().map_or(level, |levels| level % levels.max(1))
     }
 }
 
@@ -200,6 +209,14 @@ impl Game for ForeignGame {
         }
         self.description.agent.iter().for_each(|equip| equip(&mut agent));
         agent.id()
+    }
+
+    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
+        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
+    }
+
+    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<ForeignPlace>(agent).map(|place| place.0)
     }
 
     fn detectors(&self) -> Vec<Box<dyn Detector>> {

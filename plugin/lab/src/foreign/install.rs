@@ -7,7 +7,7 @@ use super::{
     game::ForeignGame,
     input,
     kept::Baseline,
-    outcome, ready, restart,
+    outcome, place, ready, restart,
     runtime::{Foreign, ForeignCell, LevelSeed},
     sense,
 };
@@ -54,7 +54,10 @@ impl Plugin for ForeignPlugin {
                     .ambiguous_with(PlaybotSystems::Act),
             ),
         )
-        .add_systems(judge, outcome::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
+        .add_systems(
+            judge,
+            (place::locate, outcome::read_outcome).chain().before(PlaybotSystems::Judge).run_if(is_tick),
+        );
         sense::build(app);
     }
 

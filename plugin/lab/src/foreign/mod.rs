@@ -53,6 +53,7 @@ mod install;
 mod kept;
 mod outcome;
 mod paths;
+mod place;
 mod ready;
 mod restart;
 mod restart_kind;

@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 
 use super::{
+    place::ForeignPlace,
     restart_kind::{OwnRestartKind, Restart},
     runtime::{Foreign, ForeignCell, LevelSeed, with_foreign},
 };
@@ -21,6 +22,8 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 }
 
 fn begin(world: &mut World, agent: Entity, level: u64) {
+    // Where the last episode ended says nothing of this one.
+    world.entity_mut(agent).remove::<ForeignPlace>();
     with_foreign(world, agent, |world, foreign| {
         world.insert_resource(LevelSeed(foreign.level_of(level)));
         restart(world, foreign)?;

@@ -59,6 +59,7 @@ impl ForeignCell {
 pub(super) struct Foreign {
     pub(super) game: ForeignGame,
     pub(super) sensor: Sensor,
+    pub(super) place: Option<OwnedSystem<Vec2>>,
     pub(super) rewards: Vec<RewardPart>,
     pub(super) end: Option<OwnedSystem<Option<EpisodeEnd>>>,
     pub(super) ready: Option<OwnedSystem<bool>>,
@@ -94,6 +95,7 @@ impl Foreign {
         };
         Self {
             sensor: description.sensor(),
+            place: description.place.as_ref().map(|system| system.make()),
             rewards: description.rewards.iter().map(part).collect(),
             end: description.end.as_ref().map(|system| system.make()),
             ready: description.ready.as_ref().map(|system| system.make()),
@@ -112,7 +114,7 @@ impl Foreign {
 
     /// The level that is played when this one is asked for.
     pub(super) fn level_of(&self, level: u64) -> u64 {
-        self.game.level_count().map_or(level, |levels| level % levels.max(1))
+        self.game.level_of(level)
     }
 }
 

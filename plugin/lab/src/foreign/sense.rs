@@ -2,7 +2,10 @@
 
 use bevy::prelude::*;
 
-use super::runtime::{Sensor, playing_agent, with_foreign};
+use super::{
+    place::locate,
+    runtime::{Sensor, playing_agent, with_foreign},
+};
 use bevy_playbot::{
     observation::{Observation, VectorSensor},
     systems::ObserveSchedule,
@@ -10,7 +13,7 @@ use bevy_playbot::{
 };
 
 pub(super) fn build(app: &mut App) {
-    app.add_systems(ObserveSchedule, observe.before(VisionSystems::Sync));
+    app.add_systems(ObserveSchedule, (locate, observe).chain().before(VisionSystems::Sync));
 }
 
 /// Fills the agent's vector, unless it has no sensor for one.

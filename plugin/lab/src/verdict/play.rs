@@ -12,7 +12,9 @@ use crate::game::Game;
 /// Plays episodes and returns what came of them, in their order; `None` if somebody asked to stop.
 ///
 /// Many are played in one World. If it breaks, the episodes that were being played are played again, each alone in a World
-/// of its own, and the one that breaks that too is the broken one; all others are played as if nothing had been.
+/// of its own, and the one that breaks that too is the broken one; all others are played as if nothing had been. If none
+/// does, it takes what other episodes have left in the World to break it, and that is a finding of the episode in which it
+/// broke.
 ///
 /// # Errors
 ///
@@ -31,10 +33,15 @@ pub(super) fn play_tasks(
         match test_world.play_out(game, &mut played, watch) {
             Ok(()) => {}
             Err(Interruption::Stopped) => return Ok(None),
-            Err(Interruption::Broken { .. }) => {
+            Err(Interruption::Broken { detector, message }) => {
+                let mut is_seen = false;
                 for suspect in test_world.suspects() {
                     let Some(alone) = play_alone(game, mode, tester, tasks[suspect], watch)? else { return Ok(None) };
+                    is_seen |= alone.shows(detector);
                     played[suspect] = Some(alone);
+                }
+                if let Some((suspect, finding)) = test_world.left_behind(detector, &message).filter(|_| !is_seen) {
+                    played[suspect].iter_mut().for_each(|played| played.found.push(finding.clone()));
                 }
             }
         }

@@ -28,6 +28,14 @@ pub(super) struct Played {
     pub walk: Option<Walk>,
 }
 
+impl Played {
+    /// Whether this detector found something in it, or the game broke so.
+    pub fn shows(&self, detector: &str) -> bool {
+        let is_broken = matches!(&self.end, PlayedEnd::Broken { detector: how, .. } if *how == detector);
+        is_broken || self.found.iter().any(|finding| finding.detector == detector)
+    }
+}
+
 /// What a detector found in an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EpisodeFinding {

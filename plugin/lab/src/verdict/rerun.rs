@@ -1,6 +1,7 @@
 //! How a level is looked at again.
 
 use super::{level_name::level_argument, level_verdict::LevelVerdict, plan::TestRecord};
+use crate::shell_word::shell_word;
 
 /// Most findings that are shown by their files.
 const MOST_FILES: usize = 3;
@@ -30,16 +31,20 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     let failed = || level.testers.iter().find(|tester| tester.score.solved < tester.score.episodes);
     let Some(name) = found.or_else(|| failed().map(|tester| &tester.tester)) else { return Vec::new() };
     let Some(tester) = record.testers.iter().find(|tester| tester.name == *name) else { return Vec::new() };
-    let who = match tester.checksum {
-        Some(_) => format!("--policy {name}{}", if tester.greedy { " --greedy" } else { "" }),
-        None => format!("--bot {name}"),
+    let greedy = if tester.greedy { " --greedy" } else { "" };
+    let policy = |given: &str| format!("--policy {}{greedy}", shell_word(given));
+    // What a policy draws in a test depends on its name, so that comes along; `view` knows files alone.
+    let (tests, views) = match (&tester.checksum, &tester.file) {
+        (Some(_), Some(file)) => (policy(&format!("{name}={file}")), policy(file)),
+        (Some(_), None) => (policy(name), policy(name)),
+        (None, _) => (format!("--bot {name}"), format!("--bot {name}")),
     };
     let (game, seed, episodes) = (&record.game, record.seed, record.episodes);
     let levels = level_argument(&record.range, &level.level);
     // The same episodes: they depend on seed, tester and level alone.
     let again =
-        format!("{program} test {game} --levels {levels} {who} --episodes {episodes} --seed {seed} --out again");
-    let shown = format!("{program} view {game} --levels {levels} {who} --episode --out again.png");
+        format!("{program} test {game} --levels {levels} {tests} --episodes {episodes} --seed {seed} --out again");
+    let shown = format!("{program} view {game} --levels {levels} {views} --episode --out again.png");
     vec![again, shown]
 }
 
@@ -71,6 +76,11 @@ mod tests {
         let again = "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
         let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again.png";
         assert_eq!(rerun_commands("jump", &record, &level), [again, shown]);
+        let mut named = record.clone();
+        named.testers[1].file = Some("my runs/a.policy".to_owned());
+        let again = again.replace("ppo.policy", "'ppo.policy=my runs/a.policy'");
+        let shown = shown.replace("ppo.policy", "'my runs/a.policy'");
+        assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
         let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
         assert!(rerun_commands("jump", &record, &perfect).is_empty());
         let finding = |name: &str| Finding {

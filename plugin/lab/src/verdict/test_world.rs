@@ -165,6 +165,32 @@ impl TestWorld {
         if begun.is_empty() { self.seats.iter().filter_map(task).collect() } else { begun }
     }
 
+    /// What broke the World, if no episode does it alone: a finding of the suspect whose agent the game names, or else of the
+    /// first one.
+    pub fn left_behind(&self, detector: &'static str, message: &str) -> Option<(usize, EpisodeFinding)> {
+        let suspects = self.suspects();
+        let current = |seat: &Seat| seat.tasks.get(seat.done).map(|(task, _)| *task);
+        let seats = self.seats.iter().filter_map(|seat| Some((seat, current(seat)?)));
+        let mut seats: Vec<(&Seat, usize)> = seats.filter(|(_, task)| suspects.contains(task)).collect();
+        let told = |seat: &Seat| {
+            let (agent, episode) = (self.world.get::<Agent>(seat.agent)?, self.world.get::<Episode>(seat.agent)?);
+            told_tick(message, agent.index, episode.level)
+        };
+        seats.sort_by_key(|(seat, _)| told(seat).is_none());
+        let (seat, task) = *seats.first()?;
+        let played = || self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick.saturating_sub(1));
+        let (tick, words) = told(seat).unwrap_or_else(|| (played(), message));
+        let words = words.strip_prefix(PANICKED).unwrap_or(words);
+        // A World with a single episode breaks of itself.
+        let is_shared = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() > 1;
+        let when = if is_shared {
+            "not when the episode is played alone: other episodes in the same World may have left something behind"
+        } else {
+            "not when the episode is played again: the game does not play the same twice"
+        };
+        Some((task, EpisodeFinding { detector, tick, message: format!("{words} ({when})") }))
+    }
+
     /// Whether nothing was drawn from a player's streams in the episode with this seed.
     pub fn is_untouched(&self, seat: usize, seed: u64) -> bool {
         let streams = self.seats.get(seat).and_then(|seat| self.world.get::<AgentStreams>(seat.agent));

@@ -17,7 +17,7 @@ pub struct Tester {
 }
 
 /// What files say of a tester.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TesterRecord {
     /// Its name, unlike that of all others of the test.
     pub name: String,
@@ -27,7 +27,19 @@ pub struct TesterRecord {
     /// Whether a policy takes its most probable action instead of drawing one.
     #[serde(default, skip_serializing_if = "is_false")]
     pub greedy: bool,
+    /// The policy's file, where the tester has another name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
 }
+
+/// Where a policy's file lies does not make it another one.
+impl PartialEq for TesterRecord {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.name, &self.checksum, self.greedy) == (&other.name, &other.checksum, other.greedy)
+    }
+}
+
+impl Eq for TesterRecord {}
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_false(value: &bool) -> bool {
@@ -37,12 +49,31 @@ fn is_false(value: &bool) -> bool {
 impl TesterRecord {
     /// A bot of the game.
     pub fn bot(name: impl Into<String>) -> Self {
-        Self { name: name.into(), checksum: None, greedy: false }
+        Self { name: name.into(), checksum: None, greedy: false, file: None }
     }
 
     /// As people read it.
     pub fn describe(&self) -> String {
         let checksum = self.checksum.as_ref().map_or_else(String::new, |sum| format!(" (file {sum})"));
         format!("{}{checksum}{}", self.name, if self.greedy { ", greedy" } else { "" })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_policy_is_known_by_name_and_checksum_and_not_by_its_place() {
+        let here = TesterRecord { checksum: Some("0f".to_owned()), ..TesterRecord::bot("ppo") };
+        let there = TesterRecord { file: Some("runs/new.policy".to_owned()), ..here.clone() };
+        assert_eq!(here, there);
+        assert_ne!(here, TesterRecord { checksum: Some("1f".to_owned()), ..there.clone() });
+        assert_ne!(here, TesterRecord { greedy: true, ..there.clone() });
+        assert_ne!(here, TesterRecord { name: "bot".to_owned(), ..there.clone() });
+        assert_eq!(there.describe(), "ppo (file 0f)");
+        let text = serde_json::to_string(&there).expect("JSON");
+        assert_eq!(text, r#"{"name":"ppo","checksum":"0f","file":"runs/new.policy"}"#);
+        assert_eq!(serde_json::to_string(&here).expect("JSON"), r#"{"name":"ppo","checksum":"0f"}"#);
     }
 }

@@ -52,7 +52,8 @@ fn finding(finding: &Finding) -> String {
 
 fn testers(testers: &[TesterVerdict]) -> String {
     let mut out = String::from(
-        "<table class=\"testers\"><thead><tr><th scope=\"col\">tester</th><th scope=\"col\">solved</th>\
+        "<div class=\"table\" role=\"group\" aria-label=\"Testers\" tabindex=\"0\"><table class=\"testers\">\
+         <thead><tr><th scope=\"col\">tester</th><th scope=\"col\">solved</th>\
          <th scope=\"col\">95 % interval</th><th scope=\"col\">ticks (quartiles)</th><th scope=\"col\">lost</th>\
          <th scope=\"col\">timed out</th><th scope=\"col\">broken</th></tr></thead><tbody>\n",
     );
@@ -81,5 +82,5 @@ fn testers(testers: &[TesterVerdict]) -> String {
     if more > 0 {
         let _ = writeln!(out, "<tr><td colspan=\"7\">and {more} more in results.json</td></tr>");
     }
-    out + "</tbody></table>\n"
+    out + "</tbody></table></div>\n"
 }

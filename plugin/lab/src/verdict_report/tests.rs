@@ -155,6 +155,29 @@ fn a_level_has_its_numbers_in_cells_that_can_be_sorted() {
 }
 
 #[test]
+fn wide_tables_scroll_within_themselves_and_keep_their_first_column() {
+    let html = page(&[long(0), level(1, 3, 9, 5)], &PLAIN);
+    let frames: Vec<&str> = html
+        .match_indices("<table")
+        .map(|(start, _)| {
+            let before = &html[..start];
+            &before[before.rfind('<').expect("it is in something")..]
+        })
+        .collect();
+    let own = "<div class=\"table\" role=\"group\" aria-label=\"Testers\" tabindex=\"0\">";
+    let [all, levels] =
+        ["table\" role=\"region\" aria-label=\"Testers", "levels\" role=\"region\" aria-labelledby=\"levels-heading"]
+            .map(|words| format!("<div class=\"{words}\" tabindex=\"0\">"));
+    assert_eq!(frames, [all.as_str(), levels.as_str(), own, own], "all testers, levels, and the testers of each level");
+    assert_eq!(html.matches("<div").count(), html.matches("</div>").count());
+    for rule in
+        [".table { overflow-x: auto;", ".levels { overflow-x: auto;", "th:first-child { position: sticky; left: 0;"]
+    {
+        assert!(html.contains(rule), "{rule}");
+    }
+}
+
+#[test]
 fn maps_are_switched_and_explained_in_words() {
     let html = page(&[long(0), level(1, 9, 9, 5)], &PLAIN);
     for words in [

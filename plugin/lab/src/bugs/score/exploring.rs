@@ -216,6 +216,7 @@ fn result(
         ends: vec![solution.map_or_else(|| "not found".to_owned(), |ticks| format!("won {ticks}"))],
         findings: sightings.findings,
         unsolvable,
+        played: shortened.map(|lengths| lengths.played),
         original: shortened.map(|lengths| lengths.original),
         minimised: shortened.map(|lengths| lengths.minimised),
         seconds,

@@ -27,7 +27,10 @@ pub struct JobResult {
     /// Why nobody can solve the level, if that was proved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unsolvable: Option<String>,
-    /// Ticks of the first finding that can be played again, as it was found.
+    /// Actions that do something in the whole episode of the first finding that can be played again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub played: Option<u32>,
+    /// Those of them up to the tick of the finding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub original: Option<u32>,
     /// The same after all that it does not need was left out.

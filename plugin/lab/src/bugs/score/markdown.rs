@@ -32,8 +32,9 @@ impl ScoreTable {
         vec![
             format!("Games and versions: {}. Sets: {}.", markdown_cell(&self.games.join(", ")), sets.join(", ")),
             format!(
-                "Each tester has the same budget on each mutant and sound level: {episodes} episodes for whoever plays, \
-                 {steps} steps and {routes} ways played again for whoever explores; seed {seed}."
+                "Each tester has the same budget on each mutant and sound level: {} for whoever plays, {steps} \
+                 steps and {routes} ways played again for whoever explores; seed {seed}.",
+                if episodes == 1 { "1 episode".to_owned() } else { format!("{episodes} episodes") }
             ),
             "A mutant is found if a detector finds something or the game breaks, if it is proved that nobody can solve it, \
              or if a tester fails that solves at least 99 % of the sound levels of the game. On a sound level the same is a \
@@ -45,6 +46,12 @@ impl ScoreTable {
                 .to_owned(),
             "Precision is the share of mutants in all that is found in mutants and on sound levels. Intervals are 95 % \
              Wilson intervals."
+                .to_owned(),
+            "Some games bring detectors that know their rules; the column without them has what is found by the detectors of \
+             all games, by a proof, or by failing."
+                .to_owned(),
+            "Findings are made shorter as long as they are there. Counted are actions that do something: of the way there, \
+             up to the tick of the finding, and of the whole episode in which it was found."
                 .to_owned(),
             format!("Testers with learned skills: {skilled}."),
             format!(

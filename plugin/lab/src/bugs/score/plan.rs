@@ -10,7 +10,11 @@ use super::{
     error::ScoreError,
     record::{GameRecord, SCORE_FORMAT, ScoreBudget, ScoreRecord, SetRecord},
 };
-use crate::{bugs::BugSet, detectors::Detectors, game::Game};
+use crate::{
+    bugs::BugSet,
+    detectors::{Detectors, own_detectors},
+    game::Game,
+};
 
 /// How testers are scored.
 #[derive(Clone)]
@@ -74,6 +78,7 @@ impl ScorePlan<'_> {
             version: tested.game.version(),
             testers: tested.contestants.iter().map(|contestant| contestant.record.clone()).collect(),
             detectors: tested.detectors.record().to_vec(),
+            own_detectors: own_detectors(tested.game),
         };
         ScoreRecord {
             format: SCORE_FORMAT,

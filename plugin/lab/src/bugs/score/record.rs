@@ -42,6 +42,9 @@ pub struct GameRecord {
     pub testers: Vec<ContestantRecord>,
     /// What looks for defects, each detector with its settings.
     pub detectors: Vec<String>,
+    /// Names of those that the game brings itself and no other game has.
+    #[serde(default)]
+    pub own_detectors: Vec<String>,
 }
 
 /// How much each tester may do on each subject.

@@ -42,12 +42,24 @@ pub(super) struct Rows<'a> {
     pub played_sound: Vec<BTreeMap<usize, &'a ScoredJob>>,
     /// For each tester, what it found with nothing to compare it with.
     pub catches: Vec<Catch>,
+    /// Names of the detectors that games bring themselves, by the game.
+    own_detectors: BTreeMap<&'a str, &'a [String]>,
 }
 
 impl Rows<'_> {
     /// Whether a tester found a mutant by any means.
     pub fn beside(&self, tester: usize, mutant: usize) -> bool {
         self.played[tester].get(&mutant).is_some_and(|job| job.found.at_all())
+    }
+
+    /// Whether a tester found a mutant with nothing to compare it with, and without the detectors that its game brings itself.
+    pub fn without_own(&self, tester: usize, mutant: usize) -> bool {
+        let own = self.own_detectors.get(self.mutants[mutant].game.as_str()).copied().unwrap_or_default();
+        self.played[tester].get(&mutant).is_some_and(|job| {
+            let findings = &job.result.findings;
+            let is_of_own = !findings.is_empty() && findings.iter().all(|finding| own.contains(&finding.detector));
+            job.found.unsolvable || job.found.failed || job.found.detected && !is_of_own
+        })
     }
 }
 
@@ -56,6 +68,7 @@ pub(super) fn rows(scores: &[(PathBuf, Score)]) -> Rows<'_> {
     let mut rows = Rows::default();
     for (_, score) in scores {
         add_testers(&mut rows, score);
+        rows.own_detectors.extend(score.record.games.iter().map(|game| (game.name.as_str(), &*game.own_detectors)));
         let (mut mutants, mut sound) = (BTreeMap::new(), BTreeMap::new());
         for Subject { id, game, kind } in &score.subjects {
             let game = game.clone();
@@ -86,7 +99,7 @@ pub(super) fn rows(scores: &[(PathBuf, Score)]) -> Rows<'_> {
     rows
 }
 
-fn add_testers(rows: &mut Rows, score: &Score) {
+fn add_testers(rows: &mut Rows<'_>, score: &Score) {
     for game in &score.record.games {
         for record in &game.testers {
             let known = rows.testers.iter().position(|tester| tester.name == record.name);

@@ -50,7 +50,10 @@ impl ScoreTable {
                 "careful mix: the same, with something found on at most {} % of the sound levels and none called unsolvable",
                 100.0 * FEW_FALSE
             ),
+            "without games' own detectors: found by what all games have, by a proof, or by failing".to_owned(),
             "beside a sound build: found as before, or by a difference from the sound level or game, with the best mix"
+                .to_owned(),
+            "of the way there, of the episode: what is left of the actions up to the finding, and of all of its episode"
                 .to_owned(),
             "skills alone: found by testers with learned skills and by no other".to_owned(),
         ]
@@ -75,6 +78,7 @@ impl ScoreTable {
         let columns = [
             "tester",
             "recall",
+            "without games' own detectors",
             "beside a sound build",
             "precision",
             "false findings",
@@ -82,13 +86,17 @@ impl ScoreTable {
             "defects per hour",
             "seconds to the first",
             "minimised actions",
-            "of the original",
+            "of the way there",
+            "of the episode",
         ];
         let number = |number: Option<f64>| number.map_or_else(|| "–".to_owned(), short_number);
+        let percent =
+            |share: Option<f64>| share.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share));
         let row = |name: String, row: &TesterRow| {
             vec![
                 name,
                 row.recall.describe(),
+                row.without_own.short(),
                 row.beside.short(),
                 row.precision.describe(),
                 row.false_findings.describe(),
@@ -96,7 +104,8 @@ impl ScoreTable {
                 number(row.found_per_hour),
                 number(row.first_seconds),
                 number(row.minimised),
-                row.minimised_share.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
+                percent(row.minimised_share),
+                percent(row.episode_share),
             ]
         };
         let testers = self.testers.iter().map(|tester| row(tester.testers.join(" + "), tester));

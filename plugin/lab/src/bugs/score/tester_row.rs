@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use super::{mix::Catch, numbers::Share, rows::Rows};
+use super::{found::ScoredJob, mix::Catch, numbers::Share, rows::Rows};
 use crate::report::statistics::median;
 
 /// What a tester finds, and what it costs; or several testers together.
@@ -20,6 +20,8 @@ pub struct TesterRow {
     pub recall: Share,
     /// The same beside a sound build.
     pub beside: Share,
+    /// Recall without the detectors that games bring themselves.
+    pub without_own: Share,
     /// Of all that they find in mutants and sound levels: how much is no false finding.
     pub precision: Share,
     /// Sound levels on which something is found.
@@ -34,8 +36,10 @@ pub struct TesterRow {
     pub first_seconds: Option<f64>,
     /// Median length of the minimised replays, in actions that do something.
     pub minimised: Option<f64>,
-    /// Median of their share of the original length.
+    /// Median of their share of the actions up to the finding.
     pub minimised_share: Option<f64>,
+    /// Median of their share of the actions of the whole episode.
+    pub episode_share: Option<f64>,
     /// How many there are.
     pub replays: u64,
 }
@@ -60,11 +64,14 @@ pub(super) fn tester_row(rows: &Rows, testers: &[usize]) -> TesterRow {
     let seconds: f64 = mutants.iter().flat_map(|&mutant| jobs(mutant)).map(|job| job.result.seconds).sum();
     let first = |&mutant: &usize| jobs(mutant).filter_map(|job| job.first).min_by(f64::total_cmp);
     let shortest = |&mutant: &usize| {
-        let lengths = jobs(mutant).filter_map(|job| Some((job.result.minimised?, job.result.original?)));
-        lengths.min().map(|(minimised, original)| (f64::from(minimised), f64::from(original)))
+        let lengths = |job: &&ScoredJob| Some([job.result.minimised?, job.result.original?, job.result.played?]);
+        jobs(mutant).filter_map(lengths).min().map(|lengths| lengths.map(f64::from))
     };
-    let replays: Vec<(f64, f64)> = found.iter().filter_map(shortest).collect();
-    let shares = replays.iter().filter(|(_, original)| *original > 0.0).map(|(short, long)| short / long);
+    let replays: Vec<[f64; 3]> = found.iter().filter_map(shortest).collect();
+    let share_of = |whole: usize| {
+        let shares = replays.iter().filter(|lengths| lengths[whole] > 0.0).map(|lengths| lengths[0] / lengths[whole]);
+        median(shares.collect())
+    };
     let own = || testers.iter().map(move |&tester| &rows.testers[tester]);
     let games: BTreeSet<&String> = own().flat_map(|tester| &tester.games).collect();
     let count = found.len() as u64;
@@ -74,14 +81,18 @@ pub(super) fn tester_row(rows: &Rows, testers: &[usize]) -> TesterRow {
         skilled: !testers.is_empty() && own().all(|tester| tester.skilled),
         recall: Share::new(count, mutants.len() as u64),
         beside: Share::of(mutants.iter().map(|&mutant| testers.iter().any(|&tester| rows.beside(tester, mutant)))),
+        without_own: Share::of(
+            mutants.iter().map(|&mutant| testers.iter().any(|&tester| rows.without_own(tester, mutant))),
+        ),
         precision: Share::new(count, count + wrong.count),
         false_findings: wrong,
         called_unsolvable: sound.iter().filter(|&&level| catch.unsolvable[level]).count() as u64,
         seconds,
         found_per_hour: (seconds > 0.0).then(|| count as f64 * HOUR / seconds),
         first_seconds: median(found.iter().filter_map(first).collect()),
-        minimised: median(replays.iter().map(|(short, _)| *short).collect()),
-        minimised_share: median(shares.collect()),
+        minimised: median(replays.iter().map(|lengths| lengths[0]).collect()),
+        minimised_share: share_of(1),
+        episode_share: share_of(2),
         replays: replays.len() as u64,
     }
 }

@@ -179,7 +179,8 @@ pub(super) fn job(subject: &str, tester: &str, detected: bool) -> ScoredJob {
 pub(super) fn record(game: &str, testers: &[&str]) -> ScoreRecord {
     let tester = |name: &&str| ContestantRecord { skilled: name.starts_with("skill"), ..ContestantRecord::bot(*name) };
     let testers = testers.iter().map(tester).collect();
-    let game = GameRecord { name: game.to_owned(), version: 1, testers, detectors: vec!["stuck ticks=9".to_owned()] };
+    let (detectors, own_detectors) = (vec!["stuck ticks=9".to_owned()], vec!["weeds".to_owned()]);
+    let game = GameRecord { name: game.to_owned(), version: 1, testers, detectors, own_detectors };
     ScoreRecord {
         format: SCORE_FORMAT,
         set: SetRecord { seed: 7, hash: "0f".to_owned() },

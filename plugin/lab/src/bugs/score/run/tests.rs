@@ -109,3 +109,24 @@ fn a_score_is_the_same_on_any_number_of_threads_and_after_a_stop() {
     resumed.write(&file).expect("writable");
     assert_eq!(Score::read(&file).expect("readable"), resumed);
 }
+
+/// A game that panics in the second episode of a World, after ten ticks.
+const LATER: &str = r#"{"format":1,"seed":7,"games":[{"name":"corridor","version":1}],"mutants":[
+{"id":"corridor-panic-01","game":"corridor","class":"panic","about":"it panics","base":"plain:0","variant":2}],
+"sound":[{"game":"corridor","range":"plain:0..0"}]}"#;
+
+#[test]
+fn what_only_breaks_after_other_episodes_is_found_by_whoever_plays_several() {
+    let (folder, game) = (tempfile::tempdir().expect("a folder"), Corridor::default());
+    fs::write(folder.path().join("mutants.json"), LATER).expect("writable");
+    let set = BugSet::read(folder.path()).expect("a set");
+    let plan = plan(&set, folder.path(), &game, 1);
+    let (score, _) = scored(&plan, &folder.path().join("score.json"), Earlier::Keep, u64::MAX);
+    // Who holds the last action stays for the whole time.
+    let is_hold = |job: &&ScoredJob| job.result.tester == "hold" && job.result.subject == "corridor-panic-01";
+    let score = score.expect("nobody stopped it");
+    let JobResult { findings, ends, .. } = &score.jobs.iter().find(is_hold).expect("it was done").result;
+    assert_eq!(findings[0].detector, "panic");
+    assert!(findings[0].message.contains("other episodes in the same World may have left something"), "{findings:?}");
+    assert_eq!(ends.as_slice(), ["time up 30"; 3], "each episode is sound when it is played alone");
+}

@@ -1,6 +1,6 @@
 use super::*;
 use crate::bugs::score::{
-    Found, JobResult, ScoredJob,
+    Found, JobFinding, JobResult, ScoredJob,
     testing::{job, mutant, record, sound},
 };
 
@@ -25,7 +25,7 @@ fn forest() -> (PathBuf, Score) {
     let subjects = vec![mutant("forest", "e", "pit"), sound("forest", 1)];
     let short = |job: ScoredJob| {
         let found = Found { differs: true, ..job.found };
-        let result = JobResult { minimised: Some(3), original: Some(12), ..job.result };
+        let result = JobResult { minimised: Some(3), original: Some(12), played: Some(30), ..job.result };
         ScoredJob { result, found, first: Some(0.1) }
     };
     let jobs = vec![short(job("e", "stone", true)), job("forest bed:1", "stone", false)];
@@ -45,6 +45,7 @@ fn numbers_are_those_that_are_worked_out_by_hand() {
     assert_eq!((stone.seconds, stone.found_per_hour), (5.0, Some(2160.0)));
     assert_eq!((stone.first_seconds, skill.first_seconds), (Some(0.5), Some(0.5)));
     assert_eq!((stone.minimised, stone.minimised_share, stone.replays), (Some(3.0), Some(0.25), 1));
+    assert_eq!(stone.episode_share, Some(0.1));
     assert_eq!((stone.games.clone(), skill.skilled), (vec!["forest".to_owned(), "garden".to_owned()], true));
     assert_eq!(table.best.testers, ["stone", "skill"]);
     assert_eq!(table.best.recall, Share::new(4, 5));
@@ -55,6 +56,25 @@ fn numbers_are_those_that_are_worked_out_by_hand() {
     assert_eq!((pit.class.as_str(), pit.testers.clone()), ("pit", vec![Share::new(1, 3), Share::new(1, 2)]));
     assert_eq!((pit.best, pit.precision, pit.only_skills), (Share::new(2, 3), Share::new(2, 3), Share::new(1, 3)));
     assert_eq!((wall.class.as_str(), wall.best, wall.beside), ("wall", Share::new(2, 2), Share::new(2, 2)));
+}
+
+#[test]
+fn what_only_a_games_own_detectors_find_is_told_apart() {
+    let (path, mut score) = garden();
+    let finding = |detector: &str| JobFinding { detector: detector.to_owned(), tick: None, message: String::new() };
+    let found = |job: &mut ScoredJob, detectors: &[&str]| {
+        job.result.findings = detectors.iter().map(|detector| finding(detector)).collect();
+    };
+    for job in score.jobs.iter_mut().filter(|job| job.result.tester == "stone") {
+        match job.result.subject.as_str() {
+            "a" => found(job, &["weeds"]),
+            "b" => found(job, &["weeds", "stuck"]),
+            _ => {}
+        }
+    }
+    let table = ScoreTable::join(&[(path, score)]).expect("it fits");
+    assert_eq!((table.testers[0].recall, table.testers[0].without_own), (Share::new(2, 4), Share::new(1, 4)));
+    assert_eq!((table.best.recall, table.best.without_own), (Share::new(3, 4), Share::new(2, 4)));
 }
 
 #[test]

@@ -179,6 +179,7 @@ impl Layer {
             self.window(),
             &weights.forward,
             |block| weights.bias[block],
+            true,
             |pixel, block, sums| {
                 let first = block * LANES;
                 store(self.outputs[pixel] + first, channels - first, sums);
@@ -224,6 +225,7 @@ impl Layer {
             window,
             &weights.backward,
             |_| [0.0; LANES],
+            true,
             |pixel, block, sums| {
                 let first = block * LANES;
                 store(self.inputs[pixel] + first, inputs - first, sums);
@@ -243,6 +245,8 @@ impl Layer {
             pixel,
             &weights.backward,
             |_| [0.0; LANES],
+            // Windows overlap: the order in which they are added must be the same on every machine.
+            false,
             |pixel, tile, sums| {
                 let first = tile % tiles * LANES;
                 let at = self.starts[pixel] + tile / tiles * step + first;

@@ -4,12 +4,14 @@
 //! Each sum is made by fused multiply-adds in an order of its own: it does not depend on what else is in the tile, on
 //! the width of vectors, or on threads.
 
-use macerator::{Simd, VFma};
+use macerator::{Scalar, Simd, VFma};
 
 /// Channels at a time.
 pub(super) const LANES: usize = 16;
 /// Pixels (or weights) at a time: with two vectors of 8 lanes each, the sums take 12 of 16 registers.
 const ROWS: usize = 6;
+/// Pixels at a time where a vector has all lanes and there are 32 registers; more leave too few for their addresses.
+const WIDE_ROWS: usize = 8;
 /// Pixels after which [`outer`] goes on to other weights, while these pixels are in the first-level cache.
 const BLOCK: usize = 128;
 
@@ -27,7 +29,8 @@ pub(super) struct Window {
 /// The sums of a window's numbers times `weights`, for the windows of `x` that begin at `starts`.
 ///
 /// `weights` has `count * len` rows for each block of 16 channels, `first` what the sums of each block start from.
-/// `store` gets the number of the window, the block and the sums.
+/// `store` gets the number of the window, the block and the sums: for each block all windows in their order, or, where it
+/// may be so, those of two blocks in turn, which is faster.
 #[macerator::with_simd]
 pub(super) fn correlate<S: Simd, F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &Lanes)>(
     x: &[f32],
@@ -35,21 +38,87 @@ pub(super) fn correlate<S: Simd, F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &
     window: Window,
     weights: &[Lanes],
     first: F,
+    in_turn: bool,
     store: G,
 ) {
     let mut store = store;
     {
-        for (block, weights) in weights.chunks_exact(window.count * window.len).enumerate() {
-            let first = first(block);
-            for (tile, starts) in starts.chunks(ROWS).enumerate() {
-                let mut at = [starts[0]; ROWS];
-                at[..starts.len()].copy_from_slice(starts);
-                let sums = tile_sums::<S>(x, at, window, weights, first);
-                for (p, sums) in sums.iter().enumerate() {
-                    if p < starts.len() {
-                        store(tile * ROWS + p, block, sums);
-                    }
-                }
+        let rows = window.count * window.len;
+        let mut block = 0;
+        if is_wide::<S>() && in_turn {
+            for weights in weights.chunks_exact(2 * rows) {
+                let (one, other) = weights.split_at(rows);
+                pair_strip::<S, WIDE_ROWS, _>(
+                    x,
+                    starts,
+                    window,
+                    [one, other],
+                    [first(block), first(block + 1)],
+                    block,
+                    &mut store,
+                );
+                block += 2;
+            }
+        }
+        for weights in weights[block * rows..].chunks_exact(rows) {
+            if is_wide::<S>() {
+                strip::<S, WIDE_ROWS, _>(x, starts, window, weights, first(block), block, &mut store);
+            } else {
+                strip::<S, ROWS, _>(x, starts, window, weights, first(block), block, &mut store);
+            }
+            block += 1;
+        }
+    }
+}
+
+/// Whether a vector has room for all lanes; then there are 32 of them.
+#[inline(always)]
+fn is_wide<S: Simd>() -> bool {
+    f32::lanes::<S>() >= LANES
+}
+
+/// The sums of all windows for a block, tile by tile.
+#[inline(always)]
+fn strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
+    x: &[f32],
+    starts: &[usize],
+    window: Window,
+    weights: &[Lanes],
+    first: Lanes,
+    block: usize,
+    store: &mut G,
+) {
+    for (tile, starts) in starts.chunks(P).enumerate() {
+        let mut at = [starts[0]; P];
+        at[..starts.len()].copy_from_slice(starts);
+        let sums = tile_sums::<S, P>(x, at, window, weights, first);
+        for (p, sums) in sums.iter().enumerate() {
+            if p < starts.len() {
+                store(tile * P + p, block, sums);
+            }
+        }
+    }
+}
+
+/// As [`strip`], for two blocks at once: what is read of the windows serves both.
+#[inline(always)]
+fn pair_strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
+    x: &[f32],
+    starts: &[usize],
+    window: Window,
+    weights: [&[Lanes]; 2],
+    first: [Lanes; 2],
+    block: usize,
+    store: &mut G,
+) {
+    for (tile, starts) in starts.chunks(P).enumerate() {
+        let mut at = [starts[0]; P];
+        at[..starts.len()].copy_from_slice(starts);
+        let (one, other) = pair_sums::<S, P>(x, at, window, weights, first);
+        for p in 0..P {
+            if p < starts.len() {
+                store(tile * P + p, block, &one[p]);
+                store(tile * P + p, block + 1, &other[p]);
             }
         }
     }
@@ -61,15 +130,21 @@ fn fused<S: Simd>(x: f32, y: f32, z: f32) -> f32 {
 }
 
 #[inline(always)]
-fn tile_sums<S: Simd>(x: &[f32], at: [usize; ROWS], window: Window, weights: &[Lanes], first: Lanes) -> [Lanes; ROWS] {
-    let mut sums = [first; ROWS];
+fn tile_sums<S: Simd, const P: usize>(
+    x: &[f32],
+    at: [usize; P],
+    window: Window,
+    weights: &[Lanes],
+    first: Lanes,
+) -> [Lanes; P] {
+    let mut sums = [first; P];
     for (piece, weights) in weights.chunks_exact(window.len).enumerate() {
-        let mut rows = [&x[..0]; ROWS];
-        for p in 0..ROWS {
+        let mut rows = [&x[..0]; P];
+        for p in 0..P {
             rows[p] = &x[at[p] + piece * window.step..][..weights.len()];
         }
         for (k, &weights) in weights.iter().enumerate() {
-            for p in 0..ROWS {
+            for p in 0..P {
                 let x = rows[p][k];
                 for j in 0..LANES {
                     sums[p][j] = fused::<S>(x, weights[j], sums[p][j]);
@@ -78,6 +153,36 @@ fn tile_sums<S: Simd>(x: &[f32], at: [usize; ROWS], window: Window, weights: &[L
         }
     }
     sums
+}
+
+#[inline(always)]
+fn pair_sums<S: Simd, const P: usize>(
+    x: &[f32],
+    at: [usize; P],
+    window: Window,
+    weights: [&[Lanes]; 2],
+    first: [Lanes; 2],
+) -> ([Lanes; P], [Lanes; P]) {
+    let (mut one, mut other) = ([first[0]; P], [first[1]; P]);
+    let pieces = weights[0].chunks_exact(window.len).zip(weights[1].chunks_exact(window.len));
+    for (piece, (weights0, weights1)) in pieces.enumerate() {
+        let mut rows = [&x[..0]; P];
+        for p in 0..P {
+            rows[p] = &x[at[p] + piece * window.step..][..weights0.len()];
+        }
+        for (k, (&weights0, &weights1)) in weights0.iter().zip(weights1).enumerate() {
+            for p in 0..P {
+                let x = rows[p][k];
+                for j in 0..LANES {
+                    one[p][j] = fused::<S>(x, weights0[j], one[p][j]);
+                }
+                for j in 0..LANES {
+                    other[p][j] = fused::<S>(x, weights1[j], other[p][j]);
+                }
+            }
+        }
+    }
+    (one, other)
 }
 
 /// Adds to `sums` the products of each window's numbers with the `channels` numbers of `y` that go with the window,

@@ -1,0 +1,144 @@
+//! Balls that do not move as the rules say, or that are not paid what the rules say.
+
+use playbot_lab::{
+    detector::{Detector, LevelAhead, Moment, Watch},
+    prelude::*,
+};
+
+use super::{
+    ball::{Ball, FORCE, RADIUS, Vec2d, clip_action, length, scale, sub},
+    components::{MazeArena, MazeBall, PlaysIn},
+    mode::{Contact, Maze2dMode},
+    sim::{reward, step_soft},
+    walls::Walls,
+};
+
+/// Each tick is computed once more from the place of the ball before it, the action and the map of the level, and has to come
+/// to the same.
+///
+/// The walls are those of the map, whatever the arena has. Under [`Contact::Rapier`] balls near walls are left alone: what a
+/// solver does there depends on what it remembers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AgainstRules;
+
+/// How far two results of the same tick may be apart, m and m/s.
+const SLACK: f64 = 1e-6;
+/// The same for rapier, which computes in single precision.
+const SLACK_OF_SOLVER: f64 = 1e-3;
+/// A ball this far from all walls, surface to surface, is in free flight, m.
+const CLEAR: f64 = 2.0 * RADIUS;
+/// How far two rewards of the same tick may be apart.
+const SLACK_OF_REWARD: f32 = 1e-5;
+
+/// Follows one ball.
+#[derive(Default)]
+struct Following {
+    walls: Option<Walls>,
+    before: Option<Ball>,
+}
+
+impl Detector for AgainstRules {
+    fn name(&self) -> &'static str {
+        "against-rules"
+    }
+
+    fn describe(&self) -> &'static str {
+        "the ball does not move, or is not paid, as the rules say"
+    }
+
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+        Some(Box::<Following>::default())
+    }
+}
+
+impl Watch for Following {
+    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+        let world = moment.world;
+        let ball = world.get::<MazeBall>(moment.agent)?.0;
+        let MazeArena { level, rules, .. } = world.get::<MazeArena>(world.get::<PlaysIn>(moment.agent)?.0)?;
+        let before = self.before.replace(ball).unwrap_or(level.start);
+        let ActionValue::Continuous(action) = moment.action else { return None };
+        let &[x, y] = action.as_slice() else { return None };
+        let walls = self.walls.get_or_insert_with(|| Walls::new(&level.maze, rules.wall_offset()));
+        let paid = reward(ball.position, level.goal(), rules.sparse);
+        moved_otherwise(&before, &ball, clip_action([x, y]).0, walls, rules)
+            .or_else(|| paid_otherwise(moment.reward, paid))
+    }
+}
+
+fn moved_otherwise(before: &Ball, after: &Ball, push: Vec2d, walls: &Walls, rules: &Maze2dMode) -> Option<String> {
+    let mut by_rules = *before;
+    let slack = match rules.contact {
+        Contact::Soft => {
+            step_soft(&mut by_rules, push, walls);
+            SLACK
+        }
+        Contact::Rapier if walls.touches(before.position, CLEAR).as_slice().is_empty() => {
+            by_rules.limit_speed();
+            by_rules.fly(scale(push, FORCE));
+            SLACK_OF_SOLVER
+        }
+        Contact::Rapier => return None,
+    };
+    let apart = length(sub(after.position, by_rules.position)).max(length(sub(after.velocity, by_rules.velocity)));
+    // What is no number is not near to anything.
+    let is_same = apart <= slack;
+    let told = |ball: &Ball| {
+        let Ball { position: [x, y], velocity: [vx, vy] } = ball;
+        format!("at {x:.3}, {y:.3} with {vx:.3}, {vy:.3} m/s")
+    };
+    (!is_same).then(|| format!("the ball is {}; by the rules it is {}", told(after), told(&by_rules)))
+}
+
+fn paid_otherwise(paid: f32, by_rules: f32) -> Option<String> {
+    let is_same = (paid - by_rules).abs() <= SLACK_OF_REWARD;
+    (!is_same).then(|| format!("the tick paid {paid}; by the rules it pays {by_rules}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        maze2d::Maze2d,
+        watched::{first_finding, planted},
+    };
+
+    const MODES: [&str; 3] = ["random+end-at-goal", "medium+sparse", "random+contact=rapier"];
+
+    #[test]
+    fn who_plays_by_the_rules_is_not_found() {
+        for mode in MODES {
+            for level in 0..6 {
+                for noise in [0.0, 1.0] {
+                    let found = first_finding(&Maze2d::default(), mode, level, None, &AgainstRules, noise, 400);
+                    assert_eq!(found, None, "{mode}:{level} with noise {noise}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pushes_winds_and_walls_that_the_rules_do_not_know_are_found() {
+        for class in ["weak-push", "drift", "runaway", "invisible-wall"] {
+            for mode in [MODES[0], MODES[2]] {
+                // A solver is asked where no wall is near, and stops nobody there.
+                if class == "invisible-wall" && mode == MODES[2] {
+                    continue;
+                }
+                let plant = planted(&Maze2d::default(), class);
+                let found = |level| {
+                    first_finding(&Maze2d::default(), mode, level, Some((&*plant, 0)), &AgainstRules, 0.0, 1000)
+                };
+                let found = (0..4).find_map(found);
+                assert!(found.is_some_and(|(_, words)| words.contains("by the rules it is")), "{class} {mode}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_paid_beside_the_rules_is_found() {
+        assert_eq!(paid_otherwise(0.25, 0.25), None);
+        assert_eq!(paid_otherwise(1.25, 0.25).as_deref(), Some("the tick paid 1.25; by the rules it pays 0.25"));
+        assert!(paid_otherwise(f32::NAN, 0.25).is_some());
+    }
+}

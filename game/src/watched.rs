@@ -1,0 +1,68 @@
+//! Episodes of a game's demonstrator under one detector, for tests.
+
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use bevy_playbot::test_app::test_app;
+use playbot_lab::{
+    defect::{ChangeRules, Plant},
+    detector::{Detector, LevelAhead, Moment, NoProofs},
+    prelude::*,
+};
+
+/// The defect of the rules that a game has under this name.
+pub(crate) fn planted(game: &dyn Game, class: &str) -> Arc<ChangeRules> {
+    let kind = game.defects().into_iter().find(|kind| kind.class == class).expect("there is such a defect");
+    match kind.plant {
+        Plant::Rules { plant, .. } => plant,
+        Plant::Level(_) => panic!("`{class}` is a defect of levels"),
+    }
+}
+
+/// What a detector finds first in an episode of the demonstrator, in so many ticks at most: the tick, and what is wrong.
+/// `noise` is the standard deviation of what is added to its actions, and `plant` a defect of the rules with its variant.
+pub(crate) fn first_finding(
+    game: &dyn Game,
+    mode: &str,
+    level: u64,
+    plant: Option<(&ChangeRules, u32)>,
+    detector: &dyn Detector,
+    noise: f64,
+    ticks: u32,
+) -> Option<(u32, String)> {
+    let mut app = test_app();
+    game.build(&mut app, mode);
+    if let Some((plant, variant)) = plant {
+        plant(&mut app, variant);
+    }
+    let agent = game.spawn_agent(app.world_mut(), 0);
+    app.world_mut().entity_mut(agent).insert((Control::Bot, LevelQueue::list([level])));
+    game.attach_demonstrator(app.world_mut(), agent, noise);
+    let plan = game.floor_plan(mode, level);
+    let mut watch = detector.watch(&LevelAhead { level, plan }).expect("it looks at every level");
+    for tick in 0..ticks {
+        app.tick().expect("sound");
+        let world = app.world();
+        let is_over = world.get::<EpisodeCount>(agent)?.finished > 0;
+        let moment = Moment {
+            world,
+            agent,
+            level,
+            tick,
+            action: &world.get::<Action>(agent)?.0,
+            observation: &[],
+            state_hash: 0,
+            reward: world.get::<Reward>(agent)?.get(),
+            place: game.whereabouts(world, agent),
+            is_success: false,
+            proofs: &NoProofs,
+        };
+        if let Some(words) = watch.tick(&moment) {
+            return Some((tick, words));
+        }
+        if is_over {
+            break;
+        }
+    }
+    None
+}
