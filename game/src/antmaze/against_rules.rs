@@ -13,7 +13,10 @@ use super::{
     view,
     walls::wall_boxes,
 };
-use crate::ant::{AntBody, AntState, walk::within_reach};
+use crate::{
+    ant::{AntBody, AntState, walk::within_reach},
+    maze::paid_otherwise,
+};
 
 /// Ticks are computed once more, from the ant before them, the action and the map of the level, and have to come to the same.
 ///
@@ -77,7 +80,7 @@ impl Watch for Following {
         if self.is_ready {
             body.follow(ant);
         }
-        wrong.flatten().or_else(|| paid_otherwise(moment.reward, &state, level))
+        wrong.flatten().or_else(|| paid_otherwise(moment.reward, paid_by_rules(&state, level), SLACK))
     }
 }
 
@@ -90,20 +93,20 @@ fn at_start(level: &AntMazeLevel) -> Box<AntBody> {
 
 fn moved_otherwise(after: &AntState, by_rules: &AntState) -> Option<String> {
     // What is no number is not near to anything.
-    let differs = |(_, (is, should)): &(String, (f32, f32))| {
+    let differs = |(_, (is, should)): &(usize, (f32, f32))| {
         let is_same = (is - should).abs() <= SLACK;
         !is_same
     };
-    let values = view::values(after).zip(view::values(by_rules));
-    let (name, (is, should)) = view::names().into_iter().zip(values).find(differs)?;
+    let (at, (is, should)) = view::values(after).zip(view::values(by_rules)).enumerate().find(differs)?;
+    // Names are made where there is something to tell.
+    let name = &view::names()[at];
     Some(format!("the ant's `{name}` is {is:.4}; by the rules it is {should:.4}"))
 }
 
-fn paid_otherwise(paid: f32, state: &AntState, level: &AntMazeLevel) -> Option<String> {
+/// What a tick pays that ends so.
+fn paid_by_rules(state: &AntState, level: &AntMazeLevel) -> f32 {
     let [x, y, ..] = state.qpos;
-    let by_rules = pay(level.pay, distance([x, y], level.goal_at));
-    let is_same = (paid - by_rules).abs() <= SLACK;
-    (!is_same).then(|| format!("the tick paid {paid}; by the rules it pays {by_rules}"))
+    pay(level.pay, distance([x, y], level.goal_at))
 }
 
 #[cfg(test)]
@@ -143,8 +146,8 @@ mod tests {
         let level = generate(&mode, 3).expect("a level");
         let [x, y, ..] = level.reset.qpos;
         let right = pay(level.pay, distance([x, y], level.goal_at));
-        assert_eq!(paid_otherwise(right, &level.reset, &level), None);
-        let told = paid_otherwise(right + 1.0, &level.reset, &level).expect("it is too much");
+        assert_eq!(paid_otherwise(right, paid_by_rules(&level.reset, &level), SLACK), None);
+        let told = paid_otherwise(right + 1.0, paid_by_rules(&level.reset, &level), SLACK).expect("it is too much");
         assert!(told.contains("by the rules it pays"), "{told}");
     }
 }

@@ -151,19 +151,25 @@ mod tests {
     use super::*;
     use crate::coinrun::{Level, Mode, generate};
 
-    fn seen(level: &Level, player: &Body) -> Vec<f32> {
+    /// A level with a player and nobody else.
+    fn empty<'a>(level: &'a Level, player: &'a Body) -> Scene<'a> {
+        let (tiles, coin, memory) = (&level.tiles, level.coin, PlayerState::default());
+        Scene { tiles, player, memory, coin, crates: &[], saws: &[], enemies: &[] }
+    }
+
+    fn filled(scene: &Scene<'_>) -> Vec<f32> {
         let mut out = Vec::new();
-        let scene = Scene {
-            tiles: &level.tiles,
-            player,
-            memory: PlayerState::default(),
-            coin: level.coin,
+        scene.fill(&mut paths::Surroundings::default(), &mut out);
+        out
+    }
+
+    fn seen(level: &Level, player: &Body) -> Vec<f32> {
+        filled(&Scene {
             crates: &[Body::block([3, 1])],
             saws: &[Body::block([4, 1])],
             enemies: &[Body { x: 5.75, ..Body::enemy([5, 1], -1) }],
-        };
-        scene.fill(&mut paths::Surroundings::default(), &mut out);
-        out
+            ..empty(level, player)
+        })
     }
 
     fn value(values: &[f32], name: &str) -> f32 {
@@ -206,19 +212,8 @@ mod tests {
     #[test]
     fn paths_tell_death_from_a_safe_jump() {
         let level = Level::from_text("#...........C#\n#A.....S.....#\n##############\n").expect("a picture");
-        let mut out = Vec::new();
         let player = Body { x: 5.0, vx: 0.5, ..Body::player() };
-        let saw = [Body::block([7, 1])];
-        let scene = Scene {
-            tiles: &level.tiles,
-            player: &player,
-            memory: PlayerState::default(),
-            coin: level.coin,
-            crates: &[],
-            saws: &saw,
-            enemies: &[],
-        };
-        scene.fill(&mut paths::Surroundings::default(), &mut out);
+        let out = filled(&Scene { saws: &[Body::block([7, 1])], ..empty(&level, &player) });
         assert_eq!(value(&out, "hold_7_dies"), 1.0, "walking on meets the saw");
         assert_eq!(value(&out, "hold_8_dies"), 0.0, "a jump clears it");
         assert_eq!(value(&out, "hold_1_dies"), 0.0, "turning back is safe");
@@ -229,17 +224,7 @@ mod tests {
         let level = generate(Mode::Hard, 0);
         let player = Body { x: 20.5, y: 1.5, ..Body::player() };
         let enemies = [24, 18, 27, 22, 21].map(|x| Body::enemy([x, 1], if x == 18 { -1 } else { 1 }));
-        let mut out = Vec::new();
-        let scene = Scene {
-            tiles: &level.tiles,
-            player: &player,
-            memory: PlayerState::default(),
-            coin: level.coin,
-            crates: &[],
-            saws: &[],
-            enemies: &enemies,
-        };
-        scene.fill(&mut paths::Surroundings::default(), &mut out);
+        let out = filled(&Scene { enemies: &enemies, ..empty(&level, &player) });
         let listed = [0, 1, 2].map(|enemy| (value(&out, &format!("enemy_{enemy}_dx")) * 6.5).round());
         assert_eq!(listed, [1.0, -2.0, 2.0], "of two as near as each other, the first made comes first");
         assert_eq!(value(&out, "enemy_1_vx"), -1.0);

@@ -12,9 +12,10 @@ use super::{
     sim::{reward, step_soft},
     walls::Walls,
 };
+use crate::maze::paid_otherwise;
 
-/// Each tick is computed once more from the place of the ball before it, the action and the map of the level, and has to come
-/// to the same.
+/// Each tick is computed once more from the place of the ball before it, the action and the map of the level, and has to
+/// come to the same.
 ///
 /// The walls are those of the map, whatever the arena has. Under [`Contact::Rapier`] balls near walls are left alone: what a
 /// solver does there depends on what it remembers.
@@ -62,7 +63,7 @@ impl Watch for Following {
         let walls = self.walls.get_or_insert_with(|| Walls::new(&level.maze, rules.wall_offset()));
         let paid = reward(ball.position, level.goal(), rules.sparse);
         moved_otherwise(&before, &ball, clip_action([x, y]).0, walls, rules)
-            .or_else(|| paid_otherwise(moment.reward, paid))
+            .or_else(|| paid_otherwise(moment.reward, paid, SLACK_OF_REWARD))
     }
 }
 
@@ -88,11 +89,6 @@ fn moved_otherwise(before: &Ball, after: &Ball, push: Vec2d, walls: &Walls, rule
         format!("at {x:.3}, {y:.3} with {vx:.3}, {vy:.3} m/s")
     };
     (!is_same).then(|| format!("the ball is {}; by the rules it is {}", told(after), told(&by_rules)))
-}
-
-fn paid_otherwise(paid: f32, by_rules: f32) -> Option<String> {
-    let is_same = (paid - by_rules).abs() <= SLACK_OF_REWARD;
-    (!is_same).then(|| format!("the tick paid {paid}; by the rules it pays {by_rules}"))
 }
 
 #[cfg(test)]
@@ -137,8 +133,11 @@ mod tests {
 
     #[test]
     fn what_is_paid_beside_the_rules_is_found() {
-        assert_eq!(paid_otherwise(0.25, 0.25), None);
-        assert_eq!(paid_otherwise(1.25, 0.25).as_deref(), Some("the tick paid 1.25; by the rules it pays 0.25"));
-        assert!(paid_otherwise(f32::NAN, 0.25).is_some());
+        assert_eq!(paid_otherwise(0.25, 0.25, SLACK_OF_REWARD), None);
+        assert_eq!(
+            paid_otherwise(1.25, 0.25, SLACK_OF_REWARD).as_deref(),
+            Some("the tick paid 1.25; by the rules it pays 0.25")
+        );
+        assert!(paid_otherwise(f32::NAN, 0.25, SLACK_OF_REWARD).is_some());
     }
 }

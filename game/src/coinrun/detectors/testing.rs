@@ -8,13 +8,16 @@ use std::{
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 use playbot_lab::{
-    defect::{ChangeRules, Plant},
+    defect::ChangeRules,
     detector::{LevelAhead, Moment, NoProofs, Watch},
     prelude::*,
 };
 
 use super::detectors;
-use crate::coinrun::{CoinRun, DemonstratorBot, defects::defects, game::spawn_agent};
+use crate::{
+    coinrun::{CoinRun, DemonstratorBot, game::spawn_agent},
+    watched,
+};
 
 /// Who plays.
 #[derive(Clone, Copy, Debug)]
@@ -34,11 +37,7 @@ pub(super) fn sound() -> Rules {
 
 /// A variant of a defect of the rules.
 pub(super) fn planted(class: &str, variant: u32) -> Rules {
-    let kind = defects().into_iter().find(|kind| kind.class == class).expect("there is such a defect");
-    match kind.plant {
-        Plant::Rules { plant, .. } => Some((plant, variant)),
-        Plant::Level(_) => panic!("`{class}` is a defect of levels"),
-    }
+    Some((watched::planted(&CoinRun::default(), class), variant))
 }
 
 /// What is found in the first episode on a hard level, or in its first ticks: names of detectors and ticks.

@@ -27,8 +27,8 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Follows the path of every held action, in the order of [`HELD`](super::HELD), and writes for each `[dies, coin, lands, steps,
-    /// dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
+    /// Follows the path of every held action, in the order of [`HELD`](super::HELD), and writes for each `[dies, coin, lands,
+    /// steps, dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
     ///
     /// A path ends with death, with the coin, where a flight ends on firm ground, and at the edge of the view.
     pub fn follow(

@@ -22,9 +22,9 @@ use crate::{
 /// An action that does what doing nothing does, wherever it is tried in an episode that was solved: who is stuck somewhere
 /// says nothing of actions.
 ///
-/// Actions are tried at a few moments of the episode, each held for some ticks; an episode in which these would overlap is too
-/// short to say anything. What an action does must show in the state hash, the observation or the reward. Games have actions that do nothing in some levels, and some have such that never do,
-/// so it is not usual.
+/// Actions are tried at a few moments of the episode, each held for some ticks; an episode in which these would overlap is
+/// too short to say anything. What an action does must show in the state hash, the observation or the reward. Games have
+/// actions that do nothing in some levels, and some have such that never do, so it is not usual.
 pub struct DeadAction {
     every: f64,
     moments: f64,
@@ -157,7 +157,7 @@ impl<'a> Script<'a> {
             if ticks(&probe) > actions.len() {
                 actions.extend(probe.world.get::<Action>(probe.agent).map(|action| action.0.clone()));
             }
-            if !is_active || is_over(&probe) {
+            if !is_active || probe.is_over() {
                 break;
             }
         }
@@ -179,7 +179,7 @@ impl<'a> Script<'a> {
             if now > played && now > before.len() {
                 hashes.push(hash_of_state(&probe.world, probe.agent));
             }
-            if !is_active || is_over(&probe) || now >= before.len() + ticks_then {
+            if !is_active || probe.is_over() || now >= before.len() + ticks_then {
                 break;
             }
         }
@@ -190,10 +190,6 @@ impl<'a> Script<'a> {
 /// Ticks of the episode.
 fn ticks(probe: &Probe) -> usize {
     probe.world.get::<Episode>(probe.agent).map_or(0, |episode| episode.tick as usize)
-}
-
-fn is_over(probe: &Probe) -> bool {
-    probe.world.get::<EpisodeCount>(probe.agent).is_some_and(|count| count.finished > 0)
 }
 
 #[cfg(test)]

@@ -2,12 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::Action,
-    episode::{Episode, EpisodeCount},
-    fault::Fault,
-    observation::Observation,
-    reward::Reward,
-    state_hash::StateHash,
+    action::Action, episode::Episode, fault::Fault, observation::Observation, reward::Reward, state_hash::StateHash,
 };
 
 use super::{
@@ -38,11 +33,10 @@ impl Determinism {
         let mut hashes = Vec::new();
         for _ in 0..self.ticks as u32 {
             let is_active = probe.tick()?;
-            let count = probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished);
             if !is_loading(&probe) {
                 hashes.push(hash(&probe.world, probe.agent));
             }
-            if !is_active || count > 0 {
+            if !is_active || probe.is_over() {
                 break;
             }
         }

@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 use bevy_playbot::{
     control::Control,
+    episode::EpisodeCount,
     fault::Fault,
     headless::tick_world,
     level::LevelQueue,
@@ -69,6 +70,11 @@ impl Probe {
         let queue = LevelQueue::list(vec![level; seeds.len()]);
         world.entity_mut(agent).insert((queue, EpisodeSeeds::new(seeds)));
         Ok(Self { world, agent })
+    }
+
+    /// Whether an episode is over.
+    pub fn is_over(&self) -> bool {
+        self.world.get::<EpisodeCount>(self.agent).is_some_and(|count| count.finished > 0)
     }
 
     /// Plays a tick. Whether the agent is still playing.

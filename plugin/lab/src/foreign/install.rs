@@ -54,11 +54,11 @@ impl Plugin for ForeignPlugin {
                     .ambiguous_with(PlaybotSystems::Act),
             ),
         )
-        .add_systems(
-            judge,
-            (place::locate, outcome::read_outcome).chain().before(PlaybotSystems::Judge).run_if(is_tick),
-        );
+        .add_systems(judge, outcome::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         sense::build(app);
+        if description.place.is_some() {
+            place::build(app);
+        }
     }
 
     fn finish(&self, app: &mut App) {

@@ -2,7 +2,16 @@
 
 use bevy::prelude::*;
 
-use super::runtime::{playing_agent, with_foreign};
+use super::{
+    outcome::read_outcome,
+    runtime::{playing_agent, with_foreign},
+    sense::observe,
+};
+use bevy_playbot::{
+    placement::{TickSchedules, is_tick},
+    systems::{ObserveSchedule, PlaybotSystems},
+    vision::VisionSystems,
+};
 
 /// Where the agent is on its level's plan. Not there while nobody knows.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -10,7 +19,13 @@ use super::runtime::{playing_agent, with_foreign};
 pub(super) struct ForeignPlace(pub(super) Vec2);
 
 /// Asks the game where its agent is: before each tick, so that it is known where an episode begins, and after it.
-pub(super) fn locate(world: &mut World) {
+pub(super) fn build(app: &mut App) {
+    let judge = TickSchedules::of(app).judge;
+    app.add_systems(ObserveSchedule, locate.before(observe).before(VisionSystems::Sync))
+        .add_systems(judge, locate.before(read_outcome).before(PlaybotSystems::Judge).run_if(is_tick));
+}
+
+fn locate(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
     let place = with_foreign(world, agent, |world, foreign| match &mut foreign.place {
         Some(system) => system.run(world),

@@ -2,10 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{
-    place::locate,
-    runtime::{Sensor, playing_agent, with_foreign},
-};
+use super::runtime::{Sensor, playing_agent, with_foreign};
 use bevy_playbot::{
     observation::{Observation, VectorSensor},
     systems::ObserveSchedule,
@@ -13,11 +10,11 @@ use bevy_playbot::{
 };
 
 pub(super) fn build(app: &mut App) {
-    app.add_systems(ObserveSchedule, (locate, observe).chain().before(VisionSystems::Sync));
+    app.add_systems(ObserveSchedule, observe.before(VisionSystems::Sync));
 }
 
 /// Fills the agent's vector, unless it has no sensor for one.
-fn observe(world: &mut World) {
+pub(super) fn observe(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
     let Some(expected) = world.get::<VectorSensor>(agent).map(|sensor| sensor.space().len()) else { return };
     let values = with_foreign(world, agent, |world, foreign| {

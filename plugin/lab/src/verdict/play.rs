@@ -40,8 +40,10 @@ pub(super) fn play_tasks(
                     is_seen |= alone.shows(detector);
                     played[suspect] = Some(alone);
                 }
-                if let Some((suspect, finding)) = test_world.left_behind(detector, &message).filter(|_| !is_seen) {
-                    played[suspect].iter_mut().for_each(|played| played.found.push(finding.clone()));
+                if let Some((suspect, finding)) = test_world.left_behind(detector, &message).filter(|_| !is_seen)
+                    && let Some(played) = &mut played[suspect]
+                {
+                    played.found.push(finding);
                 }
             }
         }

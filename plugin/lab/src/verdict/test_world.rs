@@ -38,6 +38,13 @@ struct Seat {
     walk: WalkCounter,
 }
 
+impl Seat {
+    /// What is played, or would be next: the task and the seed of its episode.
+    fn current(&self) -> Option<(usize, u64)> {
+        self.tasks.get(self.done).copied()
+    }
+}
+
 /// The World and who plays in it.
 pub(super) struct TestWorld {
     world: World,
@@ -135,7 +142,7 @@ impl TestWorld {
         for (agent, result) in ended {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let walk = self.take_walk(seat);
-            let Some(&(task, seed)) = self.seats[seat].tasks.get(self.seats[seat].done) else { continue };
+            let Some((task, seed)) = self.seats[seat].current() else { continue };
             let place = game.whereabouts(&self.world, agent);
             let cause = if result.success { None } else { game.end_cause(&self.world, agent) };
             let exact = self.is_untouched(seat, seed);
@@ -157,27 +164,26 @@ impl TestWorld {
     /// The tasks one of which may have broken the World: those that were being played or have just ended, or else those
     /// that would be next.
     pub fn suspects(&self) -> Vec<usize> {
-        let ended = EndedEpisodes::of(&self.world);
-        let is_begun =
-            |seat: &&Seat| is_playing(&self.world, seat.agent) || ended.iter().any(|(agent, _)| *agent == seat.agent);
-        let task = |seat: &Seat| seat.tasks.get(seat.done).map(|(task, _)| *task);
-        let begun: Vec<usize> = self.seats.iter().filter(is_begun).filter_map(task).collect();
-        if begun.is_empty() { self.seats.iter().filter_map(task).collect() } else { begun }
+        self.suspected().into_iter().map(|(_, task)| task).collect()
     }
 
-    /// What broke the World, if no episode does it alone: a finding of the suspect whose agent the game names, or else of the
-    /// first one.
+    fn suspected(&self) -> Vec<(&Seat, usize)> {
+        let ended = EndedEpisodes::of(&self.world);
+        let is_begun =
+            |seat: &Seat| is_playing(&self.world, seat.agent) || ended.iter().any(|(agent, _)| *agent == seat.agent);
+        let seats = || self.seats.iter().filter_map(|seat| seat.current().map(|(task, _)| (seat, task)));
+        let begun: Vec<(&Seat, usize)> = seats().filter(|(seat, _)| is_begun(seat)).collect();
+        if begun.is_empty() { seats().collect() } else { begun }
+    }
+
+    /// What broke the World, if no episode does it alone: a finding of the suspect whose agent the game names, or else of
+    /// the first one.
     pub fn left_behind(&self, detector: &'static str, message: &str) -> Option<(usize, EpisodeFinding)> {
-        let suspects = self.suspects();
-        let current = |seat: &Seat| seat.tasks.get(seat.done).map(|(task, _)| *task);
-        let seats = self.seats.iter().filter_map(|seat| Some((seat, current(seat)?)));
-        let mut seats: Vec<(&Seat, usize)> = seats.filter(|(_, task)| suspects.contains(task)).collect();
         let told = |seat: &Seat| {
             let (agent, episode) = (self.world.get::<Agent>(seat.agent)?, self.world.get::<Episode>(seat.agent)?);
             told_tick(message, agent.index, episode.level)
         };
-        seats.sort_by_key(|(seat, _)| told(seat).is_none());
-        let (seat, task) = *seats.first()?;
+        let (seat, task) = self.suspected().into_iter().min_by_key(|(seat, _)| told(seat).is_none())?;
         let played = || self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick.saturating_sub(1));
         let (tick, words) = told(seat).unwrap_or_else(|| (played(), message));
         let words = words.strip_prefix(PANICKED).unwrap_or(words);

@@ -216,12 +216,10 @@ fn result(
         ends: vec![solution.map_or_else(|| "not found".to_owned(), |ticks| format!("won {ticks}"))],
         findings: sightings.findings,
         unsolvable,
-        played: shortened.map(|lengths| lengths.played),
-        original: shortened.map(|lengths| lengths.original),
-        minimised: shortened.map(|lengths| lengths.minimised),
         seconds,
         found_after: sightings.first.into_iter().chain(proved_after).min_by(f64::total_cmp),
         failed_after: solution.is_none().then_some(seconds),
         ..JobResult::default()
     }
+    .with_lengths(shortened)
 }

@@ -3,7 +3,7 @@
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use serde::{Deserialize, Serialize};
 
-use crate::findings::Breakage;
+use crate::findings::{Breakage, Lengths};
 
 /// What a tester found on a subject.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -76,6 +76,14 @@ impl JobResult {
             failed_after: Some(seconds),
             ..Self::default()
         }
+    }
+
+    /// The same with the lengths of a finding that was made shorter.
+    #[must_use]
+    pub(super) fn with_lengths(self, lengths: Option<Lengths>) -> Self {
+        let of = |length: fn(Lengths) -> u32| lengths.map(length);
+        let (played, original) = (of(|lengths| lengths.played), of(|lengths| lengths.original));
+        Self { played, original, minimised: of(|lengths| lengths.minimised), ..self }
     }
 
     /// The same without what is measured with a clock.

@@ -56,21 +56,21 @@ pub(super) fn play(trial: &Trial, player: &Player) -> Result<Option<JobResult>, 
         tick: finding.tick,
         message: finding.message.clone(),
     };
-    Ok(Some(JobResult {
-        solved: verdict.score.solved,
-        episodes: verdict.score.episodes,
-        exact: verdict.testers.iter().all(|tester| tester.exact),
-        ends: tested.ends.iter().map(|end| end_of(end.as_ref())).collect(),
-        findings: found.iter().map(finding).collect(),
-        unsolvable,
-        played: shortened.map(|lengths| lengths.played),
-        original: shortened.map(|lengths| lengths.original),
-        minimised: shortened.map(|lengths| lengths.minimised),
-        seconds,
-        found_after,
-        failed_after: failed.map(|episode| times.get(episode).copied().unwrap_or(seconds)),
-        ..JobResult::default()
-    }))
+    Ok(Some(
+        JobResult {
+            solved: verdict.score.solved,
+            episodes: verdict.score.episodes,
+            exact: verdict.testers.iter().all(|tester| tester.exact),
+            ends: tested.ends.iter().map(|end| end_of(end.as_ref())).collect(),
+            findings: found.iter().map(finding).collect(),
+            unsolvable,
+            seconds,
+            found_after,
+            failed_after: failed.map(|episode| times.get(episode).copied().unwrap_or(seconds)),
+            ..JobResult::default()
+        }
+        .with_lengths(shortened),
+    ))
 }
 
 fn plan(trial: &Trial, player: &Player) -> TestPlan {

@@ -101,6 +101,8 @@ fn strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
 }
 
 /// As [`strip`], for two blocks at once: what is read of the windows serves both.
+///
+/// It stands beside it, since the sums of several blocks in one array do not stay in registers, which takes twice as long.
 #[inline(always)]
 fn pair_strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     x: &[f32],
