@@ -24,7 +24,10 @@ const NEARLY: f32 = 1e-3;
 
 /// A level as a file has it. Cells are `[row, column]`; start and goal may be letters in the rows instead.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a level, which is an object with `rows` and, where they do not say it, `start` and `goal`"
+)]
 pub(super) struct LevelText {
     rows: Vec<String>,
     #[serde(default)]

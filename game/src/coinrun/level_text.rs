@@ -18,7 +18,7 @@ use super::{
 
 /// A level as a file has it. Cells are `[x, y]` from the bottom left; only the rows have to be there.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a level, which is an object with `rows`")]
 pub(super) struct LevelText {
     rows: Vec<String>,
     #[serde(default)]

@@ -28,7 +28,7 @@ impl FromStr for Named {
     fn from_str(text: &str) -> Result<Self, String> {
         let is_name = |name: &str| !name.is_empty() && !name.contains(is_separator);
         let parts = text.split_once('=').filter(|(name, file)| is_name(name) && !file.is_empty());
-        let (name, file) = parts.ok_or("write a name in front of the file, as in ppo=bot.policy")?;
+        let (name, file) = parts.ok_or("write a name and a file, as in ppo=bot.policy")?;
         Ok(Self { name: name.to_owned(), path: file.into() })
     }
 }

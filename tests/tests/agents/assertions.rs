@@ -115,7 +115,7 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
     let again = |level: &str| {
         format!(
             "  the level again:\n    \
-             jump test lane --levels {level} --bot left --episodes 2 --seed 3 --out again --no-detect all\n    \
+             jump test lane --levels {level} --bot left --episodes 2 --seed 3 --no-detect all --out again\n    \
              jump view lane --levels {level} --bot left --episode --out again.png"
         )
     };

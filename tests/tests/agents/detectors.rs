@@ -2,6 +2,7 @@
 
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{
+    bugs::{Mutant, defect_kinds},
     detectors::{DetectorChoice, Detectors},
     eval::Player,
     prelude::*,
@@ -59,6 +60,23 @@ fn a_game_that_plays_differently_each_time_is_found() {
     assert_eq!(found.iter().map(|(index, _)| *index).collect::<Vec<_>>(), [0, 2]);
     assert!(found.iter().all(|(_, finding)| finding.message.contains("doctor")), "{found:?}");
     assert_silent(&breaches(Garden::None));
+}
+
+#[test]
+fn what_a_world_keeps_from_one_episode_to_the_next_is_a_breach_of_determinism() {
+    let kinds = defect_kinds(&Corridor);
+    let leak = kinds.iter().find(|kind| kind.class == "state-leak").expect("every game can have it");
+    let seen = |game: &dyn Game, settings: &[&str]| {
+        let mut found = findings(game, "plain:0..1", vec![random()], only(game, &["determinism"], settings));
+        found.pop().map(|(_, finding)| finding.message)
+    };
+    for (variant, episode) in [(0, 2), (1, 2), (2, 3)] {
+        let message = seen(&Mutant::new(&Corridor as &dyn Game, leak, variant), &[]).expect("it is found");
+        assert!(message.starts_with(&format!("episode {episode} of a World was another one")), "{variant}: {message}");
+    }
+    let late = Mutant::new(&Corridor as &dyn Game, leak, 2);
+    assert_eq!(seen(&late, &["determinism.episodes=2"]), None, "that is too soon for it");
+    assert_eq!(seen(&Corridor, &[]), None);
 }
 
 #[test]

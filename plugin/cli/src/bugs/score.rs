@@ -32,9 +32,10 @@ const LEFT_OUT: [&str; 2] = ["tick-time", "unreachable-region"];
 ///
 /// Every tester is set on every mutant of this program's games and on every sound level of the set, at equal budgets and
 /// under all detectors but tick-time and unreachable-region. A mutant is found if a detector finds something or the game
-/// breaks, if it is proved that nobody can solve it, or if a tester fails that solves at least 99 % of the sound levels; on
-/// a sound level the same is a false finding. Beside that, results are compared with those of the same tester on the sound
-/// level that the mutant was made of.
+/// breaks, if it is proved that nobody can solve it, or if a tester fails that solves at least 99 % of the sound levels; one
+/// that solves fewer fails where its reward lies far outside of those of the sound levels. On a sound level the same is a
+/// false finding. Beside that, results are compared with those of the same tester on the sound level that the mutant was
+/// made of.
 ///
 /// All but the times is the same on any number of threads.
 #[derive(clap::Args)]
@@ -154,6 +155,9 @@ fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<Tested
     if chosen.is_empty() {
         let is_in_set = |game: &&dyn Game| set.games.iter().any(|known| known.name == game.name());
         chosen = games.iter().filter(is_in_set).collect();
+        if chosen.is_empty() {
+            return Err(none_of_the_games(set, games));
+        }
         let is_left_out = |name: &&str| !chosen.iter().any(|game| game.name() == *name);
         let left_out: Vec<&str> = set.games.iter().map(|game| game.name.as_str()).filter(is_left_out).collect();
         if !left_out.is_empty() {
@@ -176,6 +180,19 @@ fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<Tested
         tested.push(TestedGame { game, contestants, detectors });
     }
     Ok(tested)
+}
+
+/// That the set was made for other games.
+fn none_of_the_games(set: &BugSet, games: &Games) -> CliError {
+    let of_set: Vec<&str> = set.games.iter().map(|game| game.name.as_str()).collect();
+    let known: Vec<&str> = games.iter().map(|game| game.name()).collect();
+    CliError::Usage(format!(
+        "the set has mutants of {}, and this program has {}: call the program that has the game, or make a set with \
+         `{} bugs make`",
+        of_set.join(", "),
+        known.join(", "),
+        program::name()
+    ))
 }
 
 /// A score that needs nothing more.
@@ -235,7 +252,7 @@ mod tests {
             ["playbot", "bugs", "score", "set", "--tester", "random,hold", "--policy", "ppo=a", "--out", "a.json"];
         assert_eq!(check_usage(sound), Ok(()));
         let unnamed = ["playbot", "bugs", "score", "set", "--policy", "a.policy", "--out", "a.json"];
-        assert!(check_usage(unnamed).expect_err("no name").contains("write a name in front of the file"));
+        assert!(check_usage(unnamed).expect_err("no name").contains("write a name and a file"));
         assert!(check_usage(["playbot", "bugs", "score", "set"]).is_err(), "it is written somewhere");
     }
 

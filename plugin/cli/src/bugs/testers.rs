@@ -131,6 +131,12 @@ impl ContestantArgs {
         known.sort_unstable();
         known.dedup();
         if let Some(unknown) = self.testers.iter().find(|name| !known.contains(&name.as_str())) {
+            if unknown == EXPLORE_SKILLS {
+                return Err(CliError::Usage(format!(
+                    "the tester `{EXPLORE_SKILLS}` needs skills: give a skill model with --skills FILE, or a policy that has \
+                     skills with --policy NAME=FILE"
+                )));
+            }
             return Err(UnknownName::new("tester", unknown, &known).into());
         }
         for (game, testers) in chosen.iter().zip(all) {
@@ -186,5 +192,7 @@ mod tests {
         assert!(names(&["demonstrator"]).is_empty(), "it has none");
         let words = load(&["choas"]).map(drop).expect_err("unknown").to_string();
         assert!(words.contains("did you mean `chaos`?"), "{words}");
+        let words = load(&["explore-skills"]).map(drop).expect_err("no skills").to_string();
+        assert!(words.contains("--skills FILE"), "{words}");
     }
 }

@@ -10,8 +10,11 @@ use playbot_lab::split::{LevelSplit, SplitError};
 pub fn one_level(text: &str) -> Result<LevelSplit, String> {
     text.parse::<LevelSplit>().map_err(|error| match error {
         SplitError::NotARange(_) => {
-            let mode = text.split(':').next().filter(|mode| !mode.is_empty()).unwrap_or("MODE");
-            format!("`{text}` names no level: write its mode and its number, such as {mode}:7")
+            // Numbers and files are no modes.
+            let is_mode = |mode: &&str| mode.starts_with(char::is_alphabetic) && !mode.contains(['.', '/', '\\']);
+            let mode = text.split(':').next().filter(is_mode).unwrap_or("MODE");
+            let file = if text.ends_with(".json") { format!(", or files:{text}") } else { String::new() };
+            format!("`{text}` names no level: write its mode and its number, such as {mode}:7{file}")
         }
         other => other.to_string(),
     })
@@ -24,7 +27,14 @@ mod tests {
     #[test]
     fn levels_are_read_and_others_are_told_how_to_write_one() {
         assert_eq!(one_level("plain:7").map(|level| (level.first, level.len())), Ok((7, 1)));
-        for (text, example) in [("plain", "plain:7"), ("plain:x", "plain:7"), ("", "MODE:7"), (":3", "MODE:7")] {
+        for (text, example) in [
+            ("plain", "plain:7"),
+            ("plain:x", "plain:7"),
+            ("", "MODE:7"),
+            (":3", "MODE:7"),
+            ("7", "MODE:7"),
+            ("levels/a.json", "MODE:7, or files:levels/a.json"),
+        ] {
             let error = one_level(text).expect_err(text);
             assert!(error.contains(&format!("`{text}` names no level")) && error.ends_with(example), "{error}");
         }

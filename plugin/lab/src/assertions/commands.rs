@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use crate::{
-    detectors::DetectorChoice,
     shell_word::shell_word,
     verdict::{LevelVerdict, TestRecord, rerun_commands},
 };
@@ -16,8 +15,6 @@ pub(super) struct Commands<'a> {
     pub record: TestRecord,
     /// Name and path of each policy.
     pub policies: Vec<(String, String)>,
-    /// What looked for defects.
-    pub detectors: &'a DetectorChoice,
 }
 
 impl Commands<'_> {
@@ -27,13 +24,9 @@ impl Commands<'_> {
         // Findings are named with their own files, and all is run from the same folder.
         commands
             .retain(|command| !command.starts_with(&format!("{} replay ", self.program)) && !command.starts_with('#'));
-        let tests = format!("{} test ", self.program);
         for command in &mut commands {
             for (name, path) in &self.policies {
                 *command = command.replace(&format!("--policy {name} "), &format!("--policy {} ", shell_word(path)));
-            }
-            if command.starts_with(&tests) {
-                *command += &options(self.detectors);
             }
         }
         commands
@@ -50,28 +43,13 @@ pub(super) fn replay(program: &str, file: &Path) -> String {
     format!("{program} replay {}", shell_word(&file.display().to_string()))
 }
 
-fn options(choice: &DetectorChoice) -> String {
-    let list = |option: &str, names: &[String]| {
-        if names.is_empty() { String::new() } else { format!(" {option} {}", shell_word(&names.join(","))) }
-    };
-    let settings = choice.settings.iter().map(|setting| format!(" --detector {}", shell_word(setting)));
-    list("--detect", &choice.with) + &list("--no-detect", &choice.without) + &settings.collect::<String>()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn paths_and_settings_are_words_of_a_shell() {
+    fn paths_are_words_of_a_shell() {
         assert_eq!(replay("jump", "a/b-1.finding".as_ref()), "jump replay a/b-1.finding");
         assert_eq!(replay("jump", "my levels/it's".as_ref()), r"jump replay 'my levels/it'\''s'");
-        let choice = DetectorChoice {
-            with: vec!["determinism".to_owned(), "shortcut".to_owned()],
-            without: vec!["all".to_owned()],
-            settings: vec!["determinism.every=1".to_owned()],
-        };
-        let expected = " --detect determinism,shortcut --no-detect all --detector determinism.every=1";
-        assert_eq!((options(&choice).as_str(), options(&DetectorChoice::default()).as_str()), (expected, ""));
     }
 }

@@ -43,7 +43,6 @@ impl LevelTest<'_> {
     /// What is wrong with the levels, if anything.
     fn failure(&self, wanted: Wanted) -> Result<Option<String>, LevelTestError> {
         let _alone = PLAYING.lock().unwrap_or_else(PoisonError::into_inner);
-        let choice = self.choice(wanted);
         let plan = self.plan(wanted)?;
         let mut broken = self.broken(&plan, wanted)?;
         if broken.is_empty() {
@@ -51,19 +50,19 @@ impl LevelTest<'_> {
         }
         let evidence = Evidence::new(self.game, &plan, wanted, &self.folder, self.minimise);
         let kept: Result<Vec<_>, _> = broken.iter_mut().take(MOST_SHOWN).map(|level| evidence.keep(level)).collect();
-        let commands = self.commands(&plan, &choice);
+        let commands = self.commands(&plan);
         let (episodes, folder) = (kept?, self.folder.as_path());
         Ok(Some(Failure { wanted, plan: &plan, broken: &broken, episodes: &episodes, folder, commands }.text()))
     }
 
-    fn commands<'b>(&'b self, plan: &TestPlan, detectors: &'b DetectorChoice) -> Commands<'b> {
+    fn commands(&self, plan: &TestPlan) -> Commands<'_> {
         let mut record = plan.record(self.game);
         record.testers.retain(|tester| self.named.iter().all(|named| named.own_name() != Some(tester.name.as_str())));
         let policies = self.named.iter().zip(&plan.testers).filter_map(|(named, tester)| match named {
             Named::Policy { path, .. } => Some((tester.record.name.clone(), path.display().to_string())),
             Named::Bot(_) | Named::Player { .. } => None,
         });
-        Commands { program: &self.program, record, policies: policies.collect(), detectors }
+        Commands { program: &self.program, record, policies: policies.collect() }
     }
 
     /// Levels of which the assertion is not true, in their order.

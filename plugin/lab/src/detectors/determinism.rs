@@ -2,7 +2,12 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::Action, episode::Episode, fault::Fault, observation::Observation, reward::Reward, state_hash::StateHash,
+    action::Action,
+    episode::{Episode, EpisodeCount},
+    fault::Fault,
+    observation::Observation,
+    reward::Reward,
+    state_hash::StateHash,
 };
 
 use super::{
@@ -11,36 +16,83 @@ use super::{
 };
 use crate::detector::Setting;
 
-/// Two Worlds in which the same tester plays the same episode differ. A tester's first episode on some of the levels is
-/// played twice more, so it is not usual.
+/// Two Worlds in which the same tester plays the same episode differ, or one does in which it plays it again and again. A
+/// tester's first episode on some of the levels is played several times more, so it is not usual.
 pub struct Determinism {
     every: f64,
     ticks: f64,
+    episodes: f64,
 }
 
 impl Default for Determinism {
     fn default() -> Self {
-        Self { every: 10.0, ticks: 1000.0 }
+        Self { every: 10.0, ticks: 1000.0, episodes: 4.0 }
     }
 }
 
 impl Determinism {
-    /// A hash for each tick of the episode.
-    fn play(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>) -> Result<Vec<u64>, Fault> {
+    /// The same episode, so many times in a row in one World.
+    fn play(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>, episodes: usize) -> Result<Vec<Played>, Fault> {
         let (player, config) = (tester.player, &tester.observation_config);
-        let probe = Probe::new(level.game, level.mode, level.level, player, config, vec![tester.seed]);
+        let probe = Probe::new(level.game, level.mode, level.level, player, config, vec![tester.seed; episodes]);
         let mut probe = probe.map_err(|error| Fault(error.to_string()))?;
-        let mut hashes = Vec::new();
-        for _ in 0..self.ticks as u32 {
+        let most = self.ticks as usize;
+        let (mut played, mut now) = (Vec::new(), Played::default());
+        for _ in 0..episodes * most {
             let is_active = probe.tick()?;
-            if !is_loading(&probe) {
-                hashes.push(hash(&probe.world, probe.agent));
+            let finished = probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished as usize);
+            if finished > played.len() {
+                now.is_over = true;
+                played.push(std::mem::take(&mut now));
+            } else if now.hashes.len() < most && !is_loading(&probe) {
+                now.hashes.push(hash(&probe.world, probe.agent));
             }
-            if !is_active || probe.is_over() {
+            if !is_active || played.len() == episodes {
                 break;
             }
         }
-        Ok(hashes)
+        played.push(now);
+        Ok(played)
+    }
+
+    /// What is not the same when a tester plays its first episode again.
+    fn difference(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>) -> Option<(u32, String)> {
+        // A game that breaks is found by others.
+        let one = self.play(level, tester, self.episodes as usize).ok()?;
+        let other = self.play(level, tester, 1).ok()?;
+        let first = one.first()?;
+        if let Some(tick) = first.difference(other.first()?) {
+            let message = "the episode was another one when it was played again; `playbot doctor` names what differs";
+            return Some((tick, message.to_owned()));
+        }
+        let later = one.iter().enumerate().skip(1);
+        let (number, tick) = later.filter_map(|(number, played)| Some((number, first.difference(played)?))).next()?;
+        let message = format!(
+            "episode {} of a World was another one than the first, though it began from the same seed: something is left \
+             from one episode to the next",
+            number + 1
+        );
+        Some((tick, message))
+    }
+}
+
+/// What is known of an episode.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Played {
+    /// A hash for each tick.
+    hashes: Vec<u64>,
+    /// Whether it came to its end; otherwise it was cut off.
+    is_over: bool,
+}
+
+impl Played {
+    /// The first tick that differs, or the first that one of them lacks which was not cut off.
+    fn difference(&self, other: &Self) -> Option<u32> {
+        let (one, another) = (&self.hashes, &other.hashes);
+        let shared = one.iter().zip(another).position(|(one, another)| one != another);
+        let shorter = if one.len() < another.len() { self } else { other };
+        let lacks = (one.len() != another.len() && shorter.is_over).then_some(shorter.hashes.len());
+        shared.or(lacks).map(|tick| tick as u32)
     }
 }
 
@@ -78,7 +130,8 @@ impl LevelDetector for Determinism {
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
             Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
-            Setting::new("ticks", &mut self.ticks, "ticks that are compared").at_least(1.0),
+            Setting::new("ticks", &mut self.ticks, "ticks of an episode that are compared").at_least(1.0),
+            Setting::new("episodes", &mut self.episodes, "episodes of a World that are compared").at_least(1.0),
         ]
     }
 
@@ -87,26 +140,11 @@ impl LevelDetector for Determinism {
             return Vec::new();
         }
         let of_tester = |tester: &TestedBy<'_>| {
-            // A game that breaks is found by others.
-            let (one, other) = (self.play(level, tester).ok()?, self.play(level, tester).ok()?);
-            let tick = first_difference(&one, &other)?;
-            let message = "the episode was another one when it was played again; `playbot doctor` names what differs";
-            Some(LevelDefect {
-                tester: Some(tester.name.to_owned()),
-                episode: Some(0),
-                tick: Some(tick),
-                message: message.to_owned(),
-            })
+            let (tick, message) = self.difference(level, tester)?;
+            Some(LevelDefect { tester: Some(tester.name.to_owned()), episode: Some(0), tick: Some(tick), message })
         };
         level.testers.iter().filter_map(of_tester).collect()
     }
-}
-
-/// The first tick that differs, or the first that one of them lacks.
-fn first_difference(one: &[u64], other: &[u64]) -> Option<u32> {
-    let shared = one.iter().zip(other).position(|(one, other)| one != other);
-    let longer = (one.len() != other.len()).then(|| one.len().min(other.len()));
-    shared.or(longer).map(|tick| tick as u32)
 }
 
 #[cfg(test)]
@@ -115,8 +153,14 @@ mod tests {
 
     #[test]
     fn the_first_tick_that_differs_is_named() {
-        assert_eq!(first_difference(&[1, 2, 3], &[1, 2, 3]), None);
-        assert_eq!(first_difference(&[1, 2, 3], &[1, 4, 3]), Some(1));
-        assert_eq!(first_difference(&[1, 2, 3], &[1, 2]), Some(2));
+        let difference = |one: &[u64], other: &[u64], is_over: bool| {
+            let played = |hashes: &[u64]| Played { hashes: hashes.to_vec(), is_over };
+            assert_eq!(played(one).difference(&played(other)), played(other).difference(&played(one)));
+            played(one).difference(&played(other))
+        };
+        assert_eq!(difference(&[1, 2, 3], &[1, 2, 3], true), None);
+        assert_eq!(difference(&[1, 2, 3], &[1, 4, 3], false), Some(1));
+        assert_eq!(difference(&[1, 2, 3], &[1, 2], true), Some(2));
+        assert_eq!(difference(&[1, 2, 3], &[1, 2], false), None, "the rest was not looked at");
     }
 }

@@ -73,6 +73,8 @@ pub struct TestedLevel<'a> {
     pub par: Option<f64>,
     /// Who played it.
     pub testers: Vec<TestedBy<'a>>,
+    /// Whether somebody asked to stop: then what is found no longer counts, and who plays for long should end.
+    pub stop: &'a dyn Fn() -> bool,
 }
 
 /// What a tester did on a level.

@@ -16,8 +16,18 @@ use thiserror::Error;
 use crate::game::Game;
 
 /// The pars of levels, by the names that results have for them: `hard:7`, or the path of a level file.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pars(Arc<BTreeMap<String, f64>>);
+#[derive(Clone, Debug, Default)]
+pub struct Pars {
+    ticks: Arc<BTreeMap<String, f64>>,
+    path: PathBuf,
+}
+
+/// Where they were read does not make them other ones.
+impl PartialEq for Pars {
+    fn eq(&self, other: &Self) -> bool {
+        self.ticks == other.ticks
+    }
+}
 
 /// Pars cannot be read.
 #[derive(Debug, Error)]
@@ -76,27 +86,35 @@ impl Pars {
     pub fn read(path: &Path, game: &dyn Game) -> Result<Self, ParError> {
         let is_text = path.extension().is_some_and(|ending| ending == "json");
         let pars = if is_text { of_text(path)? } else { of_recordings(path, game)? };
-        if pars.is_empty() { Err(ParError::None(path.into())) } else { Ok(Self(Arc::new(pars))) }
+        if pars.is_empty() {
+            return Err(ParError::None(path.into()));
+        }
+        Ok(Self { ticks: Arc::new(pars), path: path.into() })
     }
 
     /// The par of a level.
     pub fn of(&self, level: &str) -> Option<f64> {
-        self.0.get(level).copied()
+        self.ticks.get(level).copied()
     }
 
     /// The names of the levels that have one.
     pub fn levels(&self) -> impl Iterator<Item = &str> {
-        self.0.keys().map(String::as_str)
+        self.ticks.keys().map(String::as_str)
+    }
+
+    /// Where they were read.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Whether no level has one.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.ticks.is_empty()
     }
 
     /// A hash of all of them.
     pub fn hash(&self) -> u64 {
-        let words = self.0.iter().flat_map(|(level, ticks)| {
+        let words = self.ticks.iter().flat_map(|(level, ticks)| {
             // What no byte is ends each name.
             level.bytes().map(u64::from).chain([u64::from(u8::MAX) + 1, ticks.to_bits()])
         });

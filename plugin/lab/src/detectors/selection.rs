@@ -35,6 +35,9 @@ pub struct Detectors {
     clock: Option<Arc<TickTime>>,
     pars: Pars,
     record: Vec<String>,
+    /// Settings that somebody asked for, as `name.key=value`.
+    pub(crate) settings: Vec<String>,
+    options: Vec<String>,
 }
 
 /// Detectors cannot be chosen so.
@@ -96,8 +99,9 @@ impl Detectors {
         if let Some(unknown) = unknown {
             return Err(no_detector(unknown, &names));
         }
+        let options = options(&mut known, choice, &mut all(game));
         known.retain(|known| choice.takes(known));
-        Ok(Self::of(known))
+        Ok(Self { options, settings: choice.settings.clone(), ..Self::of(known) })
     }
 
     fn of(known: Vec<Known>) -> Self {
@@ -125,6 +129,7 @@ impl Detectors {
     pub fn with_pars(mut self, pars: Pars) -> Self {
         if !pars.is_empty() {
             self.record.push(format!("pars {:016x}", pars.hash()));
+            self.options.extend(["--par".to_owned(), pars.path().display().to_string()]);
         }
         self.pars = pars;
         self
@@ -138,6 +143,11 @@ impl Detectors {
     /// What results depend on: each detector with its settings, and a hash of the pars.
     pub fn record(&self) -> &[String] {
         &self.record
+    }
+
+    /// The same as words of a command line: whatever is not usual.
+    pub fn options(&self) -> &[String] {
+        &self.options
     }
 
     /// What looks at the clock, if anything does.
@@ -157,6 +167,35 @@ impl DetectorChoice {
         }
         known.is_usual() || names(&self.with, ALL)
     }
+}
+
+/// What a choice changes, as words of a command line, in an order that does not depend on that of the choice.
+fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) -> Vec<String> {
+    let is_all = |list: &[String]| list.iter().any(|name| name == ALL);
+    let (adds_all, leaves_all) = (is_all(&choice.with), is_all(&choice.without));
+    let mut words = Vec::new();
+    let mut list = |option: &str, all: bool, names: Vec<&str>| {
+        let names: Vec<&str> = all.then_some(ALL).into_iter().chain(names).collect();
+        if !names.is_empty() {
+            words.extend([option.to_owned(), names.join(",")]);
+        }
+    };
+    let is_implied = |it: &Known| if leaves_all { false } else { adds_all || it.is_usual() };
+    // What looks at the clock is no part of the results.
+    let counts = |it: &&Known| !matches!(it, Known::Clock(_));
+    let chosen =
+        |is: bool| known.iter().filter(counts).filter(move |it| choice.takes(it) == is && is_implied(it) != is);
+    list("--detect", adds_all && !leaves_all, chosen(true).map(Known::name).collect());
+    list("--no-detect", leaves_all, chosen(false).map(Known::name).collect());
+    for (known, usual) in known.iter_mut().zip(usual).filter(|(known, _)| counts(&&**known) && choice.takes(known)) {
+        let name = known.name();
+        for (setting, usual) in known.settings().into_iter().zip(usual.settings()) {
+            if *setting.value != *usual.value {
+                words.extend(["--detector".to_owned(), format!("{name}.{}={}", setting.key, setting.value)]);
+            }
+        }
+    }
+    words
 }
 
 /// That a name is no detector that can be chosen.
@@ -218,6 +257,38 @@ mod tests {
             words.starts_with("the detector `stuck` has no setting `tick` (did you mean `ticks`?); it has "),
             "{words}"
         );
+    }
+
+    #[test]
+    fn what_is_not_usual_can_be_said_again() {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
+        let list = |text: &str| text.split_whitespace().map(str::to_owned).collect();
+        let chosen = |with: &str, without: &str, settings: &str| {
+            let choice = DetectorChoice { with: list(with), without: list(without), settings: list(settings) };
+            Detectors::choose(&game, &choice).expect("there are such")
+        };
+        for (with, without, settings, expected) in [
+            ("", "", "", ""),
+            ("determinism stuck", "", "", "--detect determinism"),
+            ("", "stuck stuck", "", "--no-detect stuck"),
+            ("all", "stuck", "", "--detect all --no-detect stuck"),
+            ("determinism", "all", "", "--detect determinism --no-detect all"),
+            ("stuck", "", "stuck.ticks=7 stuck.ticks=90", "--detector stuck.ticks=90"),
+        ] {
+            let said = chosen(with, without, settings);
+            assert_eq!(said.options().join(" "), expected);
+            let mut again = DetectorChoice::default();
+            for pair in said.options().chunks(2) {
+                let names = pair[1].split(',').map(str::to_owned);
+                match pair[0].as_str() {
+                    "--detect" => again.with.extend(names),
+                    "--no-detect" => again.without.extend(names),
+                    _ => again.settings.push(pair[1].clone()),
+                }
+            }
+            let again = Detectors::choose(&game, &again).expect("there are such");
+            assert_eq!(again.record(), said.record(), "{expected}");
+        }
     }
 
     #[test]

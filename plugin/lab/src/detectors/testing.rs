@@ -145,5 +145,6 @@ pub fn inspected(
         episodes: (0..).zip(episodes.iter().map(result)).collect(),
         places: (0..).zip(episodes.iter().map(|(_, _, place)| Vec2::from_array(*place))).collect(),
     };
-    detector.inspect(&TestedLevel { game: &game, mode: "plain", level: 0, place: 0, par, testers: vec![tester] })
+    let (mode, testers) = ("plain", vec![tester]);
+    detector.inspect(&TestedLevel { game: &game, mode, level: 0, place: 0, par, testers, stop: &|| false })
 }

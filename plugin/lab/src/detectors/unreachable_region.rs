@@ -28,13 +28,14 @@ impl Default for UnreachableRegion {
 
 impl UnreachableRegion {
     /// What an explorer does not get to, in words.
-    fn missed(&self, game: &dyn Game, mode: &str, level: u64) -> Option<String> {
+    fn missed(&self, game: &dyn Game, mode: &str, level: u64, stop: &dyn Fn() -> bool) -> Option<String> {
         // Without a plan nobody knows what is open.
         game.floor_plan(mode, level)?;
         let plan =
             ExplorePlan { steps: self.steps as u64, arenas: 8, worlds: 1, threads: 1, ..ExplorePlan::new(mode, level) };
         // A game that breaks or does not replay is found by others.
-        let found = explore(game, &plan, |_| {}, |_| ControlFlow::Continue(())).ok()?;
+        let go_on = |_| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let found = explore(game, &plan, |_| {}, go_on).ok()?;
         let coverage = found.coverage().filter(|coverage| 1.0 - coverage > self.share)?;
         let missed: Vec<String> = found.missed().take(NAMED).map(ToString::to_string).collect();
         Some(format!(
@@ -67,7 +68,7 @@ impl LevelDetector for UnreachableRegion {
         if !level.is_sample(self.every) {
             return Vec::new();
         }
-        let missed = self.missed(level.game, level.mode, level.level);
+        let missed = self.missed(level.game, level.mode, level.level, level.stop);
         missed.map(|message| LevelDefect { message, ..LevelDefect::default() }).into_iter().collect()
     }
 
@@ -76,6 +77,6 @@ impl LevelDetector for UnreachableRegion {
     }
 
     fn is_in_level(&self, game: &dyn Game, mode: &str, level: u64) -> bool {
-        self.missed(game, mode, level).is_some()
+        self.missed(game, mode, level, &|| false).is_some()
     }
 }

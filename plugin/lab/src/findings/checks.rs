@@ -18,6 +18,8 @@ pub struct Checks {
     /// The detectors among them with all their settings, as [`Detectors::record`](crate::detectors::Detectors::record) has
     /// them.
     pub(super) records: Vec<String>,
+    /// Settings that somebody asked for, as `name.key=value`.
+    pub(super) asked: Vec<String>,
 }
 
 impl Default for Checks {
@@ -31,7 +33,7 @@ impl Default for Checks {
             (LOST, Check::Episode(is_lost)),
             (NOT_SOLVED, Check::Episode(is_not_solved)),
         ];
-        Self { checks, records: Vec::new() }
+        Self { checks, records: Vec::new(), asked: Vec::new() }
     }
 }
 

@@ -27,7 +27,7 @@ impl Checks {
     /// a level or the end of an episode [shows](ShownBy) what they find.
     #[must_use]
     pub fn with_detectors(self, detectors: &Detectors) -> Self {
-        let checks = self.with_records(detectors.record());
+        let checks = self.with_records(detectors.record(), &detectors.settings);
         let checks = detectors
             .ticks
             .iter()

@@ -8,9 +8,10 @@ use crate::{
 
 impl Checks {
     /// Notes how detectors are set. What was known of them before no longer counts.
-    pub(super) fn with_records(mut self, records: &[String]) -> Self {
+    pub(super) fn with_records(mut self, records: &[String], asked: &[String]) -> Self {
         self.records.retain(|old| !records.iter().any(|new| name_of(new) == name_of(old)));
         self.records.extend_from_slice(records);
+        asked.clone_into(&mut self.asked);
         self
     }
 
@@ -25,6 +26,12 @@ impl Checks {
         values.map(|value| format!("{detector}.{value}")).collect()
     }
 
+    /// The settings of a detector that somebody asked for, usual ones included.
+    fn asked_of(&self, detector: &str) -> Vec<String> {
+        let is_own = |text: &&String| text.split_once('.').is_some_and(|(name, _)| name == detector);
+        self.asked.iter().filter(is_own).cloned().collect()
+    }
+
     /// The check of a finding: its detector is set as it was when it found this, but for what is set in another way here.
     pub(super) fn of_finding(&self, game: &dyn Game, head: &FindingHead) -> Option<Check> {
         let check = self.of(&head.detector)?;
@@ -33,7 +40,7 @@ impl Checks {
             return Some(check);
         }
         // The last one counts.
-        let settings = [head.settings.clone(), self.settings_of(game, &head.detector)].concat();
+        let settings = [head.settings.clone(), self.asked_of(&head.detector)].concat();
         let choice = DetectorChoice { with: vec!["all".to_owned()], settings, ..DetectorChoice::default() };
         // A setting that the detector no longer has cannot be used.
         let set = Detectors::choose(game, &choice).ok();
@@ -92,6 +99,9 @@ mod tests {
         let status = |checks: &Checks| recheck(&game, &stored, checks).expect("playable").status(&stored);
         assert_eq!(status(&usual), FindingStatus::StillThere);
         assert_eq!(status(&set(&["frozen-world.ticks=100"])), FindingStatus::Gone, "somebody says otherwise");
+        let as_usual = usual.records.iter().find_map(|record| record.strip_prefix("frozen-world ")).expect("it looks");
+        let as_usual = format!("frozen-world.{as_usual}");
+        assert_eq!(status(&set(&[&as_usual])), FindingStatus::Gone, "also by saying what is usual");
         let unknown = FindingHead { settings: vec!["frozen-world.colour=4".to_owned()], ..head };
         assert!(found(&unknown, &strict).is_some(), "a setting that is no more is left aside");
     }

@@ -37,8 +37,14 @@ pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
     findings
 }
 
-/// What those find that look at a level after it was tested.
-pub(super) fn inspect(game: &dyn Game, plan: &TestPlan, index: u64, name: &str, played: &[&[Played]]) -> Vec<Finding> {
+/// What those find that look at a level after it was tested. Who asks to stop cannot use it.
+pub(super) fn inspect(
+    game: &dyn Game,
+    plan: &TestPlan,
+    (index, name): (u64, &str),
+    played: &[&[Played]],
+    stop: &dyn Fn() -> bool,
+) -> Vec<Finding> {
     if plan.detectors.levels.is_empty() {
         return Vec::new();
     }
@@ -52,9 +58,9 @@ pub(super) fn inspect(game: &dyn Game, plan: &TestPlan, index: u64, name: &str, 
         places: (0..).zip(episodes.iter()).filter_map(ended_at).collect(),
     });
     let (mode, par) = (plan.split.mode.as_str(), plan.detectors.par(name));
-    let tested = TestedLevel { game, mode, level, place: index, par, testers: testers.collect() };
+    let tested = TestedLevel { game, mode, level, place: index, par, testers: testers.collect(), stop };
     let mut findings = Vec::new();
-    for detector in &plan.detectors.levels {
+    for detector in plan.detectors.levels.iter().take_while(|_| !stop()) {
         findings.extend(detector.inspect(&tested).into_iter().map(|defect| Finding {
             detector: detector.name().to_owned(),
             tester: defect.tester,

@@ -156,6 +156,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 1,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: None,
         }

@@ -48,8 +48,8 @@ pub(crate) fn test_in_turn(
     let played = play_tasks(game, mode, tester, &tasks, &watch).map_err(EvalError::from)?;
     let Some(played) = played else { return Ok(None) };
     let ends = played.iter().map(ended).collect();
-    let verdict = judge(game, plan, 0, name.to_owned(), &[played.as_slice()]);
-    Ok(Some(TestedInTurn { verdict, ends }))
+    let verdict = judge(game, plan, (0, name.to_owned()), &[played.as_slice()], stop);
+    Ok((!stop()).then_some(TestedInTurn { verdict, ends }))
 }
 
 fn ended(episode: &Played) -> Option<EpisodeResult> {

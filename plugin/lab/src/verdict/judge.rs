@@ -15,8 +15,14 @@ use super::{
 use crate::{game::Game, proof::LevelProof};
 
 /// What the testers say of the level at this place in the range, which has this name in results. `played` has the episodes
-/// of each tester, in the order of the plan.
-pub(super) fn judge(game: &dyn Game, plan: &TestPlan, index: u64, name: String, played: &[&[Played]]) -> LevelVerdict {
+/// of each tester, in the order of the plan. Who asks to stop cannot use it.
+pub(super) fn judge(
+    game: &dyn Game,
+    plan: &TestPlan,
+    (index, name): (u64, String),
+    played: &[&[Played]],
+    stop: &dyn Fn() -> bool,
+) -> LevelVerdict {
     let level = plan.split.first + index;
     let mode = &plan.split.mode;
     let testers = plan.testers.iter().zip(played).map(|(tester, episodes)| TesterVerdict {
@@ -31,7 +37,7 @@ pub(super) fn judge(game: &dyn Game, plan: &TestPlan, index: u64, name: String, 
     let proof = if score.solved > 0 { LevelProof::Solvable } else { game.prove(mode, level) };
     let mut findings = broken(plan, played);
     findings.extend(seen(plan, played));
-    findings.extend(inspect(game, plan, index, &name, played));
+    findings.extend(inspect(game, plan, (index, &name), played, stop));
     let outcome = match proof.why_unsolvable() {
         _ if score.solved > 0 => LevelOutcome::Solved,
         None => LevelOutcome::BotFailed,

@@ -105,6 +105,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 1,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: shard.map(|shard| shard.parse().expect("a shard")),
         }

@@ -137,6 +137,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 4,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: None,
         };

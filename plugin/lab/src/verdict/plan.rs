@@ -52,6 +52,9 @@ pub struct TestRecord {
     /// What looked for defects, each detector with its settings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detectors: Vec<String>,
+    /// The same as words of a command line: whatever is not usual. Files are named as the test named them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub options: Vec<String>,
     /// Of which levels results say where agents went.
     #[serde(default, skip_serializing_if = "MapScope::is_none")]
     pub maps: MapScope,
@@ -94,6 +97,7 @@ impl TestPlan {
             testers: self.testers.iter().map(|tester| tester.record.clone()).collect(),
             episodes: self.episodes.max(1),
             detectors: self.detectors.record().to_vec(),
+            options: self.detectors.options().to_vec(),
             maps: self.maps(),
             shard: self.shard,
         }
@@ -221,6 +225,7 @@ mod tests {
             testers: vec![TesterRecord::bot("search")],
             episodes: 1,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: None,
         };

@@ -41,9 +41,11 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     };
     let (game, seed, episodes) = (&record.game, record.seed, record.episodes);
     let levels = level_argument(&record.range, &level.level);
+    let detectors: String = record.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
     // The same episodes: they depend on seed, tester and level alone.
-    let again =
-        format!("{program} test {game} --levels {levels} {tests} --episodes {episodes} --seed {seed} --out again");
+    let again = format!(
+        "{program} test {game} --levels {levels} {tests} --episodes {episodes} --seed {seed}{detectors} --out again"
+    );
     let shown = format!("{program} view {game} --levels {levels} {views} --episode --out again.png");
     vec![again, shown]
 }
@@ -68,6 +70,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random"), trained],
             episodes: 2,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: None,
         };
@@ -80,6 +83,9 @@ mod tests {
         named.testers[1].file = Some("my runs/a.policy".to_owned());
         let again = again.replace("ppo.policy", "'ppo.policy=my runs/a.policy'");
         let shown = shown.replace("ppo.policy", "'my runs/a.policy'");
+        assert_eq!(rerun_commands("jump", &named, &level), [again.clone(), shown.clone()]);
+        named.options = ["--no-detect", "stuck", "--par", "my pars.json"].map(str::to_owned).to_vec();
+        let again = again.replace(" --out", " --no-detect stuck --par 'my pars.json' --out");
         assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
         let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
         assert!(rerun_commands("jump", &record, &perfect).is_empty());

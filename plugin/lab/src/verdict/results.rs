@@ -172,6 +172,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 2,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: Some("0/2".parse().expect("a shard")),
         }

@@ -160,7 +160,11 @@ fn work(
             }
         };
         let Some(complete) = add(shared, portion, tester, testers, played) else { continue };
-        let mut verdicts = judge_portion(game, plan, places, &complete);
+        let mut verdicts = judge_portion(game, plan, places, &complete, watch.stop);
+        if (watch.stop)() {
+            lock(shared).is_stopped = true;
+            return;
+        }
         let written = files.map_or(Ok(()), |files| {
             verdicts.iter_mut().try_for_each(|verdict| keep_findings(game, plan, files, verdict))
         });
@@ -218,15 +222,22 @@ fn add(
     shared.open.remove(&portion).map(|complete| complete.into_iter().flatten().collect())
 }
 
-fn judge_portion(game: &dyn Game, plan: &TestPlan, places: &[u64], complete: &[Vec<Played>]) -> Vec<LevelVerdict> {
+/// Who asks to stop cannot use it.
+fn judge_portion(
+    game: &dyn Game,
+    plan: &TestPlan,
+    places: &[u64],
+    complete: &[Vec<Played>],
+    stop: &dyn Fn() -> bool,
+) -> Vec<LevelVerdict> {
     let episodes = plan.episodes.max(1) as usize;
     let verdict = |(number, place): (usize, &u64)| {
         let own = number * episodes..(number + 1) * episodes;
         let played: Vec<&[Played]> = complete.iter().map(|episodes| &episodes[own.clone()]).collect();
         let name = level_name(game, &plan.split, plan.split.first + place);
-        judge(game, plan, *place, name, &played)
+        judge(game, plan, (*place, name), &played, stop)
     };
-    places.iter().enumerate().map(verdict).collect()
+    places.iter().enumerate().take_while(|_| !stop()).map(verdict).collect()
 }
 
 #[cfg(test)]

@@ -112,6 +112,7 @@ mod tests {
             testers: vec![TesterRecord::bot("random")],
             episodes: 2,
             detectors: Vec::new(),
+            options: Vec::new(),
             maps: MapScope::default(),
             shard: None,
         };

@@ -76,6 +76,7 @@ pub fn record(range: &str, shard: Option<&str>) -> TestRecord {
         testers: vec![TesterRecord::bot("random")],
         episodes: 9,
         detectors: Vec::new(),
+        options: Vec::new(),
         maps: MapScope::default(),
         shard: shard.map(|shard| shard.parse().expect("a shard")),
     }

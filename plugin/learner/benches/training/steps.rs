@@ -75,7 +75,7 @@ pub fn ppo(criterion: &mut Criterion) {
 /// Both image encoders, from bytes to features alone and as a step towards others.
 pub fn images(criterion: &mut Criterion) {
     for (name, kind) in [("nature", CnnKind::Nature { feature: 512 }), ("impala", CnnKind::default())] {
-        for batch in [64, 256] {
+        for batch in [64, 256, 2048] {
             let mut rng = rng("images");
             let frozen = ImageNet::new(&kind, IMAGE, &mut rng, &DEVICE.plain()).expect("fits");
             let bytes = pixels(batch, &mut rng);

@@ -66,6 +66,9 @@ pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobRes
     }
     let solution = found.solution();
     inspect(trial, solution.as_ref(), &mut sightings);
+    if (trial.stop)() {
+        return Ok(None);
+    }
     let ticks = found.solution_ticks();
     let proof = if ticks.is_some() { LevelProof::Solvable } else { trial.game.prove(trial.mode, trial.level) };
     let unsolvable = proof.why_unsolvable().map(str::to_owned);
@@ -182,7 +185,7 @@ fn inspect(trial: &Trial, solution: Option<&Route>, sightings: &mut Sightings) {
         places: std::collections::BTreeMap::new(),
     };
     let (game, mode, level) = (trial.game, trial.mode, trial.level);
-    let tested = TestedLevel { game, mode, level, place: 0, par: None, testers: vec![tester] };
+    let tested = TestedLevel { game, mode, level, place: 0, par: None, testers: vec![tester], stop: trial.stop };
     for detector in &trial.detectors.levels {
         for defect in detector.inspect(&tested) {
             let detector = detector.name().to_owned();

@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 use super::{
     job::JobResult,
     subject::{Subject, SubjectKind},
+    usual_reward::UsualRewards,
 };
 use crate::verdict::{FALSE_DISCOVERY_RATE, Trials, benjamini_hochberg, fisher_exact};
 
-/// Share of a game's sound levels that a tester has to solve for its failure to say something.
+/// Share of a game's sound levels that a tester has to solve for its failure to say something. Of who solves fewer only the
+/// reward says something.
 pub const RELIABLE: f64 = 0.99;
 
 /// How something was found. On a sound level it is false.
@@ -20,7 +22,8 @@ pub struct Found {
     pub detected: bool,
     /// It is proved that nobody can solve the level.
     pub unsolvable: bool,
-    /// A tester failed that solves nearly all sound levels of the game: see [`RELIABLE`].
+    /// A tester failed that solves nearly all sound levels of the game: see [`RELIABLE`]. Or one that does not collected far
+    /// more or far less than on any of them: see [`FEWEST_SOUND`](super::FEWEST_SOUND).
     pub failed: bool,
     /// Beside a sound build: the tester does not do there what it does here.
     pub differs: bool,
@@ -54,21 +57,48 @@ pub struct ScoredJob {
 /// Says of all jobs what was found. `results` are in any order and stay in it.
 pub fn judge(subjects: &[Subject], results: Vec<JobResult>) -> Vec<ScoredJob> {
     let subjects: BTreeMap<&str, &Subject> = subjects.iter().map(|subject| (subject.id.as_str(), subject)).collect();
-    let reliable = reliable(&subjects, &results);
+    let failures = failures(&subjects, &results);
     let differing = differing(&subjects, &results);
-    let scored = |(index, result): (usize, JobResult)| {
-        let game = subjects.get(result.subject.as_str()).map_or("", |subject| subject.game.as_str());
+    let scored = |((index, result), failure): ((usize, JobResult), Option<Failure>)| {
         let found = Found {
             detected: !result.findings.is_empty(),
             unsolvable: result.unsolvable.is_some(),
-            failed: !result.is_solved() && reliable.contains(&(game.to_owned(), result.tester.clone())),
+            failed: failure.is_some(),
             differs: differing.contains(&index),
         };
-        let failed_after = result.failed_after.filter(|_| found.failed);
+        let failed_after = failure.and_then(|failure| match failure {
+            Failure::Unsolved => result.failed_after,
+            // Only all episodes together have a mean.
+            Failure::Reward => Some(result.seconds),
+        });
         let first = [result.found_after, failed_after].into_iter().flatten().min_by(f64::total_cmp);
         ScoredJob { result, found, first }
     };
-    results.into_iter().enumerate().map(scored).collect()
+    results.into_iter().enumerate().zip(failures).map(scored).collect()
+}
+
+/// How a tester failed that does not on sound levels.
+#[derive(Clone, Copy)]
+enum Failure {
+    /// It did not solve the level.
+    Unsolved,
+    /// It collected far more or far less.
+    Reward,
+}
+
+/// For each of the results, whether the tester failed in a way that it does not on sound levels.
+fn failures(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> Vec<Option<Failure>> {
+    let reliable = reliable(subjects, results);
+    let usual = UsualRewards::new(subjects, results);
+    let failure = |result: &JobResult| {
+        let game = subjects.get(result.subject.as_str()).map_or("", |subject| subject.game.as_str());
+        if reliable.contains(&(game.to_owned(), result.tester.clone())) {
+            (!result.is_solved()).then_some(Failure::Unsolved)
+        } else {
+            usual.is_unusual(game, result).then_some(Failure::Reward)
+        }
+    };
+    results.iter().map(failure).collect()
 }
 
 /// Games and the testers that solve nearly all of their sound levels.
@@ -161,6 +191,23 @@ mod tests {
         assert_eq!(found("m", "fair"), (false, None));
         assert_eq!(found("garden bed:7", "good"), (true, Some(2.0)), "a false finding");
         assert_eq!(found("garden bed:8", "good"), (false, None));
+    }
+
+    #[test]
+    fn who_never_wins_finds_by_its_reward() {
+        let subjects = [sound_levels(9), vec![mutant("poor"), mutant("usual")]].concat();
+        let collected = |subject: &str, reward: f64| JobResult {
+            reward: Some(reward),
+            seconds: 8.0,
+            ..result(subject, "glutton", 0, 4)
+        };
+        let mut results: Vec<JobResult> =
+            (0_u32..).zip(&subjects[..9]).map(|(level, it)| collected(&it.id, f64::from(20 + level % 3))).collect();
+        results.extend([collected("poor", 3.0), collected("usual", 19.0)]);
+        let scored = judge(&subjects, results);
+        let found: Vec<bool> = scored.iter().map(|job| job.found.failed).collect();
+        assert_eq!(found, [[false; 9].as_slice(), &[true, false]].concat());
+        assert_eq!(scored[9].first, Some(8.0), "after all episodes");
     }
 
     #[test]

@@ -21,6 +21,9 @@ pub struct JobResult {
     pub exact: bool,
     /// How each episode ended, and after how many ticks: `won 83`, `lost 12`, `time up 1000` or `broken`.
     pub ends: Vec<String>,
+    /// Mean total reward of the episodes; of explorers, and where one is no number, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reward: Option<f64>,
     /// What detectors found, and how the game broke.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<JobFinding>,
@@ -93,6 +96,13 @@ impl JobResult {
     }
 }
 
+/// Mean total reward of episodes; `None` if there are none, one broke, or one has no number for a reward.
+pub(super) fn mean_reward(ends: &[Option<EpisodeResult>]) -> Option<f64> {
+    let rewards: Option<Vec<f64>> = ends.iter().map(|end| end.as_ref().map(|end| end.total_reward)).collect();
+    let mean = rewards.map(|rewards| rewards.iter().sum::<f64>() / rewards.len() as f64);
+    mean.filter(|mean| mean.is_finite())
+}
+
 /// How an episode ended, in words.
 pub(super) fn end_of(result: Option<&EpisodeResult>) -> String {
     let Some(result) = result else { return "broken".to_owned() };
@@ -116,6 +126,18 @@ mod tests {
         let won = EpisodeResult { end: EpisodeEnd::Truncated, success: true, ..result };
         let ends = [Some(&result), Some(&late), Some(&won), None].map(end_of);
         assert_eq!(ends, ["lost 9", "time up 9", "won 9", "broken"]);
+    }
+
+    #[test]
+    fn a_mean_needs_a_number_of_each_episode() {
+        let of = |total_reward| {
+            let (end, success) = (EpisodeEnd::LOST, false);
+            Some(EpisodeResult { level: 3, end, success, ticks: 9, clipped: 0, total_reward })
+        };
+        assert_eq!(mean_reward(&[of(3.0), of(-1.0)]), Some(1.0));
+        for ends in [vec![], vec![of(3.0), None], vec![of(3.0), of(f64::NAN)], vec![of(f64::INFINITY)]] {
+            assert_eq!(mean_reward(&ends), None, "{ends:?}");
+        }
     }
 
     #[test]

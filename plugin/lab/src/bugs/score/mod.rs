@@ -29,6 +29,7 @@ mod tester_row;
 #[cfg(test)]
 pub(crate) mod testing;
 mod trial;
+mod usual_reward;
 
 pub use clock::ClockKind;
 pub use contestant::{Contestant, ContestantRecord, EXPLORE, EXPLORE_SKILLS, HOLD, Means, RANDOM};
@@ -44,3 +45,4 @@ pub use run::{ScoreRun, ScoreWatch};
 pub use subject::{Subject, SubjectKind};
 pub use table::{ClassRow, FEW_FALSE, ScoreTable};
 pub use tester_row::TesterRow;
+pub use usual_reward::FEWEST_SOUND;

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::{
     error::ScoreError,
-    job::{JobFinding, JobResult, end_of},
+    job::{JobFinding, JobResult, end_of, mean_reward},
     trial::Trial,
 };
 use crate::{
@@ -62,6 +62,7 @@ pub(super) fn play(trial: &Trial, player: &Player) -> Result<Option<JobResult>, 
             episodes: verdict.score.episodes,
             exact: verdict.testers.iter().all(|tester| tester.exact),
             ends: tested.ends.iter().map(|end| end_of(end.as_ref())).collect(),
+            reward: mean_reward(&tested.ends),
             findings: found.iter().map(finding).collect(),
             unsolvable,
             seconds,

@@ -18,6 +18,7 @@ fn record(testers: &[&str]) -> TestRecord {
         testers: testers.iter().map(|name| TesterRecord::bot(*name)).collect(),
         episodes: 1,
         detectors: Vec::new(),
+        options: Vec::new(),
         maps: MapScope::default(),
         shard: None,
     }

@@ -1,11 +1,14 @@
 //! From the gradient of the features to those of the parameters.
 
-use super::forward::{SavedActivations, wides};
-use super::layer::{Layer, Weights, add_where, put};
+use super::forward::SavedActivations;
+use super::layer::{Layer, Weights};
 use super::plan::{Plan, Step};
 use super::pool;
 use super::relu_backward;
+use super::store::{AddWhere, Write};
 use super::tile::{LANES, Lanes};
+use super::workspace::Workspace;
+use crate::nn::cpu::fast_math::vectorized;
 use rayon::prelude::*;
 
 /// Into how many parts a batch is split, each with its own sums of gradients.
@@ -19,17 +22,17 @@ const IMAGES: usize = 8;
 pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivations, grad: &[f32]) -> Vec<f32> {
     let n = grad.len() / plan.features();
     let part = n.div_ceil(PARTS).max(IMAGES);
-    let parts = (0..n.div_ceil(part)).into_par_iter().map(|i| {
+    let memory = || (Workspace::new(plan), vec![0.0; plan.lean.len]);
+    let parts = (0..n.div_ceil(part)).into_par_iter().map_init(memory, |(work, grads), i| {
         let mut sums = zeros(plan);
-        let (mut wides, mut grads) = (wides(plan), vec![0.0; plan.lean.len]);
         for image in i * part..n.min((i + 1) * part) {
             let grad = &grad[image * plan.features()..][..plan.features()];
             let values = &saved.values[image * plan.kept.len..][..plan.kept.len];
             let marks = &saved.marks[image * plan.marks..][..plan.marks];
-            let last = plan.lean.write(plan.last, &mut grads);
+            let last = plan.lean.write(plan.last, grads);
             plan.slots[plan.last].read(grad, last);
             mask(last, plan.kept.read(plan.last, values));
-            backward(plan, weights, values, marks, &mut wides, &mut grads, &mut sums);
+            backward(plan, weights, values, marks, work, grads, &mut sums);
         }
         sums
     });
@@ -56,7 +59,7 @@ fn zeros(plan: &Plan) -> Vec<Vec<Lanes>> {
 
 /// From the gradients of what a ReLU gave to those of what it got.
 fn mask(grads: &mut [f32], values: &[f32]) {
-    grads.iter_mut().zip(values).for_each(|(grad, &value)| *grad = relu_backward(value, *grad));
+    vectorized(|| grads.iter_mut().zip(values).for_each(|(grad, &value)| *grad = relu_backward(value, *grad)));
 }
 
 /// All steps for one image, from the last; the gradient of the image itself is not needed. `grads` is laid out as
@@ -66,7 +69,7 @@ fn backward(
     weights: &[Weights],
     values: &[f32],
     marks: &[u8],
-    wides: &mut [Vec<f32>],
+    Workspace { wides, points }: &mut Workspace,
     grads: &mut [f32],
     sums: &mut [Vec<Lanes>],
 ) {
@@ -76,32 +79,28 @@ fn backward(
             Step::Relu { layer, input, output } => {
                 mask(lean.write(output, grads), kept.read(output, values));
                 let (to, grad) = lean.two(input, output, grads);
-                layers[layer].add_gradients(kept.read(input, values), grad, &mut sums[layer]);
+                layers[layer].add_gradients(kept.read(input, values), grad, points, &mut sums[layer]);
                 if number > 0 {
-                    layers[layer].backward(grad, &weights[layer], to);
+                    layers[layer].backward(grad, &weights[layer], points, to);
                 }
             }
             Step::Pool { layer, input, output, wide, marks: from } => {
                 let (to, grad) = lean.two(input, output, grads);
                 let (buffer, grid, of) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
                 pool::backward(grad, of, &marks[from..][..of.numbers()], buffer, grid);
-                layers[layer].add_gradients(kept.read(input, values), buffer, &mut sums[layer]);
+                layers[layer].add_gradients(kept.read(input, values), buffer, points, &mut sums[layer]);
                 if number > 0 {
-                    layers[layer].backward(buffer, &weights[layer], to);
+                    layers[layer].backward(buffer, &weights[layer], points, to);
                 }
             }
             Step::Residual { layers: [layer0, layer1], x, relu, inner } => {
                 let (relu, hidden) = (kept.read(relu, values), kept.read(inner, values));
                 let (x, inside) = lean.two(x, inner, grads);
-                layers[layer1].add_gradients(hidden, x, &mut sums[layer1]);
-                layers[layer1].backward_same(x, &weights[layer1], |at, count, sums| {
-                    put(inside, at, count, sums, |grad, sum| *grad = sum);
-                });
+                layers[layer1].add_gradients(hidden, x, points, &mut sums[layer1]);
+                layers[layer1].backward_same(x, &weights[layer1], points, Write(inside));
                 mask(inside, hidden);
-                layers[layer0].add_gradients(relu, inside, &mut sums[layer0]);
-                layers[layer0].backward_same(inside, &weights[layer0], |at, count, sums| {
-                    add_where(x, at, count, sums, relu);
-                });
+                layers[layer0].add_gradients(relu, inside, points, &mut sums[layer0]);
+                layers[layer0].backward_same(inside, &weights[layer0], points, AddWhere(x, relu));
             }
         }
     }

@@ -1,9 +1,13 @@
 //! From images to features.
 
-use super::layer::{Weights, put};
+use super::kept_memory::KeptMemory;
+use super::layer::Weights;
 use super::plan::{Layout, Plan, Step};
 use super::pool;
 use super::relu;
+use super::store::{Add, Write, WriteRelu};
+use super::workspace::Workspace;
+use crate::nn::cpu::fast_math::vectorized;
 use rayon::prelude::*;
 
 /// Images that a thread takes at a time, at least.
@@ -13,7 +17,7 @@ const IMAGES: usize = 4;
 #[derive(Debug)]
 pub(super) struct SavedActivations {
     /// [`Plan::kept`] of each image.
-    pub(super) values: Vec<f32>,
+    pub(super) values: KeptMemory,
     /// The marks of each image.
     pub(super) marks: Vec<u8>,
 }
@@ -22,9 +26,9 @@ pub(super) struct SavedActivations {
 pub(super) fn features(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<f32> {
     let mut out = vec![0.0; images.len() / image_len(plan) * plan.features()];
     let work = out.par_chunks_mut(plan.features()).zip(images.par_chunks(image_len(plan))).with_min_len(IMAGES);
-    let scratch = || (wides(plan), vec![0.0; plan.lean.len], vec![0; plan.marks]);
-    work.for_each_init(scratch, |(wides, values, marks), (out, image)| {
-        forward(plan, &plan.lean, weights, image, wides, values, marks);
+    let scratch = || (Workspace::new(plan), vec![0.0; plan.lean.len], vec![0; plan.marks]);
+    work.for_each_init(scratch, |(work, values, marks), (out, image)| {
+        forward(plan, &plan.lean, weights, image, work, values, marks);
         write(plan, &plan.lean, values, out);
     });
     out
@@ -34,14 +38,17 @@ pub(super) fn features(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<
 pub(super) fn features_and_saved(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<f32>, SavedActivations) {
     let n = images.len() / image_len(plan);
     let mut out = vec![0.0; n * plan.features()];
-    let mut saved = SavedActivations { values: vec![0.0; n * plan.kept.len], marks: vec![0; n * plan.marks] };
+    let mut saved = SavedActivations { values: KeptMemory::take(n * plan.kept.len), marks: vec![0; n * plan.marks] };
     let images = images.par_chunks(image_len(plan)).with_min_len(IMAGES);
     let work = out.par_chunks_mut(plan.features()).zip(images);
     let work = work.zip(saved.values.par_chunks_mut(plan.kept.len).zip(saved.marks.par_chunks_mut(plan.marks)));
     work.for_each_init(
-        || wides(plan),
-        |wides, ((out, image), (values, marks))| {
-            forward(plan, &plan.kept, weights, image, wides, values, marks);
+        || Workspace::new(plan),
+        |work, ((out, image), (values, marks))| {
+            for (slot, grid) in plan.slots.iter().enumerate() {
+                grid.clear_border(plan.kept.write(slot, values));
+            }
+            forward(plan, &plan.kept, weights, image, work, values, marks);
             write(plan, &plan.kept, values, out);
         },
     );
@@ -50,11 +57,6 @@ pub(super) fn features_and_saved(plan: &Plan, weights: &[Weights], images: &[f32
 
 fn image_len(plan: &Plan) -> usize {
     plan.slots[0].numbers()
-}
-
-/// Memory for the stages before their pooling.
-pub(super) fn wides(plan: &Plan) -> Vec<Vec<f32>> {
-    plan.wides.iter().map(|grid| vec![0.0; grid.len()]).collect()
 }
 
 fn write(plan: &Plan, layout: &Layout, values: &[f32], out: &mut [f32]) {
@@ -67,7 +69,7 @@ fn forward(
     layout: &Layout,
     weights: &[Weights],
     image: &[f32],
-    wides: &mut [Vec<f32>],
+    Workspace { wides, points }: &mut Workspace,
     values: &mut [f32],
     marks: &mut [u8],
 ) {
@@ -76,29 +78,21 @@ fn forward(
         match *step {
             Step::Relu { layer, input, output } => {
                 let (x, y) = layout.two(input, output, values);
-                plan.layers[layer].forward(x, &weights[layer], |at, count, sums| {
-                    put(y, at, count, sums, |y, sum| *y = relu(sum));
-                });
+                plan.layers[layer].forward(x, &weights[layer], points, WriteRelu(y));
             }
             Step::Pool { layer, input, output, wide, marks: from } => {
                 let (x, y) = layout.two(input, output, values);
                 let (buffer, grid, to) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
-                plan.layers[layer].forward(x, &weights[layer], |at, count, sums| {
-                    put(buffer, at, count, sums, |y, sum| *y = sum);
-                });
+                plan.layers[layer].forward(x, &weights[layer], points, Write(buffer));
                 pool::forward(buffer, grid, y, to, &mut marks[from..][..to.numbers()]);
             }
             Step::Residual { layers: [layer0, layer1], x, relu: slot, inner } => {
                 let (from, to) = layout.two(x, slot, values);
-                from.iter().zip(to).for_each(|(x, y)| *y = relu(*x));
+                vectorized(|| from.iter().zip(to).for_each(|(x, y)| *y = relu(*x)));
                 let (from, to) = layout.two(slot, inner, values);
-                plan.layers[layer0].forward(from, &weights[layer0], |at, count, sums| {
-                    put(to, at, count, sums, |y, sum| *y = relu(sum));
-                });
+                plan.layers[layer0].forward(from, &weights[layer0], points, WriteRelu(to));
                 let (to, from) = layout.two(x, inner, values);
-                plan.layers[layer1].forward(from, &weights[layer1], |at, count, sums| {
-                    put(to, at, count, sums, |y, sum| *y += sum);
-                });
+                plan.layers[layer1].forward(from, &weights[layer1], points, Add(to));
             }
         }
     }

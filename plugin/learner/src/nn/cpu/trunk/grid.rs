@@ -38,6 +38,18 @@ impl Grid {
         (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.at(y, x))).collect()
     }
 
+    /// Writes zeros into the border, and behind the image.
+    pub(super) fn clear_border(self, values: &mut [f32]) {
+        let (side, row) = (self.border * self.channels, self.row());
+        let inside = self.border * row..(self.border + self.height) * row;
+        values[..inside.start].fill(0.0);
+        values[inside.end..self.len()].fill(0.0);
+        for row in values[inside].chunks_exact_mut(row.max(1)) {
+            row[..side].fill(0.0);
+            row[side + self.width * self.channels..].fill(0.0);
+        }
+    }
+
     /// The rows without the border.
     pub(super) fn rows(self, values: &[f32]) -> impl Iterator<Item = &[f32]> {
         (0..self.height).map(move |y| &values[self.at(y, 0)..][..self.width * self.channels])
@@ -84,6 +96,10 @@ mod tests {
         assert_eq!(values.iter().sum::<f32>(), 300.0);
         // The second channel of the pixel in row 1, column 2.
         assert_eq!(values[grid.at(1, 2) + 1], 19.0);
+        let mut dirty = vec![7.0; grid.len()];
+        grid.clear_border(&mut dirty);
+        grid.read(&image, &mut dirty);
+        assert_eq!(dirty, values, "whatever was there before");
         let inside: f32 = grid.places().iter().map(|&at| values[at] + values[at + 1]).sum();
         assert_eq!(inside, 300.0);
         let mut back = vec![0.0; 24];

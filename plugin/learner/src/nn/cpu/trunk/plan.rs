@@ -1,8 +1,9 @@
 //! What is computed for each image, and where in memory it is.
 
 use super::grid::Grid;
-use super::layer::{ConvShape, Layer};
+use super::layer::Layer;
 use super::pool::pooled;
+use super::shape::ConvShape;
 
 /// One stage of a trunk.
 #[derive(Clone, Copy, Debug)]
@@ -130,6 +131,10 @@ impl Plan {
                 Some(Step::Pool { layer, input, output: self.last, wide: self.wides.len() - 1, marks })
             }
             StageShape::Residual([shape0, shape1]) => {
+                // It changes its input in place, of which the backward pass of a ReLU needs to know what it was.
+                if matches!(self.steps.last(), Some(Step::Relu { .. })) {
+                    return None;
+                }
                 let x = self.slots[input];
                 let (layer0, inside) = self.layer(shape0, x)?;
                 let (layer1, output) = self.layer(shape1, inside)?;

@@ -1,8 +1,8 @@
 //! The stages of a trunk, and the way into it.
 
-use super::layer::ConvShape;
 use super::op;
 use super::plan::{Plan, StageShape};
+use super::shape::ConvShape;
 use crate::nn::Conv2d;
 use burn::tensor::Tensor;
 use std::sync::Arc;

@@ -1,5 +1,8 @@
 //! The trunk against burn's own operations, finite differences, other batches and other numbers of threads.
 
+use super::shape::ConvShape;
+use super::store::Write;
+use super::winograd::PointBuffers;
 use super::*;
 use crate::DeviceKind;
 use crate::nn::{Activation, Conv2d, host, max_pool, vector};
@@ -110,7 +113,9 @@ const SMALL: [Part; 4] = [Part::Pool(4), Part::Residual, Part::Residual, Part::P
 fn features_and_gradients_are_those_of_separate_operations() {
     let valid = [Part::Relu(5, 5, 3), Part::Relu(18, 2, 2), Part::Relu(33, 1, 1)];
     let wide = [Part::Same(17, 3), Part::Pool(20), Part::Residual];
-    let cases: [(&[Part], [usize; 4]); 9] = [
+    // Blocks of 16 channels and even sides: with fewer products.
+    let blocks = [Part::Pool(16), Part::Residual, Part::Pool(48), Part::Residual, Part::Same(32, 3)];
+    let cases: [(&[Part], [usize; 4]); 12] = [
         (&NATURE, [1, 3, 64, 64]),
         (&NATURE, [11, 4, 36, 45]),
         (&valid, [3, 2, 29, 23]),
@@ -120,6 +125,9 @@ fn features_and_gradients_are_those_of_separate_operations() {
         (&SMALL, [2, 1, 1, 1]),
         (&[Part::Residual, Part::Pool(2)], [2, 3, 4, 2]),
         (&wide, [2, 3, 9, 12]),
+        (&blocks, [3, 2, 16, 24]),
+        (&blocks, [9, 16, 4, 8]),
+        (&blocks, [2, 1, 40, 8]),
     ];
     for (parts, shape) in cases {
         let (net, pixels) = (Net::new(parts, shape[1]), images(shape));
@@ -132,7 +140,11 @@ fn features_and_gradients_are_those_of_separate_operations() {
             }
         }
     }
-    // Not made for it: a border without keeping the size. The encoders then take burn's operations.
+    // Not made for it: what a ReLU gave is needed again, and a block would change it.
+    let changed = Net::new(&[Part::Same(4, 3), Part::Residual], 1);
+    let stages = [Stage::Relu(&changed.convs[0]), Stage::Residual(&changed.convs[1], &changed.convs[2])];
+    assert!(features(&images([1, 1, 6, 6]), &stages).is_none());
+    // Nor for this: a border without keeping the size. The encoders then take burn's operations.
     let odd = Net::new(&[Part::Same(2, 5), Part::Pool(2)], 1);
     let unfit = odd.convs[1].clone().with_stride(2);
     let stages = [Stage::Relu(&odd.convs[0]), Stage::Relu(&unfit)];
@@ -173,7 +185,7 @@ fn gradients_are_slopes() {
 
 #[test]
 fn an_image_is_the_same_in_any_batch_and_on_any_number_of_threads() {
-    for (parts, side) in [(&NATURE[..], 40), (&SMALL[..], 20)] {
+    for (parts, side) in [(&NATURE[..], 40), (&SMALL[..], 20), (&[Part::Pool(16), Part::Residual], 24)] {
         let (net, pixels) = (Net::new(parts, 3), images([41, 3, side, side]));
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -207,5 +219,41 @@ fn what_is_no_number_is_not_hidden() {
         let pixels = Tensor::from_data(TensorData::new(pixels, [1, 1, 40, 40]), &DeviceKind::Flex.plain());
         let features = host(net.trunk(&pixels).inner()).expect("readable");
         assert!(features.iter().any(|x| x.is_nan()), "{parts:?}");
+    }
+}
+
+#[test]
+fn fewer_products_stay_near_the_numbers_of_double_precision() {
+    for (inputs, outputs, height, width) in [(16, 16, 2, 2), (32, 48, 6, 14), (48, 32, 10, 4), (64, 64, 8, 8)] {
+        let conv = ConvShape { inputs, outputs, kernel: 3, stride: 1, padding: 1 };
+        assert!(winograd::fits(conv, height, width));
+        let layer = layer::Layer::new(conv, height, width).expect("a convolution");
+        let params: Vec<f32> = normals(layer.params(), 11).iter().map(|x| x / (3.0 * inputs as f32).sqrt()).collect();
+        let image = normals(inputs * height * width, 12);
+        let mut x = vec![0.0; layer.input.len()];
+        layer.input.read(&image, &mut x);
+        let mut y = vec![0.0; layer.output.len()];
+        layer.forward(&x, &layer.weights(&params, false), &mut PointBuffers::default(), Write(&mut y));
+        let mut got = vec![0.0; outputs * height * width];
+        layer.output.write(&y, &mut got, |x| x);
+        let (weights, bias) = params.split_at(outputs * inputs * 9);
+        let exact = |o: usize, row: usize, column: usize| -> f64 {
+            let mut sum = f64::from(bias[o]);
+            for (number, weight) in weights[o * inputs * 9..][..inputs * 9].iter().enumerate() {
+                let (i, dy, dx) = (number / 9, number % 9 / 3, number % 3);
+                let (row, column) = (row + dy, column + dx);
+                if (1..=height).contains(&row) && (1..=width).contains(&column) {
+                    sum += f64::from(*weight) * f64::from(image[(i * height + row - 1) * width + column - 1]);
+                }
+            }
+            sum
+        };
+        let want: Vec<f64> =
+            (0..got.len()).map(|n| exact(n / (height * width), n / width % height, n % width)).collect();
+        let size = want.iter().fold(0.0f64, |size, x| size.max(x.abs()));
+        for (got, want) in got.iter().zip(&want) {
+            let error = (f64::from(*got) - want).abs() / size;
+            assert!(error < 1e-6, "{inputs} to {outputs}, {height} x {width}: {got} is not {want}");
+        }
     }
 }

@@ -1,5 +1,5 @@
-//! The two loops in which all the time goes: sums of products for a few pixels and 16 channels at once, so that the
-//! sums stay in registers.
+//! Sums of products for a few pixels and 16 channels at once, so that the sums stay in registers: where most of the time
+//! goes.
 //!
 //! Each sum is made by fused multiply-adds in an order of its own: it does not depend on what else is in the tile, on
 //! the width of vectors, or on threads.
@@ -8,12 +8,10 @@ use macerator::{Scalar, Simd, VFma};
 
 /// Channels at a time.
 pub(super) const LANES: usize = 16;
-/// Pixels (or weights) at a time: with two vectors of 8 lanes each, the sums take 12 of 16 registers.
-const ROWS: usize = 6;
-/// Pixels at a time where a vector has all lanes and there are 32 registers; more leave too few for their addresses.
-const WIDE_ROWS: usize = 8;
-/// Pixels after which [`outer`] goes on to other weights, while these pixels are in the first-level cache.
-const BLOCK: usize = 128;
+/// Rows at a time: with two vectors of 8 lanes each, the sums take 12 of 16 registers.
+pub(super) const ROWS: usize = 6;
+/// Rows at a time where a vector has all lanes and there are 32 registers; more leave too few for their addresses.
+pub(super) const WIDE_ROWS: usize = 8;
 
 /// A number for each of [`LANES`] channels.
 pub(super) type Lanes = [f32; LANES];
@@ -73,8 +71,15 @@ pub(super) fn correlate<S: Simd, F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &
 
 /// Whether a vector has room for all lanes; then there are 32 of them.
 #[inline(always)]
-fn is_wide<S: Simd>() -> bool {
+pub(super) fn is_wide<S: Simd>() -> bool {
     f32::lanes::<S>() >= LANES
+}
+
+/// The channels that begin at a place.
+#[inline(always)]
+pub(super) fn lanes_at(x: &[f32], at: usize) -> &Lanes {
+    let Some(lanes) = x[at..].first_chunk::<LANES>() else { unreachable!("images have slack behind their last pixel") };
+    lanes
 }
 
 /// The sums of all windows for a block, tile by tile.
@@ -126,8 +131,9 @@ fn pair_strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     }
 }
 
+/// x y + z, rounded once where the machine can.
 #[inline(always)]
-fn fused<S: Simd>(x: f32, y: f32, z: f32) -> f32 {
+pub(super) fn fused<S: Simd>(x: f32, y: f32, z: f32) -> f32 {
     if f32::is_accelerated::<S>() { x.mul_add(y, z) } else { x * y + z }
 }
 
@@ -185,72 +191,4 @@ fn pair_sums<S: Simd, const P: usize>(
         }
     }
     (one, other)
-}
-
-/// Adds to `sums` the products of each window's numbers with the `channels` numbers of `y` that go with the window,
-/// summed over the windows: the gradient of [`correlate`]'s weights, in their order.
-#[macerator::with_simd]
-pub(super) fn outer<S: Simd>(
-    x: &[f32],
-    starts: &[usize],
-    window: Window,
-    y: &[f32],
-    places: &[usize],
-    sums: &mut [Lanes],
-) {
-    {
-        for (starts, places) in starts.chunks(BLOCK).zip(places.chunks(BLOCK)) {
-            for (block, sums) in sums.chunks_exact_mut(window.count * window.len).enumerate() {
-                for (piece, sums) in sums.chunks_exact_mut(window.len).enumerate() {
-                    for (tile, sums) in sums.chunks_mut(ROWS).enumerate() {
-                        let x = &x[piece * window.step + tile * ROWS..];
-                        tile_outer::<S>(x, starts, &y[block * LANES..], places, sums);
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn tile_outer<S: Simd>(x: &[f32], starts: &[usize], y: &[f32], places: &[usize], sums: &mut [Lanes]) {
-    let mut tile = [[0.0; LANES]; ROWS];
-    for p in 0..ROWS {
-        if p < sums.len() {
-            tile[p] = sums[p];
-        }
-    }
-    for (&start, &place) in starts.iter().zip(places) {
-        let (Some(x), Some(y)) = (x[start..].first_chunk::<ROWS>(), y[place..].first_chunk::<LANES>()) else {
-            unreachable!("images have slack behind their last pixel");
-        };
-        for p in 0..ROWS {
-            for j in 0..LANES {
-                tile[p][j] = fused::<S>(x[p], y[j], tile[p][j]);
-            }
-        }
-    }
-    for p in 0..ROWS {
-        if p < sums.len() {
-            sums[p] = tile[p];
-        }
-    }
-}
-
-/// Adds the `channels` numbers at each of `places` to `sums`.
-#[macerator::with_simd]
-#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
-pub(super) fn column_sums<S: Simd>(y: &[f32], places: &[usize], sums: &mut [Lanes]) {
-    {
-        for (block, sums) in sums.iter_mut().enumerate() {
-            let y = &y[block * LANES..];
-            let mut total = *sums;
-            for &place in places {
-                if let Some(y) = y[place..].first_chunk::<LANES>() {
-                    total.iter_mut().zip(y).for_each(|(sum, y)| *sum += y);
-                }
-            }
-            *sums = total;
-        }
-    }
 }

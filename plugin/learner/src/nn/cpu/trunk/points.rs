@@ -1,0 +1,193 @@
+//! The transforms of [`winograd`](super::winograd), of 16 channels at a time.
+
+use super::grid::Grid;
+use super::products::Matrices;
+use super::store::Store;
+use super::tile::{LANES, Lanes, lanes_at};
+use macerator::Simd;
+use std::ops::Range;
+
+/// Numbers of a transformed tile: 4×4 points.
+pub(super) const POINTS: usize = 16;
+/// A side of it.
+const SIDE: usize = 4;
+/// Some rows of the tiles of an image.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Strip {
+    first: usize,
+    count: usize,
+    across: usize,
+}
+
+/// Numbers of a point in a strip, about: the points of a strip stay in the cache.
+const NUMBERS: usize = 1024;
+
+impl Strip {
+    /// The strips of an image; all but the last have the same size. `channels` are those of what has more of them.
+    pub(super) fn of(grid: Grid, channels: usize) -> impl Iterator<Item = Self> {
+        let (down, across) = (grid.height / 2, grid.width / 2);
+        let most = (NUMBERS / (across * channels).max(1)).clamp(1, down.max(1));
+        (0..down).step_by(most).map(move |first| Self { first, count: most.min(down - first), across })
+    }
+
+    /// The points of its tiles: a matrix for each, which has a block more than it needs, or the points of a tile would fall on
+    /// the same lines of the cache.
+    pub(super) fn matrices(self, channels: usize) -> Matrices {
+        let rows = self.count * self.across;
+        Matrices { rows, columns: channels, step: rows * channels + LANES }
+    }
+
+    fn rows(self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+}
+
+#[inline(always)]
+fn plus(one: &Lanes, other: &Lanes) -> Lanes {
+    let mut to = [0.0; LANES];
+    for l in 0..LANES {
+        to[l] = one[l] + other[l];
+    }
+    to
+}
+
+#[inline(always)]
+fn minus(one: &Lanes, other: &Lanes) -> Lanes {
+    let mut to = [0.0; LANES];
+    for l in 0..LANES {
+        to[l] = one[l] - other[l];
+    }
+    to
+}
+
+/// Bᵀd of a column: (d₀ − d₂, d₁ + d₂, d₂ − d₁, d₁ − d₃).
+#[inline(always)]
+fn seen([d0, d1, d2, d3]: [&Lanes; SIDE]) -> [Lanes; SIDE] {
+    [minus(d0, d2), plus(d1, d2), minus(d2, d1), minus(d1, d3)]
+}
+
+/// [`seen`] of the column of pixels below the one at a place.
+#[inline(always)]
+fn column(x: &[f32], at: usize, row: usize) -> [Lanes; SIDE] {
+    let x = &x[at..];
+    seen([lanes_at(x, 0), lanes_at(x, row), lanes_at(x, 2 * row), lanes_at(x, 3 * row)])
+}
+
+/// Bᵀ d B of the 4×4 pixels that each 2×2 pixels of a convolution see: `v` gets, point by point, tile by tile, the channels.
+/// `x` lies in `grid`, with its border.
+#[macerator::with_simd]
+#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
+pub(super) fn transform_seen<S: Simd>(x: &[f32], grid: Grid, strip: Strip, v: &mut [f32]) {
+    {
+        let (channels, row) = (grid.channels, grid.row());
+        let (across, step) = (strip.across, strip.matrices(channels).step);
+        for (number, ty) in strip.rows().enumerate() {
+            for first in (0..channels).step_by(LANES) {
+                let from = 2 * ty * row + first;
+                // Half of the columns belong to the next tile, too.
+                let (mut c0, mut c1) = (column(x, from, row), column(x, from + channels, row));
+                for tx in 0..across {
+                    let at = from + (2 * tx + 2) * channels;
+                    let (c2, c3) = (column(x, at, row), column(x, at + channels, row));
+                    let to = &mut v[(number * across + tx) * channels + first..][..(POINTS - 1) * step + LANES];
+                    for i in 0..SIDE {
+                        let points = seen([&c0[i], &c1[i], &c2[i], &c3[i]]);
+                        for j in 0..SIDE {
+                            to[(i * SIDE + j) * step..][..LANES].copy_from_slice(&points[j]);
+                        }
+                    }
+                    (c0, c1) = (c2, c3);
+                }
+            }
+        }
+    }
+}
+
+/// A y of a column: (y₀, y₀ + y₁, y₀ − y₁, −y₁).
+#[inline(always)]
+fn splanes_at(y0: &Lanes, y1: &Lanes) -> [Lanes; SIDE] {
+    [*y0, plus(y0, y1), minus(y0, y1), minus(&[0.0; LANES], y1)]
+}
+
+/// A g Aᵀ of each 2×2 pixels of a gradient: `v` gets, point by point, tile by tile, the channels. `grad` lies in `grid`.
+#[macerator::with_simd]
+#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
+pub(super) fn transform_gradient<S: Simd>(grad: &[f32], grid: Grid, strip: Strip, v: &mut [f32]) {
+    {
+        let (channels, row) = (grid.channels, grid.row());
+        let (across, step) = (strip.across, strip.matrices(channels).step);
+        for (number, ty) in strip.rows().enumerate() {
+            for tx in 0..across {
+                for first in (0..channels).step_by(LANES) {
+                    let from = &grad[grid.at(2 * ty, 2 * tx) + first..];
+                    let left = splanes_at(lanes_at(from, 0), lanes_at(from, row));
+                    let right = splanes_at(lanes_at(from, channels), lanes_at(from, row + channels));
+                    let to = &mut v[(number * across + tx) * channels + first..][..(POINTS - 1) * step + LANES];
+                    for i in 0..SIDE {
+                        let points = splanes_at(&left[i], &right[i]);
+                        for j in 0..SIDE {
+                            to[(i * SIDE + j) * step..][..LANES].copy_from_slice(&points[j]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Aᵀm of a column: (m₀ + m₁ + m₂, m₁ − m₂ − m₃).
+#[inline(always)]
+fn gathered([m0, m1, m2, m3]: [&Lanes; SIDE]) -> [Lanes; 2] {
+    let (mut top, mut bottom) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        top[l] = m0[l] + m1[l] + m2[l];
+    }
+    for l in 0..LANES {
+        bottom[l] = m1[l] - m2[l] - m3[l];
+    }
+    [top, bottom]
+}
+
+/// [`gathered`] of a column of a tile's points.
+#[inline(always)]
+fn gathered_column(m: &[f32], j: usize, step: usize) -> [Lanes; 2] {
+    let point = [j, SIDE + j, 2 * SIDE + j, 3 * SIDE + j];
+    gathered([
+        lanes_at(m, point[0] * step),
+        lanes_at(m, point[1] * step),
+        lanes_at(m, point[2] * step),
+        lanes_at(m, point[3] * step),
+    ])
+}
+
+/// Aᵀ m A of each tile, with the bias of its block: `store` gets the sums by places in `grid`.
+#[macerator::with_simd]
+#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
+pub(super) fn transform_back<S: Simd, F: Fn(usize) -> Lanes, T: Store>(
+    m: &[f32],
+    grid: Grid,
+    strip: Strip,
+    bias: F,
+    store: &mut T,
+) {
+    {
+        let (channels, row) = (grid.channels, grid.row());
+        let (across, step) = (strip.across, strip.matrices(channels).step);
+        for block in 0..channels / LANES {
+            let bias = bias(block);
+            for (number, ty) in strip.rows().enumerate() {
+                for tx in 0..across {
+                    let m = &m[(number * across + tx) * channels + block * LANES..][..(POINTS - 1) * step + LANES];
+                    let (c0, c1) = (gathered_column(m, 0, step), gathered_column(m, 1, step));
+                    let (c2, c3) = (gathered_column(m, 2, step), gathered_column(m, 3, step));
+                    let at = grid.at(2 * ty, 2 * tx) + block * LANES;
+                    for y in 0..2 {
+                        let [left, right] = gathered([&c0[y], &c1[y], &c2[y], &c3[y]]);
+                        store.store(at + y * row, LANES, &plus(&left, &bias));
+                        store.store(at + y * row + channels, LANES, &plus(&right, &bias));
+                    }
+                }
+            }
+        }
+    }
+}

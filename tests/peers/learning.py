@@ -1,0 +1,163 @@
+"""Times learning steps of this project and of PyTorch in turn, on the same cores.
+
+The networks, sizes and losses are the same; ours also make a step of Adam. PyTorch has its best settings: channels last,
+one thread per core, and an allocator that keeps its memory (set by `run`).
+"""
+
+import argparse
+import json
+import platform
+import re
+import statistics
+import subprocess
+import time
+from pathlib import Path
+
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+# Seconds for which a case is timed in a round, after the warm-up.
+SECONDS = 3.0
+
+
+class Block(nn.Module):
+    """x + conv1(relu(conv0(relu(x))))."""
+
+    def __init__(self, channels):
+        super().__init__()
+        self.conv0 = nn.Conv2d(channels, channels, 3, padding=1)
+        self.conv1 = nn.Conv2d(channels, channels, 3, padding=1)
+
+    def forward(self, x):
+        return x + self.conv1(F.relu(self.conv0(F.relu(x))))
+
+
+class Stage(nn.Module):
+    """A convolution, max-pooling, and two residual blocks."""
+
+    def __init__(self, inputs, outputs):
+        super().__init__()
+        self.conv = nn.Conv2d(inputs, outputs, 3, padding=1)
+        self.blocks = nn.Sequential(Block(outputs), Block(outputs))
+
+    def forward(self, x):
+        return self.blocks(F.max_pool2d(self.conv(x), 3, 2, 1))
+
+
+def impala():
+    return nn.Sequential(
+        Stage(3, 16), Stage(16, 32), Stage(32, 32), nn.ReLU(), nn.Flatten(), nn.Linear(32 * 8 * 8, 256), nn.ReLU()
+    )
+
+
+def nature():
+    return nn.Sequential(
+        nn.Conv2d(3, 32, 8, 4), nn.ReLU(), nn.Conv2d(32, 64, 4, 2), nn.ReLU(), nn.Conv2d(64, 64, 3, 1), nn.ReLU(),
+        nn.Flatten(), nn.Linear(64 * 4 * 4, 512), nn.ReLU(),
+    )
+
+
+def mlp():
+    return nn.Sequential(nn.Linear(37, 200), nn.Tanh(), nn.Linear(200, 200), nn.Tanh(), nn.Linear(200, 8))
+
+
+def image_case(make, batch, step):
+    net = make().to(memory_format=torch.channels_last)
+    pixels = torch.randint(0, 256, (batch, 3, 64, 64), dtype=torch.uint8)
+    pixels = pixels.contiguous(memory_format=torch.channels_last)
+    with torch.no_grad():
+        target = torch.randn_like(net(pixels.float() / 255))
+
+    def run():
+        x = pixels.float() / 255
+        if step:
+            net.zero_grad(set_to_none=True)
+            F.mse_loss(net(x), target).backward()
+        else:
+            with torch.inference_mode():
+                net(x).sum().item()
+
+    return run
+
+
+def mlp_case(batch):
+    net, x, target = mlp(), torch.randn(batch, 37), torch.randn(batch, 8)
+
+    def run():
+        net.zero_grad(set_to_none=True)
+        F.mse_loss(net(x), target).backward()
+
+    return run
+
+
+# Names are those of our benchmark.
+CASES = {
+    "features/impala/64": lambda: image_case(impala, 64, False),
+    "step/impala/64": lambda: image_case(impala, 64, True),
+    "step/impala/256": lambda: image_case(impala, 256, True),
+    "features/nature/64": lambda: image_case(nature, 64, False),
+    "step/nature/64": lambda: image_case(nature, 64, True),
+    "step/nature/256": lambda: image_case(nature, 256, True),
+    "step/nature/2048": lambda: image_case(nature, 2048, True),
+    "step/mlp-37-200-200-8/64": lambda: mlp_case(64),
+    "step/mlp-37-200-200-8/512": lambda: mlp_case(512),
+}
+
+
+def theirs(case):
+    """Milliseconds of the median repetition."""
+    run = CASES[case]()
+    begin = time.perf_counter()
+    while time.perf_counter() - begin < 1.0:
+        run()
+    times = []
+    begin = time.perf_counter()
+    while time.perf_counter() - begin < SECONDS or len(times) < 3:
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return 1e3 * statistics.median(times)
+
+
+def ours(bench, case):
+    """Milliseconds of the middle of criterion's estimate."""
+    words = [bench, "--bench", "--exact", case, "--noplot", "--warm-up-time", "1", "--measurement-time", str(SECONDS)]
+    told = subprocess.run([*words, "--sample-size", "10"], capture_output=True, text=True, check=True).stdout
+    found = re.search(r"time:\s+\[\S+ \S+ (\S+) (\S+) ", told)
+    if not found:
+        raise SystemExit(f"the benchmark has no case {case}: {told}")
+    return float(found[1]) * {"ns": 1e-6, "µs": 1e-3, "us": 1e-3, "ms": 1.0, "s": 1e3}[found[2]]
+
+
+def machine():
+    names = re.findall(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
+    return f"{names[0] if names else platform.processor()}, {torch.get_num_threads()} cores"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("bench", help="the built benchmark `training` of playbot_learner")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--case", default="", help="only cases whose names contain this")
+    parser.add_argument("--json", type=Path, help="file for all times")
+    args = parser.parse_args()
+    cases = [case for case in CASES if args.case in case]
+    times = {case: {"ours": [], "theirs": []} for case in cases}
+    for number in range(args.rounds):
+        for case in cases:
+            times[case]["ours"].append(ours(args.bench, case))
+            times[case]["theirs"].append(theirs(case))
+            print(f"round {number + 1}: {case}: ours {times[case]['ours'][-1]:.2f} ms, "
+                  f"PyTorch {times[case]['theirs'][-1]:.2f} ms", flush=True)
+    print(f"\n{machine()}, PyTorch {torch.__version__}, medians of {args.rounds} rounds in turn\n")
+    print("| case | ours, ms | PyTorch, ms | PyTorch / ours |\n|---|---|---|---|")
+    for case in cases:
+        mine, other = (statistics.median(times[case][who]) for who in ("ours", "theirs"))
+        print(f"| {case} | {mine:.2f} | {other:.2f} | {other / mine:.2f} |")
+    if args.json:
+        args.json.write_text(json.dumps({"machine": machine(), "torch": torch.__version__, "times": times}, indent=1))
+
+
+if __name__ == "__main__":
+    main()
