@@ -37,18 +37,22 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivatio
         sums
     });
     let parts: Vec<Vec<Vec<Lanes>>> = parts.collect();
-    let mut total = zeros(plan);
-    for part in &parts {
-        let pairs = total.iter_mut().flatten().flatten().zip(part.iter().flatten().flatten());
-        pairs.for_each(|(sum, x)| *sum += x);
-    }
     let mut params = vec![0.0; plan.layers.iter().map(Layer::params).sum()];
     let mut rest = &mut params[..];
-    for (layer, sums) in plan.layers.iter().zip(&total) {
+    let mut of_layers = Vec::new();
+    for layer in &plan.layers {
         let (of_layer, others) = rest.split_at_mut(layer.params());
-        layer.gradients(sums, of_layer);
+        of_layers.push(of_layer);
         rest = others;
     }
+    plan.layers.par_iter().zip(of_layers).enumerate().for_each(|(number, (layer, params))| {
+        let mut total = vec![[0.0; LANES]; layer.sums()];
+        for part in &parts {
+            let pairs = total.as_flattened_mut().iter_mut().zip(part[number].as_flattened());
+            vectorized(|| pairs.for_each(|(sum, x)| *sum += x));
+        }
+        layer.gradients(&total, params);
+    });
     params
 }
 

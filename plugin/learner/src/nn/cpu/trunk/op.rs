@@ -11,6 +11,7 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, DispatchDevice, Flex, TensorMetadata, backend_extension};
 use burn::tensor::{Device, Tensor};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -94,10 +95,12 @@ impl<B: Trunks + HostNumbers> Backward<B, 1> for Convolutions {
 }
 
 fn weights(plan: &Plan, mut params: &[f32], backward: bool) -> Vec<Weights> {
-    let weights = plan.layers.iter().map(|layer| {
+    let mut of_layers = Vec::new();
+    for layer in &plan.layers {
         let (own, rest) = params.split_at(layer.params());
+        of_layers.push(own);
         params = rest;
-        layer.weights(own, backward)
-    });
+    }
+    let weights = plan.layers.par_iter().zip(of_layers).map(|(layer, params)| layer.weights(params, backward));
     weights.collect()
 }
