@@ -6,8 +6,8 @@ use playbot_lab::{
     game::Game,
     report::{PlainTable, readable, whole},
     verdict::{
-        AGAINST, Comparison, JUNIT, LevelOutcome, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal,
-        TesterVerdict, Trials, wilson, write_reports,
+        AGAINST, Comparison, JUNIT, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal, Trials, wilson,
+        write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -93,20 +93,7 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
 fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
     let findings = overview.worst.iter().flat_map(|level| &level.findings);
     let files = findings.filter_map(|finding| finding.file.as_ref()).take(MOST_REPLAYS);
-    let seen: Vec<String> =
-        files.map(|file| format!("see it: {} replay {}", program::name(), folder.join(file).display())).collect();
-    if seen.is_empty() && overview.worst.iter().any(could_be_kept) {
-        return vec![
-            "to see how a level fails, call this with --keep-failures: it writes the failed episode".to_owned(),
-        ];
-    }
-    seen
-}
-
-/// Whether `--keep-failures` writes an episode of a level: see [`FindingArgs`](super::findings::FindingArgs).
-fn could_be_kept(level: &LevelVerdict) -> bool {
-    let has_failed = |tester: &TesterVerdict| tester.exact && tester.score.solved < tester.score.episodes;
-    level.outcome == LevelOutcome::BotFailed && level.testers.iter().any(has_failed)
+    files.map(|file| format!("see it: {} replay {}", program::name(), folder.join(file).display())).collect()
 }
 
 fn counts(overview: &Overview) -> String {

@@ -39,15 +39,23 @@ impl Determinism {
         let most = self.ticks as usize;
         let (mut played, mut now) = (Vec::new(), Played::default());
         for _ in 0..episodes * most {
+            if (level.stop)() {
+                return Err(Fault("somebody asked to stop".to_owned()));
+            }
             let is_active = probe.tick()?;
             let finished = probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished as usize);
+            let is_last = finished == episodes;
             if finished > played.len() {
+                // What comes after the last tick of an episode is that of the next one, if there is one.
+                if is_last && now.hashes.len() < most {
+                    now.hashes.push(hash(&probe.world, probe.agent));
+                }
                 now.is_over = true;
                 played.push(std::mem::take(&mut now));
             } else if now.hashes.len() < most && !is_loading(&probe) {
                 now.hashes.push(hash(&probe.world, probe.agent));
             }
-            if !is_active || played.len() == episodes {
+            if !is_active || is_last {
                 break;
             }
         }
@@ -58,14 +66,14 @@ impl Determinism {
     /// What is not the same when a tester plays its first episode again.
     fn difference(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>) -> Option<(u32, String)> {
         // A game that breaks is found by others.
-        let one = self.play(level, tester, self.episodes as usize).ok()?;
-        let other = self.play(level, tester, 1).ok()?;
-        let first = one.first()?;
-        if let Some(tick) = first.difference(other.first()?) {
+        let (one, other) = (self.play(level, tester, 1).ok()?, self.play(level, tester, 1).ok()?);
+        if let Some(tick) = one.first()?.difference(other.first()?) {
             let message = "the episode was another one when it was played again; `playbot doctor` names what differs";
             return Some((tick, message.to_owned()));
         }
-        let later = one.iter().enumerate().skip(1);
+        // One more, whose end is not looked at as that of the others is not.
+        let row = self.play(level, tester, self.episodes as usize + 1).ok()?;
+        let (first, later) = (row.first()?, row.iter().enumerate().take(self.episodes as usize).skip(1));
         let (number, tick) = later.filter_map(|(number, played)| Some((number, first.difference(played)?))).next()?;
         let message = format!(
             "episode {} of a World was another one than the first, though it began from the same seed: something is left \

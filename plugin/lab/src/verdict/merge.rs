@@ -28,8 +28,10 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
         let shard = lines.record().shard.ok_or_else(|| TestError::NotAShard(folder.clone()))?;
         shards.push((folder, shard, lines));
     }
+    // What only the first one says must not depend on the order of the folders.
     let Some((first, count, record)) = shards
-        .first()
+        .iter()
+        .min_by_key(|(_, shard, _)| shard.index)
         .map(|(folder, shard, lines)| (*folder, shard.count, TestRecord { shard: None, ..lines.record().clone() }))
     else {
         return Err(TestError::Missing(Vec::new()));
