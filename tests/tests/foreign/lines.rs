@@ -26,17 +26,18 @@ fn files(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// What the benchmark of testers plants into a game, which takes no part in playing or testing it.
-const DEFECTS: &str = "src/defects.rs";
+/// Modules that take no part in playing: what the benchmark of testers plants into a game, and a detector that knows its rules.
+const APART: [&str; 2] = ["defects", "rules"];
 
-/// Lines that say something: not blank, no comment, no import, not closing brackets only, not the name of [`DEFECTS`].
+/// Lines that say something: not blank, no comment, no import, not closing brackets only, not the name of one of [`APART`].
 fn lines_that_count(source: &str) -> Vec<&str> {
     let mut in_use = false;
     let mut counted = Vec::new();
     for line in source.lines().map(str::trim) {
         in_use |= line.starts_with("use ");
         let closes = line.chars().all(|c| ")]};,".contains(c));
-        if !in_use && !closes && !line.starts_with("//") && line != "mod defects;" {
+        let is_apart = APART.iter().any(|name| line == format!("mod {name};"));
+        if !in_use && !closes && !line.starts_with("//") && !is_apart {
             counted.push(line);
         }
         in_use &= !line.ends_with(';');
@@ -46,7 +47,7 @@ fn lines_that_count(source: &str) -> Vec<&str> {
 
 #[test]
 fn blank_lines_comments_imports_and_closing_brackets_do_not_count() {
-    let source = "//! A game.\nmod defects;\n\nuse std::{\n    fs,\n};\n\
+    let source = "//! A game.\nmod defects;\nmod rules;\n\nuse std::{\n    fs,\n};\n\
                   fn main() {\n    play([\n        1, // one\n    ]);\n}\n";
     assert_eq!(lines_that_count(source), ["fn main() {", "play([", "1, // one"]);
 }
@@ -68,9 +69,10 @@ fn all_of_an_adapter_is_in_its_main() {
     for game in GAMES {
         let folder = crate_of(game);
         let others = files(&folder).into_iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs"));
-        // Tests of its verbs are no part of an adapter, and neither are planted defects.
+        // Tests of its verbs are no part of an adapter, either.
         let is_apart = |path: &PathBuf| {
-            ["src/main.rs", DEFECTS].iter().any(|name| path.ends_with(name)) || path.starts_with(folder.join("tests"))
+            let is_named = |name: &&str| path.ends_with(format!("src/{name}.rs"));
+            ["main"].iter().chain(&APART).any(is_named) || path.starts_with(folder.join("tests"))
         };
         for path in others.filter(|path| !is_apart(path)) {
             assert!(!read(&path).contains("playbot"), "{} knows of the plugin", path.display());

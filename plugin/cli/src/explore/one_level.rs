@@ -11,9 +11,14 @@ pub fn one_level(text: &str) -> Result<LevelSplit, String> {
     text.parse::<LevelSplit>().map_err(|error| match error {
         SplitError::NotARange(_) => {
             // Numbers and files are no modes.
-            let is_mode = |mode: &&str| mode.starts_with(char::is_alphabetic) && !mode.contains(['.', '/', '\\']);
+            let is_file = text.contains(['.', '/', '\\']);
+            let is_mode = |mode: &&str| mode.starts_with(char::is_alphabetic) && !is_file;
             let mode = text.split(':').next().filter(is_mode).unwrap_or("MODE");
-            let file = if text.ends_with(".json") { format!(", or files:{text}") } else { String::new() };
+            let file = match (is_file, text.ends_with(".json")) {
+                (_, true) => format!(", or files:{text}"),
+                (true, false) => ", or a level file, which is JSON, such as files:levels/a.json".to_owned(),
+                (false, false) => String::new(),
+            };
             format!("`{text}` names no level: write its mode and its number, such as {mode}:7{file}")
         }
         other => other.to_string(),
@@ -34,6 +39,8 @@ mod tests {
             (":3", "MODE:7"),
             ("7", "MODE:7"),
             ("levels/a.json", "MODE:7, or files:levels/a.json"),
+            ("C:\\levels\\a.json", "MODE:7, or files:C:\\levels\\a.json"),
+            ("a.txt", "MODE:7, or a level file, which is JSON, such as files:levels/a.json"),
         ] {
             let error = one_level(text).expect_err(text);
             assert!(error.contains(&format!("`{text}` names no level")) && error.ends_with(example), "{error}");

@@ -107,6 +107,11 @@ pub(super) fn all(game: &dyn Game) -> Vec<Known> {
     known
 }
 
+/// Whether the detector with this name compares what several testers did.
+pub(crate) fn compares_testers(name: &str) -> bool {
+    general().any(|known| matches!(known, Known::Level(known) if known.name() == name && known.compares_testers()))
+}
+
 /// Names of the detectors that only this game has.
 pub(crate) fn own_detectors(game: &dyn Game) -> Vec<String> {
     let is_general = |name: &str| general().any(|known| known.name() == name);

@@ -41,6 +41,10 @@ impl LevelDetector for ClockEnd {
         ]
     }
 
+    fn compares_testers(&self) -> bool {
+        true
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(longest) = level.episodes().map(|(_, _, result)| result.ticks).max() else { return Vec::new() };
         let is_last = move |result: &EpisodeResult| result.ticks == longest && !result.success;
@@ -68,6 +72,7 @@ impl LevelDetector for ClockEnd {
             tester: Some(tester.to_owned()),
             episode: Some(episode),
             tick: longest.checked_sub(1),
+            settings: Vec::new(),
             message: format!(
                 "{} episodes are lost after {longest} ticks at different places, and none lasts longer",
                 places.len()

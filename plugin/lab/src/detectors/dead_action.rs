@@ -1,30 +1,28 @@
 //! Actions that never do anything.
 
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue},
-    episode::{Episode, EpisodeCount},
+    action::{ActionSpace, ActionValue},
     fault::Fault,
-    vision::ObservationConfig,
 };
 
 use super::{
-    determinism::hash_of_state,
     level_detector::{LevelDefect, LevelDetector, TestedBy, TestedLevel},
-    probe::Probe,
+    script::{Course, Script},
 };
 use crate::{
     detector::Setting,
-    eval::Player,
+    explore::CellGrid,
     game::Game,
     idle::{idle_action, is_named_idle},
 };
 
-/// An action that does what doing nothing does, wherever it is tried in an episode that was solved: who is stuck somewhere
-/// says nothing of actions.
+/// An action that does what doing nothing does, wherever it is tried in an episode.
 ///
 /// Actions are tried at a few moments of the episode, each held for some ticks; an episode in which these would overlap is
-/// too short to say anything. What an action does must show in the state hash, the observation or the reward. Games have
-/// actions that do nothing in some levels, and some have such that never do, so it is not usual.
+/// too short to say anything. What an action does must show in the state hash, the observation or the reward. Who is stuck
+/// somewhere says nothing of actions: the episode is one that was solved, or, on a level that nobody solves, the best paid
+/// one, if its agent was at different places at these moments. Games have actions that do nothing in some levels, and some
+/// have such that never do, so it is not usual.
 pub struct DeadAction {
     every: f64,
     moments: f64,
@@ -55,35 +53,51 @@ impl LevelDetector for DeadAction {
     }
 
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
-        let solver = level.testers.iter().find(|tester| has_solved(tester));
-        let Some(tester) = solver.filter(|_| level.is_sample(self.every)) else { return Vec::new() };
+        let Some(tester) = teller(level).filter(|_| level.is_sample(self.every)) else { return Vec::new() };
         // A game that breaks is found by others.
-        let dead = self.dead(&Script::new(level, tester)).unwrap_or_default();
+        let has_solved = level.episodes().any(|(_, _, result)| result.success);
+        let dead = self.dead(&Script::new(level, tester), has_solved).unwrap_or_default();
         let defect = |name: String| LevelDefect {
             tester: Some(tester.name.to_owned()),
             episode: Some(0),
             tick: None,
+            settings: Vec::new(),
             message: format!("{name} does what doing nothing does, wherever it was tried in the episode"),
         };
         dead.into_iter().map(defect).collect()
     }
 }
 
-fn has_solved(tester: &TestedBy<'_>) -> bool {
-    tester.episodes.iter().any(|(number, result)| *number == 0 && result.success)
+/// Whose first episode is looked at: that of the first tester that solved the level in it, or, if nobody did in any, of the
+/// best paid one.
+fn teller<'a, 'b>(level: &'b TestedLevel<'a>) -> Option<&'b TestedBy<'a>> {
+    let first = |tester: &'b TestedBy<'a>| tester.episodes.iter().find(|(number, _)| *number == 0);
+    let firsts = || level.testers.iter().filter_map(|tester| Some((tester, &first(tester)?.1)));
+    if level.episodes().any(|(_, _, result)| result.success) {
+        return firsts().find(|(_, result)| result.success).map(|(tester, _)| tester);
+    }
+    // Of equal ones the first.
+    let best = firsts().rev().max_by(|(_, one), (_, other)| one.total_reward.total_cmp(&other.total_reward));
+    best.map(|(tester, _)| tester)
 }
 
 impl DeadAction {
-    /// Names of the actions that are dead.
-    fn dead(&self, script: &Script<'_>) -> Result<Vec<String>, Fault> {
-        let (actions, idle) = (script.actions()?, idle_action(script.game));
+    /// Names of the actions that are dead. `has_solved`: whether the episode was solved when it was tested.
+    fn dead(&self, script: &Script<'_>, has_solved: bool) -> Result<Vec<String>, Fault> {
+        let (course, idle) = (script.course()?, idle_action(script.game));
         let (moments, ticks) = (self.moments as usize, self.ticks as usize);
-        if actions.len() < moments.saturating_add(1).saturating_mul(ticks) {
+        let length = course.actions.len();
+        if length < moments.saturating_add(1).saturating_mul(ticks) {
+            return Ok(Vec::new());
+        }
+        let moments: Vec<usize> = (1..=moments).map(|moment| length * moment / (moments + 1)).collect();
+        let is_same = course.is_solved == has_solved;
+        if !is_same || !(has_solved || gets_around(script, &course, &moments)) {
             return Ok(Vec::new());
         }
         let mut left = tried(script.game);
-        for moment in 1..=moments {
-            let before = &actions[..actions.len() * moment / (moments + 1)];
+        for moment in moments {
+            let before = &course.actions[..moment];
             let nothing = script.play(before, &idle, ticks)?;
             let mut still = Vec::new();
             for (name, ways) in left {
@@ -102,6 +116,16 @@ impl DeadAction {
         }
         Ok(left.into_iter().map(|(name, _)| name).collect())
     }
+}
+
+/// Whether the agent is on different tiles in at least half of these moments, more than one.
+fn gets_around(script: &Script<'_>, course: &Course, moments: &[usize]) -> bool {
+    let grid = CellGrid::new(script.game.floor_plan(script.mode, script.level).as_ref(), None);
+    let place = |moment: &usize| course.places.get(*moment - 1).copied().flatten();
+    let mut cells: Vec<_> = moments.iter().filter_map(place).filter_map(|place| grid.cell_at(place)).collect();
+    cells.sort();
+    cells.dedup();
+    cells.len() > 1 && cells.len() >= moments.len().div_ceil(2)
 }
 
 /// What is tried: each choice that is not called doing nothing, or each value of continuous actions, far up and far down.
@@ -127,84 +151,25 @@ fn tried(game: &dyn Game) -> Vec<(String, Vec<ActionValue>)> {
     }
 }
 
-/// An episode of a tester, which can be played up to any of its ticks and then otherwise.
-struct Script<'a> {
-    game: &'a dyn Game,
-    mode: &'a str,
-    level: u64,
-    player: &'a Player,
-    observation_config: ObservationConfig,
-    seed: u64,
-}
-
-/// Ticks and frames after which nobody waits any longer.
-const MOST_RUNS: u32 = 200_000;
-
-impl<'a> Script<'a> {
-    fn new(level: &TestedLevel<'a>, tester: &TestedBy<'a>) -> Self {
-        let TestedBy { player, observation_config, seed, .. } = *tester;
-        Self { game: level.game, mode: level.mode, level: level.level, player, observation_config, seed }
-    }
-
-    /// What the tester did; nothing if it does not solve the level again.
-    fn actions(&self) -> Result<Vec<ActionValue>, Fault> {
-        let config = &self.observation_config;
-        let probe = Probe::new(self.game, self.mode, self.level, self.player, config, vec![self.seed]);
-        let mut probe = probe.map_err(|error| Fault(error.to_string()))?;
-        let mut actions = Vec::new();
-        for _ in 0..MOST_RUNS {
-            let is_active = probe.tick()?;
-            if ticks(&probe) > actions.len() {
-                actions.extend(probe.world.get::<Action>(probe.agent).map(|action| action.0.clone()));
-            }
-            if !is_active || probe.is_over() {
-                break;
-            }
-        }
-        let has_solved = probe.world.get::<EpisodeCount>(probe.agent).is_some_and(|count| count.successes > 0);
-        Ok(if has_solved { actions } else { Vec::new() })
-    }
-
-    /// Hashes of the states that follow if these actions are done, and then another one for so many ticks.
-    fn play(&self, before: &[ActionValue], then: &ActionValue, ticks_then: usize) -> Result<Vec<u64>, Fault> {
-        let mut probe =
-            Probe::led(self.game, self.mode, self.level, self.seed).map_err(|error| Fault(error.to_string()))?;
-        let mut hashes = Vec::new();
-        for _ in 0..MOST_RUNS {
-            let played = ticks(&probe);
-            let action = before.get(played).unwrap_or(then).clone();
-            probe.world.entity_mut(probe.agent).insert(Action(action));
-            let is_active = probe.tick()?;
-            let now = ticks(&probe);
-            if now > played && now > before.len() {
-                hashes.push(hash_of_state(&probe.world, probe.agent));
-            }
-            if !is_active || probe.is_over() || now >= before.len() + ticks_then {
-                break;
-            }
-        }
-        Ok(hashes)
-    }
-}
-
-/// Ticks of the episode.
-fn ticks(probe: &Probe) -> usize {
-    probe.world.get::<Episode>(probe.agent).map_or(0, |episode| episode.tick as usize)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use bevy::prelude::*;
-    use bevy_playbot::episode::EpisodeEnd;
+    use bevy_playbot::{
+        bot::BlindBot,
+        episode::{EpisodeEnd, EpisodeResult},
+        vision::ObservationConfig,
+    };
 
     use super::*;
-    use crate::foreign::ForeignGame;
+    use crate::{eval::Player, foreign::ForeignGame};
 
     #[derive(Component)]
     struct Runner;
 
-    /// Space does nothing, unless the runner is far enough and it works at all.
-    fn game(works: bool) -> ForeignGame {
+    /// Space does nothing, unless the runner is far enough and it works at all. Whoever comes to this place has won.
+    fn game(works: bool, goal: f32) -> ForeignGame {
         let game = move |app: &mut App| {
             app.add_systems(Startup, |mut commands: Commands| {
                 commands.spawn((Runner, Transform::default()));
@@ -222,24 +187,67 @@ mod tests {
         ForeignGame::new("runner", 1, game)
             .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::Space]])
             .observe(["x"], |at: Single<&Transform, With<Runner>>| [at.translation.x])
-            .end(|at: Single<&Transform, With<Runner>>| (at.translation.x >= 40.0).then_some(EpisodeEnd::WON))
+            .end(move |at: Single<&Transform, With<Runner>>| (at.translation.x >= goal).then_some(EpisodeEnd::WON))
             .time_limit(100)
             .demonstrator("runs", || 1_u32)
     }
 
-    fn dead(works: bool, ticks: f64) -> Vec<String> {
-        let game = game(works);
-        let player = Player::Demonstrator;
+    /// The dead actions of the game. With somebody who runs as long as there is time, or who never does anything.
+    fn dead(game: &ForeignGame, player: &Player, ticks: f64) -> Vec<String> {
         let observation_config = ObservationConfig::default();
-        let script = Script { game: &game, mode: "default", level: 0, player: &player, observation_config, seed: 3 };
-        DeadAction { ticks, ..DeadAction::default() }.dead(&script).expect("sound")
+        let stop = &|| false;
+        let script = Script { game, mode: "default", level: 0, player, observation_config, seed: 3, stop };
+        let has_solved = script.course().expect("sound").is_solved;
+        let dead = |has_solved: bool| {
+            DeadAction { ticks, ..DeadAction::default() }.dead(&script, has_solved).expect("sound")
+        };
+        assert!(dead(!has_solved).is_empty(), "who does not play the same again says nothing");
+        dead(has_solved)
     }
 
     #[test]
     fn an_action_that_never_does_anything_is_found_and_one_that_does_later_on_is_not() {
+        let dead = |works: bool, ticks: f64| dead(&game(works, 40.0), &Player::Demonstrator, ticks);
         assert_eq!(dead(false, 5.0), ["`Space`"]);
         assert!(dead(true, 5.0).is_empty());
         assert!(dead(false, 20.0).is_empty(), "the episode has 40 ticks, which is too short");
+    }
+
+    #[test]
+    fn an_episode_without_success_tells_if_its_agent_gets_around() {
+        let place = |at: Single<&Transform, With<Runner>>| at.translation.truncate();
+        let rests = Player::Blind(BlindBot::Constant(ActionValue::Discrete(0)));
+        let told = |game: ForeignGame, player: &Player| dead(&game, player, 5.0);
+        assert_eq!(told(game(false, 1e9).place(place), &Player::Demonstrator), ["`Space`"]);
+        assert!(told(game(true, 1e9).place(place), &Player::Demonstrator).is_empty());
+        assert!(told(game(false, 1e9).place(place), &rests).is_empty(), "it may be stuck");
+        assert!(told(game(false, 1e9), &Player::Demonstrator).is_empty(), "nobody knows where it is");
+    }
+
+    #[test]
+    fn who_solves_a_level_tells_or_else_who_is_paid_best() {
+        let told = |episodes: &[(u32, bool, f32)]| {
+            let tested = |&(number, success, total_reward): &(u32, bool, f32)| {
+                let end = EpisodeEnd::Terminated { success };
+                let result = EpisodeResult { level: 0, end, success, ticks: 1, clipped: 0, total_reward };
+                TestedBy {
+                    name: "random",
+                    player: &Player::Demonstrator,
+                    observation_config: ObservationConfig::default(),
+                    seed: 0,
+                    episodes: vec![(number, result)],
+                    places: BTreeMap::new(),
+                }
+            };
+            let (game, testers) = (game(true, 1.0), episodes.iter().map(tested).collect());
+            let mode = "default";
+            let level = TestedLevel { game: &game, mode, level: 0, place: 0, par: None, testers, stop: &|| false };
+            teller(&level).map(|tester| tester.episodes[0].1.total_reward)
+        };
+        assert_eq!(told(&[(0, false, 9.0), (0, true, 1.0), (0, true, 2.0)]), Some(1.0));
+        assert_eq!(told(&[(0, false, 1.0), (0, false, 9.0), (1, false, 12.0)]), Some(9.0));
+        assert_eq!(told(&[(0, false, 9.0), (1, true, 2.0)]), None, "the first episodes of others say nothing");
+        assert_eq!(told(&[]), None);
     }
 
     #[test]

@@ -35,13 +35,10 @@ impl Determinism {
     fn play(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>, episodes: usize) -> Result<Vec<Played>, Fault> {
         let (player, config) = (tester.player, &tester.observation_config);
         let probe = Probe::new(level.game, level.mode, level.level, player, config, vec![tester.seed; episodes]);
-        let mut probe = probe.map_err(|error| Fault(error.to_string()))?;
+        let mut probe = probe.map_err(|error| Fault(error.to_string()))?.until(level.stop);
         let most = self.ticks as usize;
         let (mut played, mut now) = (Vec::new(), Played::default());
         for _ in 0..episodes * most {
-            if (level.stop)() {
-                return Err(Fault("somebody asked to stop".to_owned()));
-            }
             let is_active = probe.tick()?;
             let finished = probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished as usize);
             let is_last = finished == episodes;
@@ -104,7 +101,7 @@ impl Played {
     }
 }
 
-fn is_loading(probe: &Probe) -> bool {
+fn is_loading(probe: &Probe<'_>) -> bool {
     probe.world.get::<Episode>(probe.agent).is_some_and(Episode::is_loading)
 }
 
@@ -149,7 +146,8 @@ impl LevelDetector for Determinism {
         }
         let of_tester = |tester: &TestedBy<'_>| {
             let (tick, message) = self.difference(level, tester)?;
-            Some(LevelDefect { tester: Some(tester.name.to_owned()), episode: Some(0), tick: Some(tick), message })
+            let (tester, episode) = (Some(tester.name.to_owned()), Some(0));
+            Some(LevelDefect { tester, episode, tick: Some(tick), message, settings: Vec::new() })
         };
         level.testers.iter().filter_map(of_tester).collect()
     }

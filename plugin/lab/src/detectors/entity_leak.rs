@@ -33,18 +33,19 @@ impl Default for EntityLeak {
 
 impl EntityLeak {
     /// How many entities there are after each episode; fewer numbers if the game breaks.
-    fn counts(&self, game: &dyn Game, mode: &str, level: u64) -> Vec<u32> {
+    fn counts(&self, game: &dyn Game, mode: &str, level: u64, stop: &dyn Fn() -> bool) -> Vec<u32> {
         let (episodes, ticks) = (self.episodes as usize, self.ticks as u32);
         let player = Player::Blind(BlindBot::Uniform);
         let seeds = vec![0; episodes];
         let mut counts = Vec::new();
         let config = ObservationConfig::default();
-        let Ok(mut probe) = Probe::new(game, mode, level, &player, &config, seeds) else {
+        let Ok(probe) = Probe::new(game, mode, level, &player, &config, seeds) else {
             return counts;
         };
+        let mut probe = probe.until(stop);
         for _ in 0..episodes {
             let finished =
-                |probe: &Probe| probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished);
+                |probe: &Probe<'_>| probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished);
             let before = finished(&probe);
             for _ in 0..ticks.saturating_mul(MOST_TRIES) {
                 // A game that breaks is found by others.
@@ -65,12 +66,12 @@ impl EntityLeak {
     }
 
     /// What a level leaks, in words.
-    fn leak(&self, game: &dyn Game, mode: &str, level: u64) -> Option<String> {
+    fn leak(&self, game: &dyn Game, mode: &str, level: u64, stop: &dyn Fn() -> bool) -> Option<String> {
         // A World that is built anew has forgotten everything.
         if game.built_anew().is_some() {
             return None;
         }
-        grows(&self.counts(game, mode, level))
+        grows(&self.counts(game, mode, level, stop))
     }
 }
 
@@ -99,7 +100,7 @@ impl LevelDetector for EntityLeak {
         if !level.is_sample(self.every) {
             return Vec::new();
         }
-        let leak = self.leak(level.game, level.mode, level.level);
+        let leak = self.leak(level.game, level.mode, level.level, level.stop);
         leak.map(|message| LevelDefect { message, ..LevelDefect::default() }).into_iter().collect()
     }
 
@@ -108,7 +109,7 @@ impl LevelDetector for EntityLeak {
     }
 
     fn is_in_level(&self, game: &dyn Game, mode: &str, level: u64) -> bool {
-        self.leak(game, mode, level).is_some()
+        self.leak(game, mode, level, &|| false).is_some()
     }
 }
 

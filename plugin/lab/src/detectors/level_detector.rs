@@ -28,6 +28,11 @@ pub trait LevelDetector: Send + Sync {
         Vec::new()
     }
 
+    /// Whether it compares what several testers did, so that one of them alone may not show what it finds.
+    fn compares_testers(&self) -> bool {
+        false
+    }
+
     /// What is wrong with a level.
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect>;
 
@@ -104,6 +109,9 @@ pub struct LevelDefect {
     pub tick: Option<u32>,
     /// What is wrong.
     pub message: String,
+    /// What has to be set, as `name.key=value`, so that the detector can tell from the episode alone whether it is there: for
+    /// [`ShownBy::Episode`].
+    pub settings: Vec<String>,
 }
 
 impl TestedLevel<'_> {

@@ -26,6 +26,7 @@ mod probe;
 mod reward_farm;
 mod reward_loop;
 mod runaway;
+mod script;
 mod selection;
 mod short_time;
 mod shortcut;
@@ -40,7 +41,7 @@ mod too_long;
 mod uneven_time;
 mod unreachable_region;
 
-pub(crate) use catalogue::own_detectors;
+pub(crate) use catalogue::{compares_testers, own_detectors};
 pub use catalogue::{ALWAYS, DetectorInfo, list};
 pub(crate) use ear::Ear;
 pub use far_goal::FarGoal;

@@ -15,14 +15,15 @@ use bevy_playbot::{
 use crate::{eval::Player, game::Game, worlds::build_observing_world};
 
 /// A World with one agent, who plays one level again and again, each time from the same seed.
-pub struct Probe {
+pub struct Probe<'a> {
     /// The World.
     pub world: World,
     /// The agent.
     pub agent: Entity,
+    stop: &'a dyn Fn() -> bool,
 }
 
-impl Probe {
+impl<'a> Probe<'a> {
     /// A World for so many episodes.
     ///
     /// # Errors
@@ -69,7 +70,13 @@ impl Probe {
         let agent = agents.into_iter().next().expect("one agent was asked for");
         let queue = LevelQueue::list(vec![level; seeds.len()]);
         world.entity_mut(agent).insert((queue, EpisodeSeeds::new(seeds)));
-        Ok(Self { world, agent })
+        Ok(Self { world, agent, stop: &|| false })
+    }
+
+    /// The same, for as long as nobody asks to stop.
+    #[must_use]
+    pub fn until(self, stop: &'a dyn Fn() -> bool) -> Self {
+        Self { stop, ..self }
     }
 
     /// Whether an episode is over.
@@ -81,8 +88,11 @@ impl Probe {
     ///
     /// # Errors
     ///
-    /// The game broke.
+    /// The game broke, or somebody asked to stop.
     pub fn tick(&mut self) -> Result<bool, Fault> {
+        if (self.stop)() {
+            return Err(Fault("somebody asked to stop".to_owned()));
+        }
         tick_world(&mut self.world)?;
         Ok(Control::of(&self.world, self.agent).is_active())
     }

@@ -29,6 +29,10 @@ impl LevelDetector for RewardFarm {
         vec![Setting::new("factor", &mut self.factor, "times the reward of the best solved episode")]
     }
 
+    fn compares_testers(&self) -> bool {
+        true
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let solved = level.episodes().filter(|(_, _, result)| result.success);
         let best = solved.map(|(_, _, result)| result.total_reward).max_by(f64::total_cmp);
@@ -39,6 +43,7 @@ impl LevelDetector for RewardFarm {
             tester: Some(tester.to_owned()),
             episode: Some(episode),
             tick: result.ticks.checked_sub(1),
+            settings: Vec::new(),
             message: format!(
                 "a reward of {} until time was up, and at most {best} for reaching the aim",
                 result.total_reward

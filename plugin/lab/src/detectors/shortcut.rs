@@ -78,17 +78,23 @@ impl LevelDetector for Shortcut {
             return Vec::new();
         }
         let message = format!("solved in {} ticks, where {par} are to be expected", fastest.ticks);
-        let tick = fastest.ticks.checked_sub(1);
-        vec![LevelDefect { tester: Some(tester.to_owned()), episode: Some(episode), tick, message }]
+        let (tester, episode, tick) = (Some(tester.to_owned()), Some(episode), fastest.ticks.checked_sub(1));
+        let settings = vec![format!("shortcut.par={par}")];
+        vec![LevelDefect { tester, episode, tick, message, settings }]
     }
 
     fn shown_by(&self) -> ShownBy {
         ShownBy::Episode
     }
 
-    /// Whoever is faster still has found it, too.
+    /// Findings know their level's par. Of older ones, which do not, whoever is as fast has found it again.
     fn is_in_episode(&self, result: &EpisodeResult, tick: Option<u32>) -> bool {
-        result.success && tick.is_none_or(|tick| result.ticks <= tick.saturating_add(1))
+        let is_fast = if self.par > 0.0 {
+            is_too_fast(result, self.par, self.factor)
+        } else {
+            tick.is_none_or(|tick| result.ticks <= tick.saturating_add(1))
+        };
+        result.success && is_fast
     }
 }
 
@@ -111,10 +117,14 @@ mod tests {
     }
 
     #[test]
-    fn an_episode_that_is_as_fast_shows_it_again() {
+    fn an_episode_that_is_too_fast_for_its_par_shows_it_again() {
+        let found = inspected(&Shortcut::default(), &[(WON, 40, [1.0; 2])], Some(100.0));
+        assert_eq!(found[0].settings, ["shortcut.par=100"]);
         let ended =
             |end, ticks| EpisodeResult { level: 0, end, success: end == WON, ticks, clipped: 0, total_reward: 0.0 };
         let shows = |end, ticks| Shortcut::default().is_in_episode(&ended(end, ticks), Some(39));
         assert!(shows(WON, 40) && shows(WON, 12) && !shows(WON, 41) && !shows(LOST, 12));
+        let shows = |factor, end, ticks| Shortcut { factor, par: 100.0 }.is_in_episode(&ended(end, ticks), Some(39));
+        assert!(shows(0.5, WON, 49) && !shows(0.5, WON, 50) && !shows(0.5, LOST, 40) && !shows(0.3, WON, 40));
     }
 }

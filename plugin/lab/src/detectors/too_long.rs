@@ -32,6 +32,10 @@ impl LevelDetector for TooLong {
         ]
     }
 
+    fn compares_testers(&self) -> bool {
+        true
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let par = if self.par > 0.0 { Some(self.par) } else { level.par };
         let Some(most) = par.map(|par| par * self.factor) else { return Vec::new() };
@@ -42,6 +46,7 @@ impl LevelDetector for TooLong {
             tester: Some(tester.to_owned()),
             episode: Some(episode),
             tick: result.ticks.checked_sub(1),
+            settings: Vec::new(),
             message: format!("solved in {} ticks at best, where {most} are to be enough", result.ticks),
         });
         defect.into_iter().collect()

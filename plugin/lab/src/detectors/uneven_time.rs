@@ -22,6 +22,10 @@ impl LevelDetector for UnevenTime {
         "time is up earlier than in another episode of the level"
     }
 
+    fn compares_testers(&self) -> bool {
+        true
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(longest) = level.episodes().map(|(_, _, result)| result.ticks).max() else { return Vec::new() };
         let timed_out = level.episodes().filter(|(_, _, result)| is_timed_out(result) && result.ticks < longest);
@@ -29,6 +33,7 @@ impl LevelDetector for UnevenTime {
             tester: Some(tester.to_owned()),
             episode: Some(episode),
             tick: result.ticks.checked_sub(1),
+            settings: Vec::new(),
             message: format!("time was up after {} ticks, and another episode took {longest}", result.ticks),
         });
         defect.into_iter().collect()

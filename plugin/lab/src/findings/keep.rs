@@ -54,6 +54,8 @@ pub struct SeenFinding<'a> {
     pub detector: &'a str,
     /// What is wrong.
     pub message: &'a str,
+    /// Settings of the detector, as `name.key=value`, that count beside those of the test.
+    pub settings: &'a [String],
     /// Who played, if somebody had to.
     pub played: Option<Played<'a>>,
 }
@@ -80,7 +82,7 @@ impl FindingFiles {
         if self.checks.of(seen.detector).is_none() {
             return Ok(None);
         }
-        let settings = self.checks.settings_of(game, seen.detector);
+        let settings = [self.checks.settings_of(game, seen.detector), seen.settings.to_vec()].concat();
         let head = FindingHead { settings, ..FindingHead::new(level.name, seen.detector, seen.message) };
         let (mode, number) = alone(game, level);
         match seen.played {

@@ -29,6 +29,7 @@ pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
                         tick: Some(found.tick),
                         message: found.message.clone(),
                         file: None,
+                        settings: Vec::new(),
                     });
                 }
             }
@@ -68,6 +69,7 @@ pub(super) fn inspect(
             tick: defect.tick,
             message: defect.message,
             file: None,
+            settings: defect.settings,
         }));
     }
     findings

@@ -2,7 +2,7 @@
 
 use super::{
     error::TestError,
-    level_verdict::{LevelOutcome, LevelVerdict},
+    level_verdict::{Finding, LevelOutcome, LevelVerdict},
     plan::TestPlan,
     tester::Tester,
 };
@@ -27,7 +27,8 @@ pub(super) fn keep_findings(
     for finding in findings {
         let who = finding.tester.as_deref().zip(finding.episode);
         let played = who.and_then(|(tester, episode)| played(tester, episode));
-        let seen = SeenFinding { detector: &finding.detector, message: &finding.message, played };
+        let Finding { detector, message, settings, .. } = finding;
+        let seen = SeenFinding { detector, message, settings, played };
         finding.file = files.keep(game, level, &seen)?;
     }
     if files.keep_failures && *outcome == LevelOutcome::BotFailed {

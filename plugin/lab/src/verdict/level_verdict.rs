@@ -103,6 +103,10 @@ pub struct Finding {
     /// Its file, seen from the folder of the results: see [`findings`](crate::findings).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
+    /// Settings, as `name.key=value`, with which its file looks for it again beside those of the test: see
+    /// [`LevelDefect::settings`](crate::detectors::LevelDefect::settings). Results have none.
+    #[serde(skip)]
+    pub settings: Vec<String>,
 }
 
 /// Everything about one level.

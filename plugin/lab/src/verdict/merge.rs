@@ -1,7 +1,7 @@
 //! Joining the results of shards.
 
 use std::{
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -63,7 +63,8 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
 }
 
 fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out: &Path) -> Result<(), TestError> {
-    std::fs::create_dir_all(out).map_err(io_error("create", out))?;
+    let is_new = !out.exists();
+    fs::create_dir_all(out).map_err(io_error("create", out))?;
     let path = out.join(RESULTS);
     // The writer knows errors of the system alone.
     let mut damaged = None;
@@ -80,16 +81,19 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
         }
         results.end()
     });
-    match (written, damaged) {
+    let written = match (written, damaged) {
         (_, Some(error)) => Err(error),
         (written, None) => written.map_err(io_error("write", &path)),
+    };
+    if written.is_err() && is_new {
+        // If it is not empty after all, it stays; what went wrong before is what is told.
+        let _ = fs::remove_dir(out);
     }
+    written
 }
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
     use crate::verdict::{
         MapScope, TesterRecord,
@@ -176,6 +180,6 @@ mod tests {
         let two = folder("two", &record(Some("2/3")));
         let words = said(&[&zero, &one, &two]);
         assert!(words.contains("results.json, line 3: this is not the level with index 4"), "{words}");
-        assert!(!parent.path().join("out").join(RESULTS).exists(), "nothing is half there");
+        assert!(!parent.path().join("out").exists(), "nothing is half there");
     }
 }

@@ -156,6 +156,7 @@ mod tests {
             tick: None,
             message: why.clone(),
             file: None,
+            settings: Vec::new(),
         };
         let proved = LevelVerdict {
             outcome: LevelOutcome::ProvedUnsolvable,

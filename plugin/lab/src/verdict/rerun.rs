@@ -1,7 +1,7 @@
 //! How a level is looked at again.
 
-use super::{level_name::level_argument, level_verdict::LevelVerdict, plan::TestRecord};
-use crate::shell_word::shell_word;
+use super::{level_name::level_argument, level_verdict::LevelVerdict, plan::TestRecord, tester::TesterRecord};
+use crate::{detectors::compares_testers, shell_word::shell_word};
 
 /// Most findings that are shown by their files.
 const MOST_FILES: usize = 3;
@@ -25,29 +25,44 @@ pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) 
     comment(of_results).into_iter().chain(replays).chain(comment(of_test)).chain(again).collect()
 }
 
-/// The episodes of a tester that failed, if one did.
+/// The episodes of a tester that found something or else failed, if one did; of all testers, if what was found compares them.
 fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
     let found = level.findings.iter().find_map(|finding| finding.tester.as_ref());
     let failed = || level.testers.iter().find(|tester| tester.score.solved < tester.score.episodes);
     let Some(name) = found.or_else(|| failed().map(|tester| &tester.tester)) else { return Vec::new() };
     let Some(tester) = record.testers.iter().find(|tester| tester.name == *name) else { return Vec::new() };
-    let greedy = if tester.greedy { " --greedy" } else { "" };
-    let policy = |given: &str| format!("--policy {}{greedy}", shell_word(given));
-    // What a policy draws in a test depends on its name, so that comes along; `view` knows files alone.
-    let (tests, views) = match (&tester.checksum, &tester.file) {
-        (Some(_), Some(file)) => (policy(&format!("{name}={file}")), policy(file)),
-        (Some(_), None) => (policy(name), policy(name)),
-        (None, _) => (format!("--bot {name}"), format!("--bot {name}")),
-    };
+    let compares = level.findings.iter().any(|finding| compares_testers(&finding.detector));
+    let played = if compares { testers(&record.testers) } else { testers(std::slice::from_ref(tester)) };
+    let shown = seen(tester);
     let (game, seed, episodes) = (&record.game, record.seed, record.episodes);
     let levels = level_argument(&record.range, &level.level);
     let detectors: String = record.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
     // The same episodes: they depend on seed, tester and level alone.
     let again = format!(
-        "{program} test {game} --levels {levels} {tests} --episodes {episodes} --seed {seed}{detectors} --out again"
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out again"
     );
-    let shown = format!("{program} view {game} --levels {levels} {views} --episode --out again.png");
-    vec![again, shown]
+    let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again.png");
+    vec![again, picture]
+}
+
+/// Testers as `playbot test` takes them. What a policy draws there depends on its name, so that comes along.
+fn testers(testers: &[TesterRecord]) -> String {
+    let policies = testers.iter().filter(|tester| tester.checksum.is_some());
+    let policies = policies.map(|TesterRecord { name, file, .. }| {
+        let given = file.as_ref().map_or_else(|| name.clone(), |file| format!("{name}={file}"));
+        format!("--policy {}", shell_word(&given))
+    });
+    let bots: Vec<&str> =
+        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
+    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
+    let greedy = testers.iter().any(|tester| tester.greedy).then(|| "--greedy".to_owned());
+    bots.into_iter().chain(policies).chain(greedy).collect::<Vec<_>>().join(" ")
+}
+
+/// A tester as `playbot view` takes it, which knows files of policies alone.
+fn seen(tester: &TesterRecord) -> String {
+    let unnamed = TesterRecord { name: tester.file.clone().unwrap_or_else(|| tester.name.clone()), file: None, ..tester.clone() };
+    testers(&[unnamed])
 }
 
 #[cfg(test)]
@@ -87,6 +102,19 @@ mod tests {
         named.options = ["--no-detect", "stuck", "--par", "my pars.json"].map(str::to_owned).to_vec();
         let again = again.replace(" --out", " --no-detect stuck --par 'my pars.json' --out");
         assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
+        let farmed = Finding {
+            detector: "reward-farm".to_owned(),
+            tester: Some("random".to_owned()),
+            episode: Some(1),
+            tick: Some(9),
+            message: "paid for nothing".to_owned(),
+            file: None,
+            settings: Vec::new(),
+        };
+        let compared = LevelVerdict { findings: vec![farmed], ..level.clone() };
+        let again = "jump test garden --levels bed:6 --bot random --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
+        let shown = "jump view garden --levels bed:6 --bot random --episode --out again.png";
+        assert_eq!(rerun_commands("jump", &record, &compared), [again, shown], "all are compared");
         let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
         assert!(rerun_commands("jump", &record, &perfect).is_empty());
         let finding = |name: &str| Finding {
@@ -96,6 +124,7 @@ mod tests {
             tick: None,
             message: "walled in".to_owned(),
             file: Some(format!("findings/{name}.finding")),
+            settings: Vec::new(),
         };
         let findings = ["a", "b", "c", "d"].map(finding).to_vec();
         let walled = LevelVerdict { findings, ..perfect };

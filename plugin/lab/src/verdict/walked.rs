@@ -189,6 +189,7 @@ mod tests {
             tick: Some(3),
             message: String::new(),
             file: None,
+            settings: Vec::new(),
         };
         let found = Walked::of(&plan(), &["a"], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
         assert_eq!(found.map(|failure| (failure.episode, failure.way)), Some((1, vec![[3, 1]])));

@@ -117,6 +117,7 @@ pub fn finding(detector: &str, message: &str) -> Finding {
         tick: Some(7),
         message: message.to_owned(),
         file: None,
+        settings: Vec::new(),
     }
 }
 

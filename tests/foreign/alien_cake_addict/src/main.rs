@@ -5,6 +5,7 @@
 include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
 mod defects;
+mod rules;
 
 use std::process::ExitCode;
 
@@ -15,7 +16,7 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&defects::add_to(ForeignGame::new("alien_cake_addict", 1, game))
+    playbot_cli::main(&[&defects::add_to(rules::add_to(ForeignGame::new("alien_cake_addict", 1, game))
         .hz(20.0)
         .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
         .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
@@ -30,7 +31,7 @@ fn main() -> ExitCode {
         .demonstrator("glutton", |game: Res<Game>| {
             let (at, cake) = (&game.player, &game.bonus);
             [at.i < cake.i, at.i > cake.i, at.j < cake.j, at.j > cake.j].iter().position(|go| *go).unwrap_or(4) as u32
-        })])
+        }))])
 }
 
 /// What the game's own setup leaves as it is: the timer, an old cake, and where the camera looks.

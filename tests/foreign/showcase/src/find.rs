@@ -10,22 +10,8 @@ use serde_json::Value;
 
 /// The folder of the `bevy` package that this workspace is built with, as cargo tells it.
 pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
-    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.args(["metadata", "--offline", "--locked", "--format-version", "1"]);
-    // Packages for other systems need not have been downloaded.
-    if let Ok(target) = env::var("TARGET") {
-        command.args(["--filter-platform", &target]);
-    }
-    // It asks the compiler, which reads what it is given there.
-    let output =
-        command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
-    if !output.status.success() {
-        let why = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
-        return Err(format!("cargo metadata cannot tell where it is ({why}); `cargo fetch` may help"));
-    }
-    let metadata: Value = serde_json::from_slice(&output.stdout)
-        .map_err(|error| format!("cargo metadata answers something else than JSON: {error}"))?;
+    // Cargo lists what tests of the workspace need, too, which may not have been downloaded yet.
+    let metadata = metadata(&["--offline"]).or_else(|_| metadata(&[]))?;
     let manifest = metadata["packages"]
         .as_array()
         .into_iter()
@@ -37,4 +23,24 @@ pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
         .ok_or("there is no package bevy 0.19 in this workspace")?;
     let folder = PathBuf::from(manifest).parent().map(PathBuf::from);
     folder.ok_or_else(|| format!("{manifest} lies in no folder"))
+}
+
+/// What cargo says of the workspace.
+fn metadata(options: &[&str]) -> Result<Value, String> {
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.args(["metadata", "--locked", "--format-version", "1"]).args(options);
+    // Packages for other systems need not have been downloaded.
+    if let Ok(target) = env::var("TARGET") {
+        command.args(["--filter-platform", &target]);
+    }
+    // It asks the compiler, which reads what it is given there.
+    let output =
+        command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
+    if !output.status.success() {
+        let why = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
+        return Err(format!("cargo metadata cannot tell where it is ({why}); `cargo fetch` may help"));
+    }
+    serde_json::from_slice(&output.stdout)
+        .map_err(|error| format!("cargo metadata answers something else than JSON: {error}"))
 }

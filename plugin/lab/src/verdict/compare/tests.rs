@@ -89,6 +89,7 @@ fn a_new_proof_and_a_new_finding_are_always_told() {
         tick: Some(4),
         message: "words".to_owned(),
         file: None,
+        settings: Vec::new(),
     };
     let walled = LevelVerdict {
         outcome: LevelOutcome::ProvedUnsolvable,
@@ -143,6 +144,7 @@ fn findings_of_detectors_that_did_not_look_before_are_no_news() {
         tick: Some(4),
         message: "words".to_owned(),
         file: None,
+        settings: Vec::new(),
     };
     let looked = |detectors: &[&str]| {
         let detectors = detectors.iter().map(|detector| (*detector).to_owned()).collect();
