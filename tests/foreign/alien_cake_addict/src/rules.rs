@@ -1,0 +1,71 @@
+//! What the game promises of its cakes, as a detector of its own. Whoever plays it needs none of it.
+
+use bevy::math::UVec2;
+use playbot_lab::{
+    detector::{EachTick, Moment},
+    foreign::ForeignGame,
+};
+
+/// The game with the detector.
+pub fn add_to(game: ForeignGame) -> ForeignGame {
+    game.detector(|| {
+        EachTick::new("cake-rules", "a cake is eaten by nobody who walked onto it, or not by who did", |moment| {
+            broken_rule(moment)
+        })
+    })
+}
+
+fn broken_rule(moment: &Moment<'_>) -> Option<String> {
+    let at = moment.place?.as_uvec2();
+    // What was seen before the tick, in tens: see the adapter.
+    let &[i, j, cake_i, cake_j, cakes] = moment.observation else { return None };
+    let field = |i: f32, j: f32| UVec2::new((10.0 * i).round() as u32, (10.0 * j).round() as u32);
+    let has_walked = field(i, j) != at;
+    let is_cake_here = cakes > 0.0 && field(cake_i, cake_j) == at;
+    match (has_walked && is_cake_here, moment.reward > 0.0) {
+        (true, false) => Some(format!("a player walks onto the cake at {at}, and it does not count")),
+        (false, true) => Some(format!("a cake counts at {at}, and nobody has walked onto one")),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::*;
+    use playbot_lab::{detector::NoProofs, prelude::ActionValue};
+
+    use super::*;
+
+    /// What is said of a player who was seen at the first place and is at the second one, with a cake at the third, and has
+    /// eaten so many.
+    fn said(before: [f32; 2], now: [f32; 2], cake: Option<[f32; 2]>, reward: f32) -> Option<String> {
+        let (world, action) = (World::new(), ActionValue::Discrete(0));
+        let ([i, j], [cake_i, cake_j]) = (before, cake.unwrap_or([0.0; 2]));
+        let seen = [i, j, cake_i, cake_j, f32::from(u8::from(cake.is_some()))].map(|number| number / 10.0);
+        broken_rule(&Moment {
+            world: &world,
+            agent: Entity::PLACEHOLDER,
+            level: 0,
+            tick: 3,
+            action: &action,
+            observation: &seen,
+            state_hash: 0,
+            reward,
+            place: Some(Vec2::from_array(now)),
+            is_success: false,
+            proofs: &NoProofs,
+        })
+    }
+
+    #[test]
+    fn a_cake_counts_for_whoever_walks_onto_it_and_for_nobody_else() {
+        let (here, there) = ([7.0, 10.0], [8.0, 10.0]);
+        let is_broken = |before, now, cake, reward| said(before, now, cake, reward).is_some();
+        assert!(!is_broken(here, there, Some(there), 1.0) && !is_broken(here, there, Some(here), 0.0));
+        assert!(!is_broken(here, here, None, 0.0) && !is_broken(here, there, None, 0.0));
+        assert!(is_broken(here, there, Some(there), 0.0), "it is not counted");
+        assert!(is_broken(here, here, Some(there), 1.0), "it is eaten from afar");
+        assert!(is_broken(here, here, Some(here), 1.0), "it came along");
+        assert!(is_broken(here, there, None, 1.0), "there was none");
+    }
+}
