@@ -29,6 +29,10 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 /// Modules that take no part in playing: what the benchmark of testers plants into a game, and a detector that knows its rules.
 const APART: [&str; 2] = ["defects", "rules"];
 
+fn is_named_apart(path: &Path) -> bool {
+    APART.iter().any(|name| path.ends_with(format!("src/{name}.rs")))
+}
+
 /// Lines that say something: not blank, no comment, no import, not closing brackets only, not the name of one of [`APART`].
 fn lines_that_count(source: &str) -> Vec<&str> {
     let mut in_use = false;
@@ -71,8 +75,7 @@ fn all_of_an_adapter_is_in_its_main() {
         let others = files(&folder).into_iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs"));
         // Tests of its verbs are no part of an adapter, either.
         let is_apart = |path: &PathBuf| {
-            let is_named = |name: &&str| path.ends_with(format!("src/{name}.rs"));
-            ["main"].iter().chain(&APART).any(is_named) || path.starts_with(folder.join("tests"))
+            path.ends_with("src/main.rs") || is_named_apart(path) || path.starts_with(folder.join("tests"))
         };
         for path in others.filter(|path| !is_apart(path)) {
             assert!(!read(&path).contains("playbot"), "{} knows of the plugin", path.display());
@@ -97,7 +100,7 @@ fn nothing_of_the_examples_of_bevy_is_kept_here() {
         let folder = crate_of(game);
         for path in files(&folder).iter().filter(|path| path.extension().is_some_and(|ext| ext == "rs")) {
             let name = path.strip_prefix(&folder).expect("it was found there").display().to_string();
-            let is_ours = ["src/main.rs", DEFECTS, "tests/shell.rs"].contains(&name.as_str());
+            let is_ours = ["src/main.rs", "tests/shell.rs"].contains(&name.as_str()) || is_named_apart(path);
             assert!(is_ours || allowed.contains(&name.as_str()), "{game} has a file {name}");
         }
     }

@@ -41,7 +41,12 @@ impl<'a> Evidence<'a> {
         for finding in findings.iter_mut() {
             let who = finding.tester.as_deref().zip(finding.episode);
             let played = who.and_then(|(tester, episode)| played(tester, episode));
-            let seen = SeenFinding { detector: &finding.detector, message: &finding.message, settings: &finding.settings, played };
+            let seen = SeenFinding {
+                detector: &finding.detector,
+                message: &finding.message,
+                settings: &finding.settings,
+                played,
+            };
             finding.file = self.files.keep(self.game, level, &seen)?;
         }
         let is_shown = findings.iter().any(|finding| finding.file.is_some() && finding.tester.is_some());

@@ -198,9 +198,8 @@ mod tests {
         let stop = &|| false;
         let script = Script { game, mode: "default", level: 0, player, observation_config, seed: 3, stop };
         let has_solved = script.course().expect("sound").is_solved;
-        let dead = |has_solved: bool| {
-            DeadAction { ticks, ..DeadAction::default() }.dead(&script, has_solved).expect("sound")
-        };
+        let dead =
+            |has_solved: bool| DeadAction { ticks, ..DeadAction::default() }.dead(&script, has_solved).expect("sound");
         assert!(dead(!has_solved).is_empty(), "who does not play the same again says nothing");
         dead(has_solved)
     }
@@ -226,8 +225,8 @@ mod tests {
 
     #[test]
     fn who_solves_a_level_tells_or_else_who_is_paid_best() {
-        let told = |episodes: &[(u32, bool, f32)]| {
-            let tested = |&(number, success, total_reward): &(u32, bool, f32)| {
+        let told = |episodes: &[(u32, bool, f64)]| {
+            let tested = |&(number, success, total_reward): &(u32, bool, f64)| {
                 let end = EpisodeEnd::Terminated { success };
                 let result = EpisodeResult { level: 0, end, success, ticks: 1, clipped: 0, total_reward };
                 TestedBy {

@@ -41,8 +41,8 @@ mod too_long;
 mod uneven_time;
 mod unreachable_region;
 
-pub(crate) use catalogue::{compares_testers, own_detectors};
 pub use catalogue::{ALWAYS, DetectorInfo, list};
+pub(crate) use catalogue::{compares_testers, own_detectors};
 pub(crate) use ear::Ear;
 pub use far_goal::FarGoal;
 pub(crate) use game_proofs::GameProofs;

@@ -44,7 +44,18 @@ pub(super) fn judge(
         Some(why) => {
             let detector = "unreachable-goal".to_owned();
             let message = why.to_owned();
-            findings.insert(0, Finding { detector, tester: None, episode: None, tick: None, message, file: None, settings: Vec::new() });
+            findings.insert(
+                0,
+                Finding {
+                    detector,
+                    tester: None,
+                    episode: None,
+                    tick: None,
+                    message,
+                    file: None,
+                    settings: Vec::new(),
+                },
+            );
             LevelOutcome::ProvedUnsolvable
         }
     };
@@ -119,7 +130,15 @@ fn broken(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
             if !findings.iter().any(is_known) {
                 let (detector, message) = ((*detector).to_owned(), message.clone());
                 let (episode, tick) = (Some(number), *tick);
-                findings.push(Finding { detector, tester: name, episode, tick, message, file: None, settings: Vec::new() });
+                findings.push(Finding {
+                    detector,
+                    tester: name,
+                    episode,
+                    tick,
+                    message,
+                    file: None,
+                    settings: Vec::new(),
+                });
             }
         }
     }

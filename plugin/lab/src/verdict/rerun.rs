@@ -61,7 +61,8 @@ fn testers(testers: &[TesterRecord]) -> String {
 
 /// A tester as `playbot view` takes it, which knows files of policies alone.
 fn seen(tester: &TesterRecord) -> String {
-    let unnamed = TesterRecord { name: tester.file.clone().unwrap_or_else(|| tester.name.clone()), file: None, ..tester.clone() };
+    let unnamed =
+        TesterRecord { name: tester.file.clone().unwrap_or_else(|| tester.name.clone()), file: None, ..tester.clone() };
     testers(&[unnamed])
 }
 

@@ -1,10 +1,10 @@
 //! The Adam optimizer over named parameters.
 
-use super::cpu::fast_math::vectorized;
 use super::grads::NamedGrads;
 use super::params::{ParamVisitor, Parameters};
 use crate::LearnError;
 use burn::tensor::{Tensor, TensorData};
+use macerator::Simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,6 +12,8 @@ use std::iter::Peekable;
 
 /// Numbers that one thread updates at a time.
 const CHUNK: usize = 1 << 14;
+/// Numbers up to which a second thread costs more than it saves.
+const FEW: usize = 1 << 16;
 /// Numbers that are updated side by side.
 const LANES: usize = 16;
 
@@ -150,13 +152,17 @@ impl<I: Iterator> Step<'_, I> {
         }
         let moments = self.moments.get_mut(name).expect("inserted above if it was missing");
         let formula = &self.formula;
-        let rows = weights.par_chunks_mut(CHUNK).zip(grad.par_chunks(CHUNK));
-        let moments = moments.m.par_chunks_mut(CHUNK).zip(moments.v.par_chunks_mut(CHUNK));
-        let finite = rows.zip(moments).map(|((w, g), (m, v))| formula.apply(w, g, m, v));
-        if !finite.reduce(|| true, |a, b| a && b) {
-            return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: Some(self.steps) });
-        }
-        Ok(())
+        let is_finite = if weights.len() <= FEW {
+            formula.apply(weights, grad, &mut moments.m, &mut moments.v)
+        } else {
+            let rows = weights.par_chunks_mut(CHUNK).zip(grad.par_chunks(CHUNK));
+            let moments = moments.m.par_chunks_mut(CHUNK).zip(moments.v.par_chunks_mut(CHUNK));
+            let finite = rows.zip(moments).map(|((w, g), (m, v))| formula.apply(w, g, m, v));
+            finite.reduce(|| true, |a, b| a && b)
+        };
+        is_finite
+            .then_some(())
+            .ok_or_else(|| LearnError::NotFinite { tensor: name.to_owned(), steps: Some(self.steps) })
     }
 }
 
@@ -192,31 +198,47 @@ impl Formula {
 
     /// Updates weights and moments, and says whether all weights are finite.
     fn apply(&self, weights: &mut [f32], grad: &[f32], m: &mut [f32], v: &mut [f32]) -> bool {
-        let Self { beta, gain, eps, scale, decay, rate, correction } = *self;
         // 0 for finite numbers, NaN otherwise.
         let mut witness = [0.0f32; LANES];
-        let mut update = |lane: usize, w: &mut f32, g: f32, m: &mut f32, v: &mut f32| {
-            let g = g * scale;
-            *m = beta.0 * *m + gain.0 * g;
-            *v = beta.1 * *v + gain.1 * g * g;
-            *w = *w * decay - rate * *m / ((*v * correction).sqrt() + eps);
-            witness[lane] += *w * 0.0;
-        };
-        vectorized(|| {
-            let (weights, w_rest) = weights.as_chunks_mut::<LANES>();
-            let (grad, g_rest) = grad.as_chunks::<LANES>();
-            let (m, m_rest) = m.as_chunks_mut::<LANES>();
-            let (v, v_rest) = v.as_chunks_mut::<LANES>();
-            for ((w, g), (m, v)) in weights.iter_mut().zip(grad).zip(m.iter_mut().zip(v)) {
-                for lane in 0..LANES {
-                    update(lane, &mut w[lane], g[lane], &mut m[lane], &mut v[lane]);
-                }
-            }
-            for ((w, &g), (m, v)) in w_rest.iter_mut().zip(g_rest).zip(m_rest.iter_mut().zip(v_rest)) {
-                update(0, w, g, m, v);
-            }
-        });
+        update(self, weights, grad, m, v, &mut witness);
         witness.iter().sum::<f32>() == 0.0
+    }
+
+    /// Updates one weight and its moments, and gives 0 if it is finite.
+    #[inline(always)]
+    fn apply_to(&self, w: &mut f32, g: f32, m: &mut f32, v: &mut f32) -> f32 {
+        let Self { beta, gain, eps, scale, decay, rate, correction } = *self;
+        let g = g * scale;
+        *m = beta.0 * *m + gain.0 * g;
+        *v = beta.1 * *v + gain.1 * g * g;
+        *w = *w * decay - rate * *m / ((*v * correction).sqrt() + eps);
+        *w * 0.0
+    }
+}
+
+#[macerator::with_simd]
+#[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
+fn update<S: Simd>(
+    formula: &Formula,
+    weights: &mut [f32],
+    grad: &[f32],
+    m: &mut [f32],
+    v: &mut [f32],
+    witness: &mut [f32; LANES],
+) {
+    {
+        let (weights, w_rest) = weights.as_chunks_mut::<LANES>();
+        let (grad, g_rest) = grad.as_chunks::<LANES>();
+        let (m, m_rest) = m.as_chunks_mut::<LANES>();
+        let (v, v_rest) = v.as_chunks_mut::<LANES>();
+        for ((w, g), (m, v)) in weights.iter_mut().zip(grad).zip(m.iter_mut().zip(v)) {
+            for lane in 0..LANES {
+                witness[lane] += formula.apply_to(&mut w[lane], g[lane], &mut m[lane], &mut v[lane]);
+            }
+        }
+        for ((w, &g), (m, v)) in w_rest.iter_mut().zip(g_rest).zip(m_rest.iter_mut().zip(v_rest)) {
+            witness[0] += formula.apply_to(w, g, m, v);
+        }
     }
 }
 

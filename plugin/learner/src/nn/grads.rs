@@ -5,6 +5,9 @@ use crate::LearnError;
 use burn::tensor::{Gradients, Tensor, TensorData};
 use rayon::prelude::*;
 
+/// Numbers up to which a second thread costs more than it saves.
+const FEW: usize = 1 << 17;
+
 /// The gradients of a network's parameters on the host, in the order of [`Parameters::visit`].
 #[derive(Clone, Debug, Default)]
 pub struct NamedGrads {
@@ -44,8 +47,14 @@ impl NamedGrads {
 
     /// The Euclidean norm over all gradients together.
     pub fn norm(&self) -> f64 {
+        let sum_of = |(_, values): &(String, TensorData)| square_sum(numbers(values));
+        let all: usize = self.entries.iter().map(|(_, values)| values.num_elements()).sum();
         // Each sum is made by one thread, and the sums are added in order.
-        let sums: Vec<f64> = self.entries.par_iter().map(|(_, values)| square_sum(numbers(values))).collect();
+        let sums: Vec<f64> = if all <= FEW {
+            self.entries.iter().map(sum_of).collect()
+        } else {
+            self.entries.par_iter().map(sum_of).collect()
+        };
         sums.iter().sum::<f64>().sqrt()
     }
 

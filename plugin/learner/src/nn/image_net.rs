@@ -161,7 +161,7 @@ pub(super) fn last_layer(fc: &Linear, flat: Tensor<2>) -> Tensor<2> {
     // Matrix libraries sum a single row in another order than the rows of a matrix; an image's features shall not
     // depend on the others in the batch.
     let flat = if n == 1 { flat.repeat_dim(0, 2) } else { flat };
-    Activation::Relu.forward(fc.forward(flat)).narrow(0, 0, n)
+    fc.activated(flat, Activation::Relu).narrow(0, 0, n)
 }
 
 impl Parameters for ImageNet {

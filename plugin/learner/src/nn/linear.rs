@@ -1,5 +1,7 @@
 //! A linear layer.
 
+use super::Activation;
+use super::cpu::dense::dense;
 use super::params::{ParamVisitor, Parameters, path};
 use super::source::{Init, ParamSource, RandomInit};
 use burn::tensor::{Device, Tensor, module::linear};
@@ -35,8 +37,18 @@ impl Linear {
         })
     }
 
-    /// `[.., inputs]` to `[.., outputs]`.
-    pub fn forward<const D: usize>(&self, x: Tensor<D>) -> Tensor<D> {
+    /// `[n, inputs]` to `[n, outputs]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        dense(&x, &self.weight, &self.bias, None).unwrap_or_else(|| self.plain(x))
+    }
+
+    /// The activation of [`Self::forward`].
+    pub fn activated(&self, x: Tensor<2>, activation: Activation) -> Tensor<2> {
+        dense(&x, &self.weight, &self.bias, Some(activation)).unwrap_or_else(|| activation.forward(self.plain(x)))
+    }
+
+    /// By the backend's own operations.
+    fn plain(&self, x: Tensor<2>) -> Tensor<2> {
         linear(x, self.weight.clone(), Some(self.bias.clone()))
     }
 

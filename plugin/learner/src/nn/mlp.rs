@@ -60,7 +60,7 @@ impl Mlp {
 
     /// The last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
     pub fn features(&self, x: Tensor<2>) -> Tensor<2> {
-        self.layers.iter().fold(x, |x, layer| self.activation.forward(layer.forward(x)))
+        self.layers.iter().fold(x, |x, layer| layer.activated(x, self.activation))
     }
 
     /// [`Self::features`] of `[held, x]` joined, where row `b` of `held` `[B, H]` goes with the rows `t * B + b` of
@@ -70,7 +70,7 @@ impl Mlp {
             return Tensor::cat(vec![held.repeat_dim(0, steps), x], 1);
         };
         let first = self.activation.forward(first.forward_held(held, x, steps));
-        rest.iter().fold(first, |x, layer| self.activation.forward(layer.forward(x)))
+        rest.iter().fold(first, |x, layer| layer.activated(x, self.activation))
     }
 
     /// `[n, inputs]` to `[n, outputs]`.

@@ -38,8 +38,8 @@ impl ScoreTable {
             ),
             "A mutant is found if a detector finds something or the game breaks, if it is proved that nobody can solve it, \
              or if a tester fails that solves at least 99 % of the sound levels of the game. One that solves fewer, but \
-             collects much the same reward on all of them, fails where it collects more or less by more than these lie apart. On a sound level \
-             the same, held against the others, is a false finding."
+             collects much the same reward on all of them, fails by a reward outside of all those and more than four standard \
+             deviations from their mean. On a sound level the same, held against the others, is a false finding."
                 .to_owned(),
             "Beside a sound build, a difference from the same tester's episodes on the sound level counts too: any, where \
              nothing is left to chance, else by Fisher's exact test, with at most one in twenty false over all mutants \

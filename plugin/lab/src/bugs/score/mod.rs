@@ -45,4 +45,4 @@ pub use run::{ScoreRun, ScoreWatch};
 pub use subject::{Subject, SubjectKind};
 pub use table::{ClassRow, FEW_FALSE, ScoreTable};
 pub use tester_row::TesterRow;
-pub use usual_reward::FEWEST_SOUND;
+pub use usual_reward::{FAR, FEWEST_SOUND};

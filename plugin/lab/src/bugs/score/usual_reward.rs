@@ -9,6 +9,9 @@ use super::{
 
 /// Fewest sound levels, beside the one that is looked at, from which a tester's usual reward is known.
 pub const FEWEST_SOUND: usize = 8;
+/// Standard deviations from the mean that are far: with 20 sound levels and normal rewards, one in a thousand lies there (Student's
+/// t with 19 degrees of freedom).
+pub const FAR: f64 = 4.0;
 
 /// The rewards of each tester on the sound levels of each game.
 ///
@@ -33,20 +36,27 @@ impl<'a> UsualRewards<'a> {
         Self { known }
     }
 
-    /// Whether a tester's reward lies outside of what it collects on the sound levels of the game, this one left out, by more
-    /// than these lie apart: below `least - (most - least)` or above `most + (most - least)`. Only a tester that collects
-    /// much the same on all of them says something: the least and the most lie less far apart than their middle from 0.
+    /// Whether a tester's reward lies outside of all that it collects on the sound levels of the game, this one left out, and
+    /// more than [`FAR`] standard deviations from their mean. Only a tester that collects much the same on all of them says
+    /// something: the least and the most lie less far apart than their middle from 0.
     pub fn is_unusual(&self, game: &str, result: &JobResult) -> bool {
         let Some(reward) = result.reward else { return false };
         let Some(known) = self.known.get(&(game, result.tester.as_str())) else { return false };
-        let others = known.iter().filter(|(subject, _)| *subject != result.subject).map(|(_, reward)| *reward);
-        let nothing = (0, f64::INFINITY, f64::NEG_INFINITY);
-        let (count, least, most) = others
-            .fold(nothing, |(count, least, most), reward| (count + 1, f64::min(least, reward), f64::max(most, reward)));
-        let (apart, middle) = (most - least, least.midpoint(most));
-        let is_steady = count >= FEWEST_SOUND && apart < middle.abs();
-        is_steady && !(least - apart..=most + apart).contains(&reward)
+        let others: Vec<f64> =
+            known.iter().filter(|(subject, _)| *subject != result.subject).map(|(_, reward)| *reward).collect();
+        let [least, most] = [(f64::INFINITY, f64::min as fn(f64, f64) -> f64), (f64::NEG_INFINITY, f64::max)]
+            .map(|(none, of)| others.iter().copied().fold(none, of));
+        let is_steady = others.len() >= FEWEST_SOUND && most - least < least.midpoint(most).abs();
+        is_steady && !(least..=most).contains(&reward) && is_far(reward, &others)
     }
+}
+
+/// Whether a number is more than [`FAR`] standard deviations from the mean of these, of which there are two or more.
+fn is_far(number: f64, others: &[f64]) -> bool {
+    let count = others.len() as f64;
+    let mean = others.iter().sum::<f64>() / count;
+    let variance = others.iter().map(|other| (other - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (number - mean).abs() > FAR * variance.sqrt()
 }
 
 #[cfg(test)]
@@ -75,8 +85,12 @@ mod tests {
     #[test]
     fn a_reward_is_unusual_far_outside_of_those_of_sound_levels() {
         let sound_rewards = [10.0, 11.0, 12.0, 10.5, 11.5, 10.0, 12.0, 11.0, 11.0];
+        // Mean 11, standard deviation 0.75.
         let rewards = [11.0, 8.1, 7.9, 13.9, 14.1, -3.0];
         assert_eq!(unusual(&sound_rewards, &rewards).0, [false, false, true, false, true, true]);
+        let skewed = [10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 10.0, 14.9];
+        let skewed = [skewed.as_slice(), &[10.0; 15]].concat();
+        assert_eq!(unusual(&skewed, &[14.8]).0, [false], "no more than another one");
         assert!(unusual(&sound_rewards, &rewards).1.is_empty());
     }
 

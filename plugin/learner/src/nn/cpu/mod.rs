@@ -1,7 +1,13 @@
-//! Loops of our own for the backends whose numbers are in host memory: tanh, the recurrent part of a GRU layer, and the
-//! convolutions of an image encoder.
+//! Loops of our own for the backends whose numbers are in host memory: tanh, dense layers, the recurrent part of a GRU layer,
+//! and the convolutions of an image encoder.
 
+pub(in crate::nn) mod dense;
 pub(in crate::nn) mod fast_math;
 mod gru_scan;
+mod host_numbers;
 pub(in crate::nn) mod kernels;
+mod outer;
+mod relu;
+mod store;
+mod tile;
 pub(in crate::nn) mod trunk;

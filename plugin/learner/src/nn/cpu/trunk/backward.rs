@@ -4,11 +4,11 @@ use super::forward::SavedActivations;
 use super::layer::{Layer, Weights};
 use super::plan::{Plan, Step};
 use super::pool;
-use super::relu_backward;
-use super::store::{AddWhere, Write};
-use super::tile::{LANES, Lanes};
 use super::workspace::Workspace;
 use crate::nn::cpu::fast_math::vectorized;
+use crate::nn::cpu::relu::relu_backward;
+use crate::nn::cpu::store::{AddWhere, Write};
+use crate::nn::cpu::tile::{LANES, Lanes};
 use rayon::prelude::*;
 
 /// Into how many parts a batch is split, each with its own sums of gradients.

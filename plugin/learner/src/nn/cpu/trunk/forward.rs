@@ -4,10 +4,10 @@ use super::kept_memory::KeptMemory;
 use super::layer::Weights;
 use super::plan::{Layout, Plan, Step};
 use super::pool;
-use super::relu;
-use super::store::{Add, Write, WriteRelu};
 use super::workspace::Workspace;
 use crate::nn::cpu::fast_math::vectorized;
+use crate::nn::cpu::relu::relu;
+use crate::nn::cpu::store::{Add, Write, WriteRelu};
 use rayon::prelude::*;
 
 /// Images that a thread takes at a time, at least.

@@ -1,11 +1,11 @@
 //! One convolution of one image.
 
 use super::grid::Grid;
-use super::outer::{column_sums, outer};
 use super::shape::ConvShape;
-use super::store::{Add, Store, Write};
-use super::tile::{LANES, Lanes, Window, correlate};
 use super::winograd::{self, PointBuffers};
+use crate::nn::cpu::outer::{column_sums, outer};
+use crate::nn::cpu::store::{Add, Store, Write};
+use crate::nn::cpu::tile::{LANES, Lanes, Window, correlate};
 use crate::nn::window_places;
 
 /// A convolution between two grids.

@@ -13,19 +13,15 @@ mod grid;
 mod kept_memory;
 mod layer;
 mod op;
-mod outer;
 mod plan;
 mod points;
 mod pool;
 mod products;
 mod shape;
 mod stage;
-mod store;
 #[cfg(test)]
 mod tests;
-mod tile;
 mod winograd;
 mod workspace;
 
 pub(in crate::nn) use stage::{Stage, forward as features};
-use stage::{relu, relu_backward};

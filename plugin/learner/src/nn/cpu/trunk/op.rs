@@ -4,6 +4,7 @@ use super::backward::gradients;
 use super::forward::{SavedActivations, features, features_and_saved};
 use super::layer::Weights;
 use super::plan::Plan;
+use crate::nn::cpu::host_numbers::HostNumbers;
 use crate::nn::cpu::kernels::tensor;
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
 use burn::backend::autodiff::grads::Gradients;
@@ -12,7 +13,6 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, DispatchDevice, Flex, TensorMetadata, backend_extension};
 use burn::tensor::{Device, Tensor};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Whether `device` has this operation.
@@ -30,20 +30,6 @@ pub(super) fn trunk(pixels: Tensor<4>, params: Tensor<1>, plan: Arc<Plan>) -> Te
 pub(super) trait Trunks: Backend {
     /// As [`trunk`].
     fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self>;
-}
-
-/// A backend whose numbers can be read without a copy.
-pub(super) trait HostNumbers: Backend {
-    /// The numbers, row-major.
-    fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]>;
-}
-
-impl HostNumbers for Flex {
-    fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]> {
-        let copy = || tensor.to_contiguous().as_slice().map(<[f32]>::to_vec);
-        let values = tensor.as_slice().map(Cow::Borrowed).or_else(|| copy().map(Cow::Owned));
-        values.expect("a tensor in row-major order can be read")
-    }
 }
 
 impl Trunks for Flex {

@@ -2,8 +2,8 @@
 
 use super::grid::Grid;
 use super::products::Matrices;
-use super::store::Store;
-use super::tile::{LANES, Lanes, lanes_at};
+use crate::nn::cpu::store::Store;
+use crate::nn::cpu::tile::{LANES, Lanes, lanes_at};
 use macerator::Simd;
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! The largest of 3×3 pixels, at every second pixel.
 
 use super::grid::Grid;
-use super::tile::{LANES, Lanes};
+use crate::nn::cpu::tile::{LANES, Lanes};
 use crate::nn::window_places;
 use macerator::Simd;
 use std::ops::Range;

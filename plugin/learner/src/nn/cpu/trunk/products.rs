@@ -3,7 +3,7 @@
 //! As in [`tile`](super::tile), each sum is made by fused multiply-adds in an order of its own, whatever the width of
 //! vectors.
 
-use super::tile::{LANES, Lanes, fused, is_wide, lanes_at};
+use crate::nn::cpu::tile::{LANES, Lanes, fused, is_wide, lanes_at};
 use macerator::Simd;
 
 /// Rows at a time where a vector has all lanes: with two blocks of channels the sums take 16 of 32 registers.

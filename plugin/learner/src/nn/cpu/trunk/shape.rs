@@ -1,6 +1,6 @@
 //! Sizes of a convolution, and the orders in which its weights lie.
 
-use super::tile::LANES;
+use crate::nn::cpu::tile::LANES;
 
 /// Sizes of a convolution with a square kernel.
 #[derive(Clone, Copy, Debug)]
@@ -39,13 +39,13 @@ impl ConvShape {
         }
     }
 
-    /// Row and lane of a weight in the order for [`correlate`](super::tile::correlate).
+    /// Row and lane of a weight in the order for [`correlate`](crate::nn::cpu::tile::correlate).
     pub(super) fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
         let rows = self.kernel * self.kernel * self.inputs;
         (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
     }
 
-    /// Rows in the order for [`correlate`](super::tile::correlate).
+    /// Rows in the order for [`correlate`](crate::nn::cpu::tile::correlate).
     pub(super) fn forward_rows(self) -> usize {
         self.outputs.div_ceil(LANES) * self.kernel * self.kernel * self.inputs
     }

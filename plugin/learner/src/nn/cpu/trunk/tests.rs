@@ -1,10 +1,10 @@
 //! The trunk against burn's own operations, finite differences, other batches and other numbers of threads.
 
 use super::shape::ConvShape;
-use super::store::Write;
 use super::winograd::PointBuffers;
 use super::*;
 use crate::DeviceKind;
+use crate::nn::cpu::store::Write;
 use crate::nn::{Activation, Conv2d, host, max_pool, vector};
 use crate::rng::{Streams, normal};
 use burn::tensor::{Tensor, TensorData};

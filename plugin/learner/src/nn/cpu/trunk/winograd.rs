@@ -10,8 +10,8 @@ use super::grid::Grid;
 use super::points::{POINTS, Strip, transform_back, transform_gradient, transform_seen};
 use super::products::{add_products, products};
 use super::shape::{ConvShape, Place};
-use super::store::Store;
-use super::tile::{LANES, Lanes};
+use crate::nn::cpu::store::Store;
+use crate::nn::cpu::tile::{LANES, Lanes};
 
 /// G, by which weights become points.
 const G: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0.0, 0.0, 1.0]];

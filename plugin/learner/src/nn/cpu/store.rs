@@ -2,8 +2,8 @@
 //!
 //! These are no closures, since only what is inlined for certain is compiled for the vectors of the loops around it.
 
+use super::relu::{relu, relu_backward};
 use super::tile::{LANES, Lanes};
-use super::{relu, relu_backward};
 
 /// Gets the sums of a pixel's channels, up to 16 at a time.
 pub(super) trait Store {

@@ -1,0 +1,44 @@
+//! Weights in the orders in which products read them.
+
+use super::share::share;
+use crate::nn::cpu::tile::{LANES, Lanes};
+
+/// Weights for [`correlate`](crate::nn::cpu::tile::correlate): for each block of 16 columns of a product its rows, 16
+/// numbers each, zeros beyond the last column.
+pub(super) struct Packed {
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    pub(super) lanes: Vec<Lanes>,
+}
+
+impl Packed {
+    /// Of the matrix `[rows, columns]`.
+    pub(super) fn new(matrix: &[f32], rows: usize, columns: usize) -> Self {
+        let mut lanes = vec![[0.0; LANES]; rows * columns.div_ceil(LANES)];
+        share(&mut lanes, rows.max(1), matrix.len(), |block, lanes| {
+            let first = block * LANES;
+            for (lanes, row) in lanes.iter_mut().zip(matrix.chunks_exact(columns)) {
+                match row[first..].first_chunk() {
+                    Some(row) => *lanes = *row,
+                    None => lanes.iter_mut().zip(&row[first..]).for_each(|(lane, number)| *lane = *number),
+                }
+            }
+        });
+        Self { rows, columns, lanes }
+    }
+
+    /// Of the transpose of the matrix `[columns, rows]`.
+    pub(super) fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Self {
+        let mut lanes = vec![[0.0; LANES]; rows * columns.div_ceil(LANES)];
+        share(&mut lanes, rows.max(1), matrix.len(), |block, lanes| {
+            let of_block = &matrix[block * LANES * rows..];
+            let count = LANES.min(columns - block * LANES);
+            for (row, lanes) in lanes.iter_mut().enumerate() {
+                for (lane, number) in lanes.iter_mut().enumerate().take(count) {
+                    *number = of_block[lane * rows + row];
+                }
+            }
+        });
+        Self { rows, columns, lanes }
+    }
+}
