@@ -1,5 +1,5 @@
-//! Recordings, skill models, checkpoints and policy files of an older program load, and come to what they came to then.
-//! `fixtures/older/README.md` says how they were made.
+//! Recordings, skill models, checkpoints and policy files of an older program load, and come to what they came to then, up to
+//! roundings: networks make their sums in another order since. `fixtures/older/README.md` says how they were made.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -7,6 +7,7 @@ mod program;
 use std::{fs, path::Path};
 
 use program::{done, json_lines};
+use serde_json::Value;
 
 const OLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/older");
 const FILES: [&str; 6] = ["bot.policy", "few.demo", "policy.json", "run.json", "skills.safetensors", "small.ron"];
@@ -47,8 +48,28 @@ fn measures_as_then(args: &[&str], then: &str) {
     for (now, then) in now.iter().zip(&then) {
         let then = then.as_object().expect("a line is an object");
         for (key, value) in then.iter().filter(|(key, _)| *key != "return_se") {
-            assert_eq!(&now[key], value, "{key}");
+            assert!(is_near(&now[key], value), "{key}: {} is not {value}", now[key]);
         }
+    }
+}
+
+/// Whether two values are the same up to roundings.
+fn is_near(now: &Value, then: &Value) -> bool {
+    match (now.as_f64(), then.as_f64()) {
+        (Some(now), Some(then)) => (now - then).abs() <= 1e-5 + 1e-3 * then.abs(),
+        _ => now == then,
+    }
+}
+
+/// That a run has trained as the older one did.
+fn trained_as_then(folder: &Path, run: &str, then: &str) {
+    let (now, then) = (json_lines(&read(folder, &format!("{run}/metrics.jsonl"))), json_lines(then));
+    assert_eq!(now.len(), then.len());
+    for (now, then) in now.iter().zip(&then) {
+        let (now, then) = (now.as_object().expect("an object"), then.as_object().expect("an object"));
+        assert!(now.keys().eq(then.keys()), "{now:?} and {then:?}");
+        let differs = now.iter().find(|(key, value)| !is_near(value, &then[*key]));
+        assert_eq!(differs, None, "then {then:?}");
     }
 }
 
@@ -75,7 +96,7 @@ fn a_training_goes_on_from_its_checkpoint_as_it_went_on_then() {
     let then = read(folder.path(), "run/metrics.jsonl");
     fs::remove_dir_all(folder.path().join("run/checkpoints/step-000000000256")).expect("the last of three");
     done(folder.path(), &["train", "--resume", "--run", "run"]);
-    assert_eq!(read(folder.path(), "run/metrics.jsonl"), then);
+    trained_as_then(folder.path(), "run", &then);
     assert!(folder.path().join("run/checkpoints/step-000000000256").is_dir(), "it has got as far again");
 }
 
@@ -84,5 +105,5 @@ fn a_training_starts_from_a_skill_model() {
     let folder = older();
     let args = ["train", "--experiment", "small.ron", "--skills", "skills.safetensors", "--run", "again"];
     done(folder.path(), &args);
-    assert_eq!(read(folder.path(), "again/metrics.jsonl"), read(folder.path(), "run/metrics.jsonl"));
+    trained_as_then(folder.path(), "again", &read(folder.path(), "run/metrics.jsonl"));
 }

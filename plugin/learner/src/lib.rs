@@ -33,6 +33,7 @@
 //! # Ok::<(), playbot_learner::LearnError>(())
 //! ```
 
+mod among_workers;
 mod device;
 mod error;
 mod file;
@@ -51,6 +52,7 @@ pub mod skill;
 mod space;
 mod spec;
 
+pub use among_workers::among_workers;
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
 pub use file::{write_atomically, write_atomically_with};

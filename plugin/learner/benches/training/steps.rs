@@ -3,7 +3,7 @@
 use burn::tensor::{Tensor, TensorData};
 use criterion::Criterion;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind,
+    ActionSpace, Actions, Dataset, DemoEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind, among_workers,
     nn::{ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, tracked},
     policy::{Actor, Critic, NetShape},
     ppo::{Minibatch, PpoBatch, PpoNets, gradient_step},
@@ -32,12 +32,14 @@ pub fn mlp(criterion: &mut Criterion) {
         let mut net = tracked(&Mlp::new(37, &[200, 200], 8, Activation::Tanh, 1.0, &mut rng, &DEVICE.plain()));
         let mut adam = Adam::new(AdamConfig::default());
         let (x, target) = (matrix(batch, 37, &mut rng), matrix(batch, 8, &mut rng));
+        let mut step = || {
+            let loss = (net.forward(x.clone()) - target.clone()).square().mean();
+            let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");
+            adam.step(&mut net, "", &grads, 3e-4, 1.0).expect("fits");
+        };
         criterion.bench_function(&format!("step/mlp-37-200-200-8/{batch}"), |bencher| {
-            bencher.iter(|| {
-                let loss = (net.forward(x.clone()) - target.clone()).square().mean();
-                let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");
-                adam.step(&mut net, "", &grads, 3e-4, 1.0).expect("fits");
-            });
+            // As updates do.
+            among_workers(|| bencher.iter(&mut step));
         });
     }
 }
@@ -68,7 +70,9 @@ pub fn ppo(criterion: &mut Criterion) {
     };
     let (config, mut adam) = (PpoConfig::default(), Adam::new(AdamConfig::default()));
     criterion.bench_function("step/ppo-563-200-200-15/2048", |bencher| {
-        bencher.iter(|| gradient_step(&mut nets, &mut adam, &batch, &config, None, 3e-4).expect("finite"));
+        among_workers(|| {
+            bencher.iter(|| gradient_step(&mut nets, &mut adam, &batch, &config, None, 3e-4).expect("finite"));
+        });
     });
 }
 
@@ -85,11 +89,12 @@ pub fn images(criterion: &mut Criterion) {
             let (mut net, target) = (tracked(&frozen), matrix(batch, kind.features(), &mut rng));
             let mut adam = Adam::new(AdamConfig::default());
             criterion.bench_function(&format!("step/{name}/{batch}"), |bencher| {
-                bencher.iter(|| {
+                let mut step = || {
                     let loss = (net.forward(image_tensor(bytes.clone())) - target.clone()).square().mean();
                     let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");
                     adam.step(&mut net, "", &grads, 3e-4, 1.0).expect("fits");
-                });
+                };
+                among_workers(|| bencher.iter(&mut step));
             });
         }
     }

@@ -8,7 +8,7 @@ use crate::norm::ObsStats;
 use crate::policy::{InputBuilder, NetInput, StateBatch};
 use crate::rng::shuffle;
 use crate::score::{Penalty, ScoreConfig, TeacherBatch, TeacherOutput, penalty};
-use crate::{LearnError, Observations, Rollout};
+use crate::{LearnError, Observations, Rollout, among_workers};
 use burn::tensor::Device;
 use std::sync::Arc;
 
@@ -45,6 +45,10 @@ impl PpoLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
+        among_workers(|| self.update_here(rollout))
+    }
+
+    fn update_here(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
         rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
         let rewards = match &mut self.base.rewards {
             Some(normalizer) => normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?,

@@ -6,7 +6,7 @@ use super::transitions::check_ends;
 use super::{EntropyCoef, SacBatch, SacLearner, SacMetrics, actor_step, critic_step, soft_update, temperature_step};
 use crate::nn::matrix;
 use crate::rng::{ChaCha8Rng, normal};
-use crate::{ActionSpace, LearnError, Rollout};
+use crate::{ActionSpace, LearnError, Rollout, among_workers};
 use burn::tensor::Tensor;
 
 impl SacLearner {
@@ -20,6 +20,10 @@ impl SacLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
+        among_workers(|| self.update_here(rollout))
+    }
+
+    fn update_here(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
         let base = &mut self.base;
         rollout.check_for(&base.spec, base.rollout_latent())?;
         check_ends(rollout)?;

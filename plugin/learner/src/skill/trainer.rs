@@ -6,7 +6,7 @@ use crate::nn::{
 };
 use crate::norm::ObsStats;
 use crate::rng::{Streams, normal};
-use crate::{Actions, DeviceKind, LearnError, Observations};
+use crate::{Actions, DeviceKind, LearnError, Observations, among_workers};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -147,7 +147,7 @@ impl SkillTrainer {
     pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
         let end = (self.next + self.config.batch).min(self.windows.len());
         let windows = self.windows[self.next..end].to_vec();
-        let metrics = self.step(&windows)?;
+        let metrics = among_workers(|| self.step(&windows))?;
         self.sums.add(&metrics);
         self.next = end;
         if end == self.windows.len() {

@@ -16,25 +16,22 @@ use playbot_lab::{
 };
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&defects::add_to(
-        rules::add_to(ForeignGame::new("alien_cake_addict", 1, game))
-            .hz(20.0)
-            .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
-            .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
-                [g.player.i, g.player.j, g.bonus.i, g.bonus.j, g.bonus.entity.iter().len()].map(|n| n as f32 / 10.0)
-            })
-            .place(|game: Res<Game>| Vec2::new(game.player.i as f32, game.player.j as f32))
-            .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
-            .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
-            .time_limit(1200)
-            .restart(Restart::state(GameState::Playing))
-            .level(refresh)
-            .demonstrator("glutton", |game: Res<Game>| {
-                let (at, cake) = (&game.player, &game.bonus);
-                [at.i < cake.i, at.i > cake.i, at.j < cake.j, at.j > cake.j].iter().position(|go| *go).unwrap_or(4)
-                    as u32
-            }),
-    )])
+    playbot_cli::main(&[&rules::add_to(ForeignGame::new("alien_cake_addict", 1, game))
+        .hz(20.0)
+        .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
+        .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
+            [g.player.i, g.player.j, g.bonus.i, g.bonus.j, g.bonus.entity.iter().len()].map(|n| n as f32 / 10.0)
+        })
+        .place(|game: Res<Game>| Vec2::new(game.player.i as f32, game.player.j as f32))
+        .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
+        .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
+        .time_limit(1200)
+        .restart(Restart::state(GameState::Playing))
+        .level(refresh)
+        .demonstrator("glutton", |game: Res<Game>| {
+            let (at, cake) = (&game.player, &game.bonus);
+            [at.i < cake.i, at.i > cake.i, at.j < cake.j, at.j > cake.j].iter().position(|go| *go).unwrap_or(4) as u32
+        })])
 }
 
 /// What the game's own setup leaves as it is: the timer, an old cake, and where the camera looks.

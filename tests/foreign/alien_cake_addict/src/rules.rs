@@ -6,9 +6,11 @@ use playbot_lab::{
     foreign::ForeignGame,
 };
 
-/// The game with the detector.
+use crate::defects;
+
+/// The game with the detector, and with the defects that it can have.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
-    game.detector(|| {
+    defects::add_to(game).detector(|| {
         EachTick::new("cake-rules", "a cake is eaten by nobody who walked onto it, or not by who did", |moment| {
             broken_rule(moment)
         })
