@@ -53,7 +53,8 @@ pub mod proof;
 pub mod report;
 pub mod runs;
 pub mod sensors;
-mod shell_word;
+#[doc(hidden)]
+pub mod shell_word;
 pub mod space_view;
 pub mod split;
 pub mod stage_clock;

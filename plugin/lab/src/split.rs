@@ -79,13 +79,18 @@ impl fmt::Display for LevelSplit {
     }
 }
 
+/// The level files that somebody may have meant.
+fn files_like(text: &str) -> &str {
+    if text.ends_with(".json") { text } else { "levels/*.json" }
+}
+
 /// The text is not a split.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum SplitError {
     /// It is written in another way.
     #[error(
-        "`{0}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, or name level files, \
-         as in files:levels/*.json"
+        "`{}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, or name level files, \
+         as in files:{}", .0, files_like(.0)
     )]
     NotARange(String),
     /// The range goes backwards.

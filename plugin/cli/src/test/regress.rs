@@ -107,8 +107,10 @@ fn table(folder: &Path, regression: &Regression) -> PlainTable {
 
 fn tell_all(regression: &Regression) {
     let count = |status| regression.rows.iter().filter(|row| row.status == status).count();
+    let pinned = regression.rows.iter().filter(|row| row.pin.as_ref().is_some_and(|pin| !pin.expired)).count();
+    let pinned = if pinned > 0 { format!("; {pinned} pinned") } else { String::new() };
     tell!(
-        "{}: {} still there, {} there in another way, {} gone, {} unplayable",
+        "{}: {} still there, {} there in another way, {} gone, {} unplayable{pinned}",
         counted(regression.rows.len() as u64, "finding"),
         count(FindingStatus::StillThere),
         count(FindingStatus::Changed),

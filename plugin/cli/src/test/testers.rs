@@ -21,7 +21,7 @@ use crate::{error::CliError, named::Named, player::Chosen};
 pub struct TesterArgs {
     /// Bots of the game, such as random, separated by commas; a name that it does not have lists all. Its demonstrator, or
     /// else its first bot, if nobody is named.
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = trimmed)]
     bot: Vec<String>,
     /// Policy file, as written by `playbot policy export`; may be given several times. Results know it by the name of the
     /// file, or by a name in front of it, as in ppo=runs/bot.policy: under one name --against knows a file again that was moved.
@@ -36,6 +36,11 @@ pub struct TesterArgs {
     /// Policies take their most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
+}
+
+/// A name without the blanks that people write behind commas.
+fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
+    Ok(name.trim().to_owned())
 }
 
 impl TesterArgs {

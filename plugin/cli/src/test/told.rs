@@ -5,9 +5,10 @@ use std::{fs, path::Path};
 use playbot_lab::{
     game::Game,
     report::{PlainTable, readable, whole},
+    shell_word::shell_word,
     verdict::{
-        AGAINST, Comparison, JUNIT, LevelVerdict, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal, Trials, wilson,
-        write_reports,
+        AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal,
+        Trials, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -93,7 +94,8 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
 fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
     let findings = overview.worst.iter().flat_map(|level| &level.findings);
     let files = findings.filter_map(|finding| finding.file.as_ref()).take(MOST_REPLAYS);
-    files.map(|file| format!("see it: {} replay {}", program::name(), folder.join(file).display())).collect()
+    let word = |file: &String| shell_word(&folder.join(file).display().to_string());
+    files.map(|file| format!("see it: {} replay {}", program::name(), word(file))).collect()
 }
 
 fn counts(overview: &Overview) -> String {
@@ -139,7 +141,10 @@ fn worst(overview: &Overview) -> PlainTable {
         ]
     };
     PlainTable {
-        caption: "levels to look at".to_owned(),
+        caption: match overview.worst.len() {
+            MOST_WORST => format!("levels to look at, the worst {MOST_WORST}"),
+            _ => "levels to look at".to_owned(),
+        },
         columns: ["level", "outcome", "solved", "ticks", "lost", "timed out", "visited", "finding"]
             .map(str::to_owned)
             .to_vec(),

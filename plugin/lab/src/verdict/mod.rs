@@ -67,7 +67,7 @@ pub use level_pars::LevelPars;
 pub use level_verdict::{EndPlace, Finding, LevelOutcome, LevelVerdict, Score, TesterVerdict};
 pub use map_scope::MapScope;
 pub use merge::merge;
-pub use overview::{Overview, TesterTotal};
+pub use overview::{MOST_WORST, Overview, TesterTotal};
 pub use places::Places;
 pub use plan::{TestPlan, TestRecord};
 pub use report_files::{AGAINST, JUNIT, SUMMARY, write_reports};

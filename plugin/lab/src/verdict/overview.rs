@@ -12,7 +12,7 @@ use super::{
 };
 
 /// Most levels that are told as the worst.
-const MOST_WORST: usize = 20;
+pub const MOST_WORST: usize = 20;
 
 /// What a tester did on all levels.
 #[derive(Clone, Debug, PartialEq)]

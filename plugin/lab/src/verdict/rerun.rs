@@ -26,6 +26,7 @@ pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) 
 }
 
 /// The episodes of a tester that found something or else failed, if one did; of all testers, if what was found compares them.
+/// And a picture, if it does the same each time.
 fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
     let found = level.findings.iter().find_map(|finding| finding.tester.as_ref());
     let failed = || level.testers.iter().find(|tester| tester.score.solved < tester.score.episodes);
@@ -41,8 +42,10 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     let again = format!(
         "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out again"
     );
+    // What draws random numbers draws others in a picture.
+    let exact = level.testers.iter().any(|tester| tester.tester == *name && tester.exact);
     let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again.png");
-    vec![again, picture]
+    [again].into_iter().chain(exact.then_some(picture)).collect()
 }
 
 /// Testers as `playbot test` takes them. What a policy draws there depends on its name, so that comes along.
@@ -90,7 +93,7 @@ mod tests {
             maps: MapScope::default(),
             shard: None,
         };
-        let testers = vec![tester("random", 2, 2, false), tester("ppo.policy", 1, 2, false)];
+        let testers = vec![tester("random", 2, 2, true), tester("ppo.policy", 1, 2, true)];
         let level = LevelVerdict { level: "bed:6".to_owned(), testers, ..verdict(1, 3, 4) };
         let again = "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
         let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again.png";
@@ -103,6 +106,9 @@ mod tests {
         named.options = ["--no-detect", "stuck", "--par", "my pars.json"].map(str::to_owned).to_vec();
         let again = again.replace(" --out", " --no-detect stuck --par 'my pars.json' --out");
         assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
+        let mut drawn = level.clone();
+        drawn.testers[1].exact = false;
+        assert_eq!(rerun_commands("jump", &named, &drawn).len(), 1, "a picture would show another episode");
         let farmed = Finding {
             detector: "reward-farm".to_owned(),
             tester: Some("random".to_owned()),
