@@ -1,7 +1,7 @@
 //! Levels as JSON: what `playbot level antmaze --json` prints of a whole mode, and what level files hold.
 
 use bevy_playbot::unknown_name::UnknownName;
-use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json};
+use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json_object};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -146,7 +146,7 @@ fn rules(text: &str) -> Result<AntMazeMode, MazeModeError> {
 ///
 /// What is wrong with it, and on which line.
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
-    let level = read_json::<LevelText>(text)?.into_level(text)?;
+    let level = read_json_object::<LevelText>(text)?.into_level(text)?;
     let content = serde_json::json!(LevelText::of(&level)).to_string();
     Ok(LevelDesign::new(level, &content))
 }

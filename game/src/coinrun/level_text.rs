@@ -2,7 +2,7 @@
 
 use playbot_lab::level_files::{
     JsonStep::{Index, Key},
-    LevelDesign, LevelTextError, read_json,
+    LevelDesign, LevelTextError, read_json_object,
 };
 use serde::{Deserialize, Serialize};
 
@@ -100,7 +100,7 @@ impl Level {
 ///
 /// What is wrong with it, and on which line.
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
-    let level = read_json::<LevelText>(text)?.into_level(text)?;
+    let level = read_json_object::<LevelText>(text)?.into_level(text)?;
     // A level is the same one wherever it is from.
     let content = LevelText { mode: Mode::Hard, seed: 0, ..level.to_level_text() };
     Ok(LevelDesign::new(level, &serde_json::json!(content).to_string()))

@@ -1,6 +1,6 @@
 //! Levels as JSON: what `playbot level maze2d --json` prints of a whole mode, and what level files hold.
 
-use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json};
+use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json_object};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -91,7 +91,7 @@ impl LevelText {
 ///
 /// What is wrong with it, and on which line.
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
-    let drawn = read_json::<LevelText>(text)?.into_drawn(text)?;
+    let drawn = read_json_object::<LevelText>(text)?.into_drawn(text)?;
     let content = serde_json::json!(LevelText::of(&drawn.level, &drawn.rules)).to_string();
     Ok(LevelDesign::new(drawn, &content))
 }

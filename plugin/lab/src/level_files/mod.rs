@@ -19,4 +19,4 @@ pub use error::LevelFileError;
 pub use find::find_level_files;
 pub use json_lines::JsonStep;
 pub use mode::{LEVEL_FILES, is_level_files, level_file_pattern, level_files_mode};
-pub use text_error::{LevelTextError, read_json};
+pub use text_error::{LevelTextError, read_json, read_json_object};

@@ -25,22 +25,34 @@ impl LevelTextError {
     }
 }
 
-/// Reads a JSON text that is an object.
+/// Reads a JSON text that is an object. Structs would also be read from a list of their fields.
 ///
 /// # Errors
 ///
 /// It is none, or not of this form: [`LevelTextError`] with the line.
-pub fn read_json<T: DeserializeOwned>(text: &str) -> Result<T, LevelTextError> {
-    // Some editors put a mark in front of all they write.
-    let text = text.trim_start_matches('\u{feff}');
-    // A struct would be read from a list of its fields, too.
+pub fn read_json_object<T: DeserializeOwned>(text: &str) -> Result<T, LevelTextError> {
+    let text = without_mark(text);
     let blank = text.len() - text.trim_start().len();
     if text[blank..].starts_with('[') {
         let line = 1 + text[..blank].matches('\n').count();
         let what = "a level is an object, `{…}`, and this is a list".to_owned();
         return Err(LevelTextError { line: Some(line), what });
     }
-    serde_json::from_str(text).map_err(|error| {
+    read_json(text)
+}
+
+/// Some editors put a mark in front of all they write.
+fn without_mark(text: &str) -> &str {
+    text.trim_start_matches('\u{feff}')
+}
+
+/// Reads a JSON text.
+///
+/// # Errors
+///
+/// It is none, or not of this form: [`LevelTextError`] with the line.
+pub fn read_json<T: DeserializeOwned>(text: &str) -> Result<T, LevelTextError> {
+    serde_json::from_str(without_mark(text)).map_err(|error| {
         let (line, column) = (error.line().max(1), error.column());
         let words = error.to_string();
         let place = format!(" at line {} column {column}", error.line());
@@ -66,8 +78,9 @@ mod tests {
         assert!(error("{\n \"x\": 1,\n \"y\": 2\n}").what.starts_with("unknown field `y`, expected `x` (column"));
         assert_eq!(error("{\n \"x\": \n}").line, Some(3));
         assert_eq!(error("").line, Some(1));
-        let list = error("\n [3]");
+        let list = read_json_object::<Small>("\n [3]").expect_err("a list");
         assert!(list.line == Some(2) && list.what.contains("this is a list"), "{list:?}");
+        assert_eq!(read_json_object::<Small>("\u{feff} {\"x\": 3}").expect("an object").x, 3);
         assert_eq!(read_json::<Small>("\u{feff}{\"x\": 3}").expect("a mark is no mistake").x, 3);
     }
 }
