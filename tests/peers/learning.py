@@ -14,52 +14,12 @@ import time
 from pathlib import Path
 
 import torch
-from torch import nn
 from torch.nn import functional as F
+
+from networks import Skills, impala, mlp, nature
 
 # Seconds for which a case is timed in a round, after the warm-up.
 SECONDS = 3.0
-
-
-class Block(nn.Module):
-    """x + conv1(relu(conv0(relu(x))))."""
-
-    def __init__(self, channels):
-        super().__init__()
-        self.conv0 = nn.Conv2d(channels, channels, 3, padding=1)
-        self.conv1 = nn.Conv2d(channels, channels, 3, padding=1)
-
-    def forward(self, x):
-        return x + self.conv1(F.relu(self.conv0(F.relu(x))))
-
-
-class Stage(nn.Module):
-    """A convolution, max-pooling, and two residual blocks."""
-
-    def __init__(self, inputs, outputs):
-        super().__init__()
-        self.conv = nn.Conv2d(inputs, outputs, 3, padding=1)
-        self.blocks = nn.Sequential(Block(outputs), Block(outputs))
-
-    def forward(self, x):
-        return self.blocks(F.max_pool2d(self.conv(x), 3, 2, 1))
-
-
-def impala():
-    return nn.Sequential(
-        Stage(3, 16), Stage(16, 32), Stage(32, 32), nn.ReLU(), nn.Flatten(), nn.Linear(32 * 8 * 8, 256), nn.ReLU()
-    )
-
-
-def nature():
-    return nn.Sequential(
-        nn.Conv2d(3, 32, 8, 4), nn.ReLU(), nn.Conv2d(32, 64, 4, 2), nn.ReLU(), nn.Conv2d(64, 64, 3, 1), nn.ReLU(),
-        nn.Flatten(), nn.Linear(64 * 4 * 4, 512), nn.ReLU(),
-    )
-
-
-def mlp():
-    return nn.Sequential(nn.Linear(37, 200), nn.Tanh(), nn.Linear(200, 200), nn.Tanh(), nn.Linear(200, 8))
 
 
 def image_case(make, batch, step):
@@ -82,11 +42,21 @@ def image_case(make, batch, step):
 
 
 def mlp_case(batch):
-    net, x, target = mlp(), torch.randn(batch, 37), torch.randn(batch, 8)
+    net, x, target = mlp(37, [200, 200], 8), torch.randn(batch, 37), torch.randn(batch, 8)
 
     def run():
         net.zero_grad(set_to_none=True)
         F.mse_loss(net(x), target).backward()
+
+    return run
+
+
+def skill_case():
+    net, states, actions = Skills(29, 8), torch.randn(10, 50, 29), torch.randn(10, 50, 8)
+
+    def run():
+        net.zero_grad(set_to_none=True)
+        net.loss(states, actions).backward()
 
     return run
 
@@ -96,12 +66,14 @@ CASES = {
     "features/impala/64": lambda: image_case(impala, 64, False),
     "step/impala/64": lambda: image_case(impala, 64, True),
     "step/impala/256": lambda: image_case(impala, 256, True),
+    "step/impala/2048": lambda: image_case(impala, 2048, True),
     "features/nature/64": lambda: image_case(nature, 64, False),
     "step/nature/64": lambda: image_case(nature, 64, True),
     "step/nature/256": lambda: image_case(nature, 256, True),
     "step/nature/2048": lambda: image_case(nature, 2048, True),
     "step/mlp-37-200-200-8/64": lambda: mlp_case(64),
     "step/mlp-37-200-200-8/512": lambda: mlp_case(512),
+    "step/skill": skill_case,
 }
 
 

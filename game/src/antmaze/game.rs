@@ -176,7 +176,8 @@ impl Game for AntMaze {
 
     fn benchmarks(&self) -> Vec<Benchmark> {
         let vector = Benchmark::simulate("vector", "medium");
-        vec![vector, Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster)]
+        let training = Benchmark::train("vector", "medium");
+        vec![vector, training, Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster)]
     }
 
     fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {

@@ -12,13 +12,13 @@ use playbot_lab::{
     game::Game,
     parallel::{default_threads, on_threads},
     stage_clock::StageClock,
-    train::{Algorithm, Trainer},
+    train::Trainer,
     worlds::build_observing_world,
 };
-use playbot_learner::{DeviceKind, nn::CnnKind};
 use serde_json::{Value, json};
 
 use super::{
+    compute::Device,
     error::{CliError, Outcome, print_line},
     experiment::ExperimentArgs,
 };
@@ -29,7 +29,8 @@ use super::{
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --json
-  playbot bench --case sim/GAME --threads 1")]
+  playbot bench --case sim/GAME --threads 1
+  playbot bench --case train/GAME --set 'ppo.cnn=Impala()' --set ppo.num_steps=256")]
 pub struct Args {
     /// Only cases whose name contains this.
     #[arg(long, default_value = "")]
@@ -43,6 +44,11 @@ pub struct Args {
     /// Seconds to measure each case for, at least.
     #[arg(long, default_value_t = 5.0)]
     seconds: f64,
+    /// Change a value of what is trained, such as ppo.cnn=Impala(); may be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    #[command(flatten)]
+    device: Device,
     /// One line of JSON per case.
     #[arg(long)]
     json: bool,
@@ -79,10 +85,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             print_line(measured.to_json(name, &args))?;
         } else {
             print_line(format!(
-                "{name}: {:.0} steps/s with {} arenas on {} threads; peak memory {:.0} MiB; in a step {}",
+                "{name}: {:.0} steps/s with {} arenas on {} threads{}; peak memory {:.0} MiB; in a step {}",
                 measured.steps_per_s,
                 args.arenas,
                 args.threads,
+                measured.idle.map_or(String::new(), |idle| format!(", {:.0} % idle", 100.0 * idle)),
                 peak_rss_mib(),
                 measured.parts_in_words()
             ))?;
@@ -114,6 +121,8 @@ struct Measure {
     steps_per_s: f64,
     /// Microseconds per step of the parts, over all threads together.
     parts: Value,
+    /// Share of the threads' time in which they did nothing; `None` where the system does not say.
+    idle: Option<f64>,
 }
 
 impl Measure {
@@ -121,13 +130,18 @@ impl Measure {
         json!({
             "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
             "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts,
+            "idle_share": self.idle,
         })
     }
 
     /// The parts in the order in which they happen.
     fn parts_in_words(&self) -> String {
         let part = |name: &&str| Some(format!("{name} {} µs", self.parts.get(*name)?.as_f64()?));
-        ["simulate", "observe", "infer", "record", "learn"].iter().filter_map(part).collect::<Vec<_>>().join(", ")
+        ["simulate", "observe", "infer", "record", "gather", "learn"]
+            .iter()
+            .filter_map(part)
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
@@ -150,7 +164,7 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
     }
     worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
     const TICKS: u64 = 100;
-    let (start, mut ticks) = (Instant::now(), 0);
+    let (start, mut ticks, busy) = (Instant::now(), 0, busy_s());
     while start.elapsed().as_secs_f64() < args.seconds {
         for done in on_threads(&mut worlds, args.threads, |world| world.ticks(TICKS)) {
             done?;
@@ -158,42 +172,49 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
         ticks += TICKS;
     }
     let steps = (ticks * u64::from(arrangement.total())) as f64;
-    let steps_per_s = steps / start.elapsed().as_secs_f64();
-    Ok(Measure { steps_per_s, parts: stages(worlds.iter_mut(), steps) })
+    let seconds = start.elapsed().as_secs_f64();
+    let idle = idle_share(busy_s() - busy, seconds, args.threads);
+    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle })
 }
 
 /// PPO with 3 epochs and 8 minibatches: on state vectors with 256 steps a rollout, on pictures with 32 and the
-/// Nature-CNN.
+/// Nature-CNN, if `--set` does not say otherwise.
 fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games: &Games) -> Result<Measure, CliError> {
-    let mut experiment = ExperimentArgs::default().load(games, [])?;
-    experiment.game = game.name().to_owned();
-    (experiment.train, experiment.test) = (levels(mode, 0), levels(mode, 64));
-    experiment.observation = kind;
-    experiment.arenas = args.arenas;
-    experiment.worlds = args.threads as u32;
-    experiment.algorithm = Algorithm::Ppo;
-    experiment.ppo.num_steps = if experiment.observation_config().is_image() { 32 } else { 256 };
-    experiment.ppo.cnn = CnnKind::Nature { feature: 256 };
-    experiment.ppo.epochs = 3;
-    experiment.ppo.minibatches = 8;
-    let mut trainer = Trainer::new(game, &experiment, None, DeviceKind::default(), args.threads)?;
+    let experiment = training(game, mode, kind, args).load(games, [])?;
+    let mut trainer = Trainer::new(game, &experiment, None, args.device.device, args.threads)?;
     trainer.update()?;
     trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
-    let (start, before) = (Instant::now(), trainer.steps());
+    let (start, before, gathered, busy) = (Instant::now(), trainer.steps(), trainer.gathering(), busy_s());
     let mut learn_s = 0.0;
     while start.elapsed().as_secs_f64() < args.seconds {
         learn_s += trainer.update()?.timing.learn_s;
     }
     let steps = (trainer.steps() - before) as f64;
-    let steps_per_s = steps / start.elapsed().as_secs_f64();
+    let seconds = start.elapsed().as_secs_f64();
+    let gather_s = (trainer.gathering() - gathered).as_secs_f64();
     let mut parts = stages(trainer.worlds_mut(), steps);
-    parts["learn"] = json!(microseconds(learn_s * args.threads as f64, steps));
-    Ok(Measure { steps_per_s, parts })
+    parts["gather"] = json!(microseconds(gather_s * args.threads as f64, steps));
+    parts["learn"] = json!(microseconds((learn_s - gather_s) * args.threads as f64, steps));
+    Ok(Measure { steps_per_s: steps / seconds, parts, idle: idle_share(busy_s() - busy, seconds, args.threads) })
 }
 
-/// 64 levels of a mode.
-fn levels(mode: &str, first: u64) -> LevelSplit {
-    LevelSplit { mode: mode.to_owned(), first, last: first + 63 }
+/// The experiment of a training case: what the case says, under what the command line says.
+fn training(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> ExperimentArgs {
+    let config = ObservationConfig { kind, ..ObservationConfig::default() };
+    let known = [
+        format!("game={}", game.name()),
+        format!("train={mode}:0..63"),
+        format!("test={mode}:64..127"),
+        format!("observation={kind:?}"),
+        format!("arenas={}", args.arenas),
+        format!("worlds={}", args.threads),
+        "algorithm=ppo".to_owned(),
+        format!("ppo.num_steps={}", if config.is_image() { 32 } else { 256 }),
+        "ppo.cnn=Nature(feature:256)".to_owned(),
+        "ppo.epochs=3".to_owned(),
+        "ppo.minibatches=8".to_owned(),
+    ];
+    ExperimentArgs { experiment: None, set: args.set.clone() }.over(known)
 }
 
 /// Microseconds per step that the Worlds' threads spent in each part of their ticks.
@@ -222,4 +243,20 @@ fn peak_rss_mib() -> f64 {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     let kib = line.and_then(|rest| rest.split_whitespace().next()?.parse::<f64>().ok());
     (kib.unwrap_or(0.0) / 1024.0).round()
+}
+
+/// Seconds of processor time that this process has taken so far, all threads together; 0 where the system does not say.
+fn busy_s() -> f64 {
+    // A hundredth of a second on every Linux.
+    const TICKS_PER_S: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name of the program, in brackets, may hold anything.
+    let numbers = stat.rsplit(')').next().unwrap_or_default();
+    let ticks: f64 = numbers.split_whitespace().skip(11).take(2).filter_map(|word| word.parse::<f64>().ok()).sum();
+    ticks / TICKS_PER_S
+}
+
+fn idle_share(busy_s: f64, seconds: f64, threads: usize) -> Option<f64> {
+    let share = 1.0 - busy_s / (seconds * threads as f64);
+    (busy_s > 0.0).then_some((1000.0 * share.max(0.0)).round() / 1000.0)
 }

@@ -67,6 +67,22 @@ pub enum LearnError {
     /// A value could not be read back from the device.
     #[error("reading a tensor from the device failed: {0}")]
     Device(String),
+    /// This program or this machine cannot compute there.
+    #[error("cannot compute on `{device}`: {reason}; the device `flex` computes on the CPU")]
+    NoDevice {
+        /// Where.
+        device: String,
+        /// What is missing.
+        reason: String,
+    },
+    /// A graphics card was lost, or had no memory left.
+    #[error(
+        "the graphics card failed: {reason}; what was saved is kept: smaller batches or the device `flex` can go on from it"
+    )]
+    DeviceFailed {
+        /// What its driver said.
+        reason: String,
+    },
 }
 
 impl LearnError {

@@ -63,7 +63,7 @@ pub use policy::{Policy, PolicyOutput, StdKind};
 pub use policy_file::{PolicyCard, PolicyFile};
 pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};
 pub use rng::{RngState, Streams};
-pub use rollout::{EndStates, Rollout, RolloutStep};
+pub use rollout::{EndStates, ObsColumns, Rollout, RolloutStep};
 pub use sac::{EntropyCoef, SacConfig, SacLearner, SacMetrics};
 pub use score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{

@@ -1,7 +1,7 @@
 //! One World that plays with the current policy and keeps what the learner needs.
 
 use bevy::prelude::*;
-use playbot_learner::{Actions, LearnError, ObsKind, Observations, Policy, Rollout, RolloutStep};
+use playbot_learner::{Actions, LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout, RolloutStep};
 
 use super::{
     arena_state::ActionLog,
@@ -110,6 +110,27 @@ impl Collector {
         latent: usize,
         steps: usize,
     ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let kind = self.obs_kind();
+        let mut obs = Observations::empty(&kind);
+        let mut columns = obs.columns(&kind, steps, &[self.agents.len()]);
+        let collected = columns.pop().map(|mut columns| self.collect_into(&mut columns, policy, latent, steps));
+        drop(columns);
+        let (rollout, ended) = collected.unwrap_or_else(|| Err(Fault("there are no agents".to_owned())))?;
+        Ok((Rollout { obs, ..rollout }, ended))
+    }
+
+    /// [`collect`](Self::collect) with the observations in these columns and not in the rollout.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn collect_into(
+        &mut self,
+        columns: &mut ObsColumns<'_>,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
         let world = &mut self.world;
         world.insert_resource(ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample });
         let kind = world.resource::<Collecting>().kind;
@@ -117,11 +138,19 @@ impl Collector {
         world.resource_mut::<Collecting>().rollout = empty.clone();
         for _ in 0..steps {
             tick_world(world)?;
+            let obs = &mut world.resource_mut::<Collecting>().rollout.obs;
+            columns.fill_next(obs.as_slice()).map_err(|error| Fault(error.to_string()))?;
+            obs.clear();
         }
         let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
         bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
         world.resource_mut::<Faults>().take()?;
         Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
+    }
+
+    /// What an observation of its agents is.
+    pub fn obs_kind(&self) -> ObsKind {
+        self.world.resource::<Collecting>().kind
     }
 
     /// The World, for saving and restoring its arenas.

@@ -25,15 +25,12 @@ impl Experiment {
         let is_image = self.observation_config().is_image();
         let observation = kind.numbers() as u64 * if is_image { 1 } else { 4 };
         let (arenas, steps) = (u64::from(self.arenas), self.rollout_steps() as u64);
-        // The rollouts of several Worlds are joined into another one.
-        let copies: u64 = if self.worlds > 1 { 2 } else { 1 };
-        let rollouts = product(&[arenas, steps, observation, copies]);
+        let rollouts = product(&[arenas, steps, observation]);
         if rollouts > free {
             let learner = self.algorithm.learner().key();
             let image = if is_image { ", `image.width`, `image.height` or `image.stack`" } else { "" };
-            let joined = if copies > 1 { " × 2 (those of the Worlds are joined)" } else { "" };
             return Err(ExperimentError::Memory {
-                what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes{joined}"),
+                what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes"),
                 needed: rollouts,
                 free,
                 keys: format!("`arenas`, `{learner}.num_steps`{image}"),
@@ -128,14 +125,13 @@ mod tests {
 
     #[test]
     fn rollouts_must_fit() {
-        // 64 arenas × 256 steps × 40 bytes = 640 KiB, twice with two Worlds.
-        assert_eq!(check("ppo", "worlds: 1", 640 << 10), Ok(()));
-        let text = check("ppo", "worlds: 2", 1279 << 10).expect_err("two copies");
-        assert!(text.contains("64 arenas × 256 steps × 40 bytes × 2"), "{text}");
-        assert_eq!(check("ppo", "worlds: 2", 1280 << 10), Ok(()));
+        // 64 arenas × 256 steps × 40 bytes = 640 KiB, which all Worlds share.
+        assert_eq!(check("ppo", "worlds: 2", 640 << 10), Ok(()));
+        let text = check("ppo", "worlds: 2", 639 << 10).expect_err("too large");
+        assert!(text.contains("64 arenas × 256 steps × 40 bytes"), "{text}");
         let pictures = "observation: Raster, image: (width: 512, height: 512, stack: 8)";
-        let text = check("ppo", pictures, 16 << 30).expect_err("192 GiB");
-        for words in ["64 arenas × 256 steps × 6291456 bytes × 2", "192.0 GiB", "16.0 GiB", "`image.stack`"] {
+        let text = check("ppo", pictures, 16 << 30).expect_err("96 GiB");
+        for words in ["64 arenas × 256 steps × 6291456 bytes", "96.0 GiB", "16.0 GiB", "`image.stack`"] {
             assert!(text.contains(words), "{text}");
         }
     }

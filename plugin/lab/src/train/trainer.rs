@@ -1,10 +1,13 @@
 //! The training loop, one update at a time: the caller owns the progress bar and decides when to stop.
 
-use std::{path::Path, time::Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use bevy::prelude::World;
-use bevy_playbot::{fault::Fault, skill_prior::SkillPrior};
-use playbot_learner::{ActionSpace, DeviceKind, LearnError, Policy, Rollout, SkillModel, SkillSource};
+use bevy_playbot::{episode::EpisodeEnded, fault::Fault, skill_prior::SkillPrior};
+use playbot_learner::{ActionSpace, DeviceKind, LearnError, Observations, Policy, Rollout, SkillModel, SkillSource};
 
 use super::{
     collect::Collector,
@@ -27,6 +30,8 @@ pub struct Trainer {
     pub(crate) learner: TrainedLearner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
+    /// Memory of the last rollout's observations, for the next.
+    obs: Option<Observations>,
 }
 
 impl Trainer {
@@ -63,7 +68,7 @@ impl Trainer {
             .map(|first| Collector::new(game, levels, &observation_config, seed, first, share, prior.clone()))
             .collect();
         let (experiment, collectors) = (experiment.clone(), collectors?);
-        Ok(Self { experiment, threads, learner, collectors, progress: Progress::default() })
+        Ok(Self { experiment, threads, learner, collectors, progress: Progress::default(), obs: None })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -75,17 +80,11 @@ impl Trainer {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
         let steps = self.experiment.rollout_steps();
-        let collected = on_threads(&mut self.collectors, self.threads, |world| world.collect(&policy, latent, steps));
-        let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
-        for part in collected {
-            let (rollout, ended) = part?;
-            rollouts.push(rollout);
-            finished.extend(ended);
-        }
-        let rollout = Rollout::join(rollouts)?;
+        let (rollout, finished) = self.collect(&policy, latent, steps)?;
         let collect_s = start.elapsed().as_secs_f64();
         let initial_kl = self.initial_kl(&rollout)?;
         let learner = self.learner.learn(&rollout)?;
+        self.obs = Some(rollout.obs);
         self.progress.note(&finished);
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();
@@ -94,6 +93,33 @@ impl Trainer {
         report.clipped_share =
             report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
         Ok(report)
+    }
+
+    /// Plays `steps` ticks in all Worlds at once. Their observations share one piece of memory, which is kept.
+    fn collect(
+        &mut self,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), TrainError> {
+        let Some(kind) = self.collectors.first().map(Collector::obs_kind) else {
+            return Ok((Rollout::join(Vec::new())?, Vec::new()));
+        };
+        let mut obs = self.obs.take().unwrap_or_else(|| Observations::empty(&kind));
+        let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
+        let columns = obs.columns(&kind, steps, &shares);
+        let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
+        let collected = on_threads(&mut work, self.threads, |(collector, columns)| {
+            collector.collect_into(columns, policy, latent, steps)
+        });
+        drop(work);
+        let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
+        for part in collected {
+            let (rollout, ended) = part?;
+            rollouts.push(rollout);
+            finished.extend(ended);
+        }
+        Ok((Rollout::join_around(obs, rollouts)?, finished))
     }
 
     /// Before the first update of SCORE, the policy must be the decoder, to the bit.
@@ -130,6 +156,11 @@ impl Trainer {
     /// The policy as it is now.
     pub fn policy(&self) -> Policy {
         self.learner.policy()
+    }
+
+    /// Time that the learner spent putting minibatches together so far.
+    pub fn gathering(&self) -> Duration {
+        self.learner.gathering()
     }
 
     /// The Worlds that play, to look into or to measure.

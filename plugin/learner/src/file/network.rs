@@ -37,11 +37,13 @@ impl TensorFile {
     }
 
     /// Adds an optimizer's moments, `adam.m.NAME` and `adam.v.NAME`.
-    pub(crate) fn put_adam(&mut self, adam: &Adam) {
-        for (name, moments) in &adam.moments {
+    pub(crate) fn put_adam(&mut self, adam: &Adam) -> Result<(), FileError> {
+        let all = adam.host_moments().map_err(|source| self.learner(source))?;
+        for (name, moments) in all.iter() {
             self.put(&format!("adam.m.{name}"), &moments.shape, &moments.m);
             self.put(&format!("adam.v.{name}"), &moments.shape, &moments.v);
         }
+        Ok(())
     }
 
     /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`, called by `prefix`.

@@ -6,6 +6,7 @@ use crate::rng::Streams;
 use crate::score::{ScoreConfig, Teacher};
 use crate::{DeviceKind, LearnError, PolicySpec};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The common part of all learners: what the policy reads and does, the skill model that it is tied to, normalisers,
 /// random numbers, and the device.
@@ -20,6 +21,8 @@ pub struct LearnerBase {
     /// Rollouts learned from.
     pub(crate) updates: u64,
     pub(crate) device: DeviceKind,
+    /// Time spent putting minibatches together since this learner was made.
+    pub(crate) gathering: Duration,
 }
 
 impl LearnerBase {
@@ -35,12 +38,22 @@ impl LearnerBase {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
+        device.check()?;
         spec.validate()?;
         if let Some(teacher) = &teacher {
             teacher.check(norm_obs)?;
         }
         let observations = norm_obs.then(|| ObsNormalizer::new(spec.obs.numbers()));
-        Ok(Self { spec, teacher, rewards, observations, streams: Streams::new(seed), updates: 0, device })
+        Ok(Self {
+            spec,
+            teacher,
+            rewards,
+            observations,
+            streams: Streams::new(seed),
+            updates: 0,
+            device,
+            gathering: Duration::ZERO,
+        })
     }
 
     /// The settings of SCORE, with a skill model.

@@ -80,6 +80,7 @@ impl<C: DeserializeOwned, K: DeserializeOwned> Checkpoint<C, K> {
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing or misshapen.
     pub(crate) fn read(path: &Path, kind: FileKind, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
+        device.check().map_err(|e| file.learner(e))?;
         let Header { config, spec, score, skill, seed, updates, counters }: Header<C, K> = file.header(kind)?;
         let teacher = match score.zip(skill) {
             None => None,

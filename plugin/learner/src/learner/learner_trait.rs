@@ -7,6 +7,7 @@ use crate::skill::{Prior, SkillSource};
 use crate::{FileError, LearnError, ObsSlice, PolicySpec, Rollout};
 use std::fmt::Debug;
 use std::path::Path;
+use std::time::Duration;
 
 /// Improves a policy from rollouts.
 ///
@@ -75,6 +76,12 @@ pub trait Learner: Debug + Send {
     /// The seed.
     fn seed(&self) -> u64 {
         self.base().streams.seed()
+    }
+
+    /// Time spent putting minibatches together, out of rollouts or a replay buffer, since this learner was made. It is not
+    /// saved.
+    fn gathering(&self) -> Duration {
+        self.base().gathering
     }
 
     /// The settings of SCORE, with a skill model.

@@ -1,12 +1,14 @@
 //! The Adam optimizer over named parameters.
 
 use super::grads::NamedGrads;
+use super::moments::{FlatMoments, Moments};
 use super::params::{ParamVisitor, Parameters};
 use crate::LearnError;
 use burn::tensor::{Tensor, TensorData};
 use macerator::Simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::iter::Peekable;
 
@@ -36,14 +38,6 @@ impl Default for AdamConfig {
     }
 }
 
-/// First and second moment of one parameter, without bias correction.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Moments {
-    pub(crate) shape: Vec<usize>,
-    pub(crate) m: Vec<f32>,
-    pub(crate) v: Vec<f32>,
-}
-
 /// Adam with one step counter for all parameters.
 ///
 /// The moments live on the host, by parameter name, so that a checkpoint holds all of the state.
@@ -52,12 +46,14 @@ pub struct Adam {
     pub(crate) config: AdamConfig,
     pub(crate) steps: u64,
     pub(crate) moments: BTreeMap<String, Moments>,
+    /// The moments, in place of those above, if they are on a graphics card.
+    pub(super) flat: Option<FlatMoments>,
 }
 
 impl Adam {
     /// An optimizer that has seen nothing.
     pub fn new(config: AdamConfig) -> Self {
-        Self { config, steps: 0, moments: BTreeMap::new() }
+        Self { config, steps: 0, moments: BTreeMap::new(), flat: None }
     }
 
     /// Steps done.
@@ -68,6 +64,17 @@ impl Adam {
     /// First and second moment of the parameter called `name`, if it was ever updated.
     pub fn moments(&self, name: &str) -> Option<(&[f32], &[f32])> {
         self.moments.get(name).map(|moments| (moments.m.as_slice(), moments.v.as_slice()))
+    }
+
+    /// First and second moments of each parameter by name, in host memory.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if they cannot be read from a graphics card.
+    pub(crate) fn host_moments(&self) -> Result<Cow<'_, BTreeMap<String, Moments>>, LearnError> {
+        match &self.flat {
+            Some(flat) => Ok(Cow::Owned(flat.by_name()?)),
+            None => Ok(Cow::Borrowed(&self.moments)),
+        }
     }
 
     /// Puts back the moments of a parameter from a checkpoint.

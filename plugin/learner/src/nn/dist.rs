@@ -107,6 +107,15 @@ impl Dist {
         }
     }
 
+    /// Some of the rows, which may repeat.
+    pub(crate) fn select(&self, rows: &Tensor<1, Int>) -> Self {
+        let of = |values: &Tensor<2>| values.clone().select(0, rows.clone());
+        match self {
+            Self::Categorical { log_probs } => Self::Categorical { log_probs: of(log_probs) },
+            Self::Gaussian { mean, log_std } => Self::Gaussian { mean: of(mean), log_std: of(log_std) },
+        }
+    }
+
     /// Reads the distributions of all rows to the host.
     ///
     /// # Errors

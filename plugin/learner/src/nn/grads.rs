@@ -35,6 +35,18 @@ impl NamedGrads {
         reader.finish()
     }
 
+    /// Adds those of the same network for other rows; to none yet, these are they.
+    pub(crate) fn add(&mut self, more: Self) {
+        if self.entries.is_empty() {
+            *self = more;
+            return;
+        }
+        for ((_, to), (_, from)) in self.entries.iter_mut().zip(&more.entries) {
+            let to = to.as_mut_slice::<f32>().expect("gradients are checked to be f32 when they are read");
+            to.iter_mut().zip(numbers(from)).for_each(|(to, from)| *to += from);
+        }
+    }
+
     /// The gradients, by name.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &[f32])> {
         self.entries.iter().map(|(name, values)| (name.as_str(), numbers(values)))

@@ -3,7 +3,7 @@
 use super::params::{ParamVisitor, Parameters};
 use super::source::{ParamSource, RandomInit};
 use super::{Activation, Impala, Linear, Nature};
-use crate::{ImageShape, LearnError, ObsKind};
+use crate::{ImageShape, LearnError, ObsKind, among_workers};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -141,10 +141,10 @@ impl ImageNet {
     /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`. Gradients reach the parameters, not
     /// the pixels.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        match self {
+        among_workers(|| match self {
             Self::Impala(net) => net.forward(pixels),
             Self::Nature(net) => net.forward(pixels),
-        }
+        })
     }
 
     fn fc(&self) -> &Linear {

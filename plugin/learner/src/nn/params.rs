@@ -1,6 +1,7 @@
 //! Named parameters: one way to walk over the tensors of a network.
 
-use burn::tensor::Tensor;
+use crate::LearnError;
+use burn::tensor::{Device, Tensor};
 
 /// Does something with each parameter of a network in turn.
 pub trait ParamVisitor {
@@ -47,6 +48,28 @@ pub fn frozen<M: Parameters + Clone>(network: &M) -> M {
     let mut copy = network.clone();
     copy.visit("", &mut Freeze);
     copy
+}
+
+struct Move<'a>(&'a Device, Option<LearnError>);
+
+impl ParamVisitor for Move<'_> {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        match tensor.clone().inner().try_into_data() {
+            Ok(numbers) => *tensor = Tensor::from_data(numbers, self.0),
+            Err(error) => self.1 = Some(LearnError::Device(error.to_string())),
+        }
+    }
+}
+
+/// A copy with the same weights on `device`, of which operations are not recorded.
+///
+/// # Errors
+/// [`LearnError::Device`] if they cannot be read.
+pub(crate) fn moved<M: Parameters + Clone>(network: &M, device: &Device) -> Result<M, LearnError> {
+    let mut copy = network.clone();
+    let mut visitor = Move(device, None);
+    copy.visit("", &mut visitor);
+    visitor.1.map_or(Ok(copy), Err)
 }
 
 struct Count(usize);

@@ -1,6 +1,7 @@
 //! A frozen policy that plays.
 
 use super::{Actor, Critic, InputBuilder, PolicyOutput, StateBatch};
+use crate::device::guarded;
 use crate::nn::{CnnKind, ImageNet, frozen, host};
 use crate::norm::ObsStats;
 use crate::{ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec};
@@ -144,12 +145,14 @@ impl Policy {
             ObsKind::Vector(_) => VECTORS_AT_A_TIME,
             ObsKind::Image(_) => IMAGES_AT_A_TIME,
         };
-        for start in (0..n).step_by(chunk) {
-            let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
-            let len = rows.len();
-            let x = self.actor.join(&inputs.input(&rows, &self.device))?;
-            read(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
-        }
-        Ok(())
+        guarded(&self.device, || {
+            for start in (0..n).step_by(chunk) {
+                let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
+                let len = rows.len();
+                let x = self.actor.join(&inputs.input(&rows, &self.device))?;
+                read(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
+            }
+            Ok(())
+        })
     }
 }

@@ -103,6 +103,7 @@ impl PolicyFile {
 
     fn take(mut file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
         let header: Header = file.header(FILE)?;
+        device.check().map_err(|e| file.learner(e))?;
         let spec = header.policy.spec();
         let policy = header.policy.take(&mut file, device)?;
         let skills = match header.skills {

@@ -51,7 +51,7 @@ impl PpoLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
-        let teacher = Teacher::new(score, model);
+        let teacher = Teacher::new(score, model, device)?;
         Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
@@ -132,7 +132,7 @@ impl Learner for PpoLearner {
         let counters = Counters { adam_steps: self.adam.steps };
         self.base.save(path, FILE, &self.config, &counters, |file| {
             file.put_network("", &self.nets)?;
-            file.put_adam(&self.adam);
+            file.put_adam(&self.adam)?;
             Ok(())
         })
     }

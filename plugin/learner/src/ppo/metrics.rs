@@ -91,6 +91,22 @@ pub struct StepMetrics {
 }
 
 impl StepMetrics {
+    /// Each number times `share`.
+    pub(super) fn scaled(self, share: f64) -> Self {
+        Self {
+            policy_loss: self.policy_loss * share,
+            value_loss: self.value_loss * share,
+            entropy: self.entropy * share,
+            total_loss: self.total_loss * share,
+            approx_kl: self.approx_kl * share,
+            clip_fraction: self.clip_fraction * share,
+            decoder_kl: self.decoder_kl * share,
+            kl_penalty: self.kl_penalty * share,
+            confidence: self.confidence * share,
+            grad_norm: self.grad_norm * share,
+        }
+    }
+
     pub(super) fn add(&mut self, other: &Self) {
         self.policy_loss += other.policy_loss;
         self.value_loss += other.value_loss;

@@ -1,10 +1,13 @@
 //! Proximal policy optimisation (Schulman et al. 2017), with or without a skill decoder.
 
+mod batch;
 mod config;
 mod learner;
 mod metrics;
 mod nets;
 mod objective;
+mod on_device;
+mod step;
 mod update;
 
 pub use config::PpoConfig;
@@ -12,4 +15,4 @@ pub use learner::PpoLearner;
 pub use metrics::{RatioStats, StepMetrics, UpdateMetrics, explained_variance, ratio_stats};
 pub use nets::PpoNets;
 pub use objective::{Advantages, PpoBatch, PpoLoss, gae, normalize_advantages, ppo_loss};
-pub use update::{Minibatch, gradient_step};
+pub use step::{Minibatch, gradient_step};

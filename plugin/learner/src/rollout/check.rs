@@ -9,8 +9,13 @@ impl Rollout {
     /// # Errors
     /// [`LearnError::Shape`] names the first length that does not; [`LearnError::Config`] names a row.
     pub fn check(&self) -> Result<(), LearnError> {
+        self.obs.as_slice().check_size("rollout obs", &self.obs_kind, self.rows())?;
+        self.check_beside_obs()
+    }
+
+    /// [`Self::check`] for a rollout whose observations are kept elsewhere.
+    pub(super) fn check_beside_obs(&self) -> Result<(), LearnError> {
         let (rows, cuts) = (self.rows(), self.ends.cut_rows.len());
-        self.obs.as_slice().check_size("rollout obs", &self.obs_kind, rows)?;
         self.ends.cut_obs.as_slice().check_size("rollout ends cut_obs", &self.obs_kind, cuts)?;
         for (name, expected, found) in [
             ("rollout z", rows * self.latent, self.z.len()),

@@ -11,22 +11,40 @@ impl Rollout {
     /// [`LearnError::Config`] for no parts; [`LearnError::Shape`], [`LearnError::Config`] or [`LearnError::Action`] if they
     /// do not fit together.
     pub fn join(mut parts: Vec<Self>) -> Result<Self, LearnError> {
-        for part in &parts {
-            part.check()?;
-        }
+        parts.iter().try_for_each(Self::check)?;
         if parts.len() == 1 {
             return Ok(parts.remove(0));
         }
+        let obs = side_by_side(&parts)?;
+        Self::join_around(obs, parts)
+    }
+
+    /// [`Self::join`], of parts whose observations lie in `obs` already, each in its
+    /// [columns](Observations::columns); what the parts hold themselves is not looked at.
+    ///
+    /// # Errors
+    /// As [`Self::join`].
+    pub fn join_around(obs: Observations, mut parts: Vec<Self>) -> Result<Self, LearnError> {
+        let mut all = match parts.len() {
+            1 => parts.remove(0),
+            _ => Self::join_beside_obs(&parts)?,
+        };
+        all.obs = obs;
+        all.check()?;
+        Ok(all)
+    }
+
+    fn join_beside_obs(parts: &[Self]) -> Result<Self, LearnError> {
         let Some(first) = parts.first() else {
             return Err(LearnError::Config("no rollouts to join".to_owned()));
         };
-        let (kind, width) = (first.obs_kind, first.obs_kind.numbers());
+        let kind = first.obs_kind;
         let mut all =
             Self { actions: first.actions.clone(), ..Self::new(0, kind, first.latent, &ActionSpace::Discrete(0)) };
         all.actions.clear();
-        all.obs = Observations::with_capacity(&kind, parts.iter().map(Self::rows).sum());
         all.steps = first.steps;
-        for part in &parts {
+        for part in parts {
+            part.check_beside_obs()?;
             LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
             kind.same_as(&part.obs_kind, "a joined rollout")?;
             LearnError::check("latent of a joined rollout", first.latent, part.latent)?;
@@ -36,10 +54,9 @@ impl Rollout {
             all.ends.next_z.extend_from_slice(&part.ends.next_z);
         }
         for t in 0..first.steps {
-            for part in &parts {
+            for part in parts {
                 let rows = t * part.envs..(t + 1) * part.envs;
                 all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
-                all.obs.push(part.obs.rows(rows.clone(), width))?;
                 all.z.extend_from_slice(&part.z[rows.start * part.latent..rows.end * part.latent]);
                 all.log_probs.extend_from_slice(&part.log_probs[rows.clone()]);
                 all.values.extend_from_slice(&part.values[rows.clone()]);
@@ -49,7 +66,7 @@ impl Rollout {
                 all.final_values.extend_from_slice(&part.final_values[rows]);
             }
         }
-        all.join_cuts(&parts)?;
+        all.join_cuts(parts)?;
         Ok(all)
     }
 
@@ -72,4 +89,21 @@ impl Rollout {
         }
         Ok(())
     }
+}
+
+/// The observations of all parts, tick by tick.
+fn side_by_side(parts: &[Rollout]) -> Result<Observations, LearnError> {
+    let Some(first) = parts.first() else {
+        return Err(LearnError::Config("no rollouts to join".to_owned()));
+    };
+    let (kind, width) = (first.obs_kind, first.obs_kind.numbers());
+    let mut obs = Observations::with_capacity(&kind, parts.iter().map(Rollout::rows).sum());
+    for t in 0..first.steps {
+        for part in parts {
+            LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
+            kind.same_as(&part.obs_kind, "a joined rollout")?;
+            obs.push(part.obs.rows(t * part.envs..(t + 1) * part.envs, width))?;
+        }
+    }
+    Ok(obs)
 }

@@ -2,11 +2,13 @@
 
 mod bootstrap;
 mod check;
+mod columns;
 mod ends;
 mod join;
 mod steps;
 #[cfg(test)]
 mod tests;
 
+pub use columns::ObsColumns;
 pub use ends::EndStates;
 pub use steps::{Rollout, RolloutStep};

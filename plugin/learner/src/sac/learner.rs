@@ -92,7 +92,7 @@ impl SacLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
-        let teacher = Teacher::new(score, model);
+        let teacher = Teacher::new(score, model, device)?;
         Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
@@ -219,7 +219,7 @@ impl Learner for SacLearner {
             file.put_network("target", &nets.targets)?;
             file.put_network("", &nets.log_temperature)?;
             for adam in [&adams.critics, &adams.actor, &adams.temperature] {
-                file.put_adam(adam);
+                file.put_adam(adam)?;
             }
             self.buffer.put(file);
             Ok(())

@@ -4,10 +4,12 @@
 use super::metrics::MetricSums;
 use super::transitions::check_ends;
 use super::{EntropyCoef, SacBatch, SacLearner, SacMetrics, actor_step, critic_step, soft_update, temperature_step};
+use crate::device::guarded;
 use crate::nn::matrix;
 use crate::rng::{ChaCha8Rng, normal};
 use crate::{ActionSpace, LearnError, Rollout, among_workers};
 use burn::tensor::Tensor;
+use std::time::Instant;
 
 impl SacLearner {
     /// Takes in a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
@@ -20,7 +22,7 @@ impl SacLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
-        among_workers(|| self.update_here(rollout))
+        guarded(&self.base.device.plain(), || among_workers(|| self.update_here(rollout)))
     }
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
@@ -63,7 +65,9 @@ impl SacLearner {
         let mut rng = self.base.streams.stream("sac.noise", number);
         self.gradient_steps += 1;
         let with_actor = self.gradient_steps.is_multiple_of(self.config.actor_every);
+        let start = Instant::now();
         let batch = self.batch(&slots, with_actor)?;
+        self.base.gathering += start.elapsed();
         let noise = self.noise(&mut rng);
         let (temperature, config) = (self.temperature()?, &self.config);
         let (nets, adam) = (&mut self.nets, &mut self.optimizers.critics);

@@ -49,7 +49,7 @@ impl SkillTrainer {
         };
         let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("", &self.nets)?;
-        file.put_adam(&self.adam);
+        file.put_adam(&self.adam)?;
         if let Some(stats) = &self.stats {
             put_obs_stats(&mut file, "obs_norm", stats);
         }
@@ -64,6 +64,7 @@ impl SkillTrainer {
     pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.header(FILE)?;
+        device.check().map_err(|e| file.learner(e))?;
         let skill = header.skill;
         for (what, expected, found) in [
             ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),

@@ -132,6 +132,7 @@ impl SkillModel {
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path).map_err(|error| error.or_again(": learn the skills again"))?;
         let header: Header = file.header(FILE)?;
+        device.check().map_err(|e| file.learner(e))?;
         let description = header.skill;
         let nets = SkillNets::stored(&description, &mut file, &device.plain())?;
         if let Some(picture) = &header.picture {

@@ -1,5 +1,6 @@
 //! p(z | s₀) in use.
 
+use crate::device::guarded;
 use crate::nn::frozen;
 use crate::norm::ObsStats;
 use crate::policy::{Actor, InputBuilder};
@@ -95,7 +96,7 @@ impl Prior {
                     // As in `Policy`: a single row would be summed in another order.
                     x = x.repeat_dim(0, 2);
                 }
-                let dist = actor.forward(x).to_host()?;
+                let dist = guarded(device, || actor.forward(x).to_host())?;
                 (dist.head, dist.log_std.unwrap_or_default())
             }
         };

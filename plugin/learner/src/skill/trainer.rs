@@ -1,12 +1,14 @@
 //! Training of the skill model.
 
 use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
+use crate::device::{guarded, is_host};
 use crate::nn::{
     ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, host, matrix, scalar, tracked,
 };
 use crate::norm::ObsStats;
 use crate::rng::{Streams, normal};
 use crate::{Actions, DeviceKind, LearnError, Observations, among_workers};
+use burn::tensor::Tensor;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -75,6 +77,7 @@ impl SkillTrainer {
     /// episode is long enough.
     pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::check(&config, &dataset)?;
+        device.check()?;
         let (streams, plain) = (Streams::new(seed), device.plain());
         let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &plain)?;
         Self::with_nets(config, dataset, &nets, seed, device)
@@ -147,7 +150,7 @@ impl SkillTrainer {
     pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
         let end = (self.next + self.config.batch).min(self.windows.len());
         let windows = self.windows[self.next..end].to_vec();
-        let metrics = among_workers(|| self.step(&windows))?;
+        let metrics = guarded(&self.device.plain(), || among_workers(|| self.step(&windows)))?;
         self.sums.add(&metrics);
         self.next = end;
         if end == self.windows.len() {
@@ -208,24 +211,33 @@ impl SkillTrainer {
     fn step(&mut self, windows: &[Window]) -> Result<SkillMetrics, LearnError> {
         let (forward, actions) = self.forward(windows)?;
         let loss = skill_loss(&forward, &self.config);
-        let steps = self.adam.steps();
-        let mut metrics = SkillMetrics {
-            loss: scalar(loss.total.clone())?,
-            nll: scalar(loss.nll)?,
-            kl: scalar(loss.kl)?,
-            latent_norm: scalar(loss.latent_norm)?,
-            accuracy: accuracy(&forward.decoded, &actions)?,
-            grad_norm: 0.0,
+        let accuracy = accuracy(&forward.decoded, &actions)?;
+        let parts = [&loss.total, &loss.nll, &loss.kl, &loss.latent_norm];
+        // One piece of memory, and one wait for a graphics card.
+        let numbers = host(Tensor::cat(parts.map(|part| part.clone().inner()).to_vec(), 0))?;
+        let [total, nll, kl, latent_norm] = numbers[..] else {
+            return Err(LearnError::Device(format!("{} losses instead of 4", numbers.len())));
         };
-        let parts = [("nll", metrics.nll), ("kl", metrics.kl), ("loss", metrics.loss)];
-        for (name, value) in parts {
+        let steps = self.adam.steps();
+        for (name, value) in [("nll", nll), ("kl", kl), ("loss", total)] {
             check_loss(name, value, steps)?;
         }
-        let grads = NamedGrads::take(&mut self.nets, "", loss.total.backward())?;
-        let (norm, scale) = grads.clip_factor(self.config.max_grad_norm, steps)?;
-        metrics.grad_norm = norm as f32;
-        self.adam.step(&mut self.nets, "", &grads, self.config.lr, scale)?;
-        Ok(metrics)
+        let grad_norm = self.descend(loss.total)?;
+        Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm })
+    }
+
+    /// Gradient, clipping, one step of Adam; gives the norm before clipping.
+    fn descend(&mut self, loss: Tensor<1>) -> Result<f32, LearnError> {
+        let (lr, max_norm, steps) = (self.config.lr, self.config.max_grad_norm, self.adam.steps());
+        if is_host(&self.device.plain()) {
+            let grads = NamedGrads::take(&mut self.nets, "", loss.backward())?;
+            let (norm, scale) = grads.clip_factor(max_norm, steps)?;
+            self.adam.step(&mut self.nets, "", &grads, lr, scale)?;
+            return Ok(norm as f32);
+        }
+        let norm = scalar(self.adam.step_on_device(&mut self.nets, loss.backward(), lr, max_norm))?;
+        let lost = || LearnError::NotFinite { tensor: "gradient".to_owned(), steps: Some(steps) };
+        norm.is_finite().then_some(norm).ok_or_else(lost)
     }
 
     fn forward(&self, windows: &[Window]) -> Result<(SkillForward, Actions), LearnError> {

@@ -5,6 +5,8 @@ mod corridor;
 mod determinism;
 mod errors;
 mod files;
+#[cfg(feature = "wgpu")]
+mod gpu;
 mod image_task;
 mod images;
 mod noisy;

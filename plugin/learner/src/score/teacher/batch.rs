@@ -31,13 +31,17 @@ pub struct TeacherBatch {
 impl TeacherOutput {
     /// The given rows as constants on `device`.
     pub(crate) fn batch(&self, rows: &[usize], device: &Device) -> TeacherBatch {
-        let confidence: Vec<f32> = rows.iter().map(|&r| self.confidence[r]).collect();
-        let sum: f64 = confidence.iter().map(|&x| f64::from(x)).sum();
         TeacherBatch {
             dist: self.dist.rows(rows, device),
-            mean_confidence: sum / confidence.len() as f64,
-            confidence: vector(confidence, device),
+            mean_confidence: self.mean_confidence(rows),
+            confidence: vector(rows.iter().map(|&r| self.confidence[r]).collect(), device),
         }
+    }
+
+    /// Mean confidence of some rows.
+    pub(crate) fn mean_confidence(&self, rows: &[usize]) -> f64 {
+        let sum: f64 = rows.iter().map(|&r| f64::from(self.confidence[r])).sum();
+        sum / rows.len() as f64
     }
 }
 
@@ -81,7 +85,7 @@ mod tests {
             SkillNets::new(&config, observation, space, &Streams::new(0), &device.plain()).expect("good settings");
         let description = SkillDescription { config, observation, action_space: space };
         let model = SkillModel::new(description, &nets, None, device);
-        let teacher = Teacher::new(ScoreConfig::default(), &model);
+        let teacher = Teacher::new(ScoreConfig::default(), &model, device).expect("the same device");
         let mut rng = Streams::new(1).stream("rows", 0);
         let n = VECTORS_AT_A_TIME + 1;
         let mut numbers = |width: usize| -> Vec<f32> { (0..n * width).map(|_| normal(&mut rng)).collect() };

@@ -1,5 +1,6 @@
 //! A frozen skill model, and what a learner that is tied to it takes from it.
 
+use crate::nn::moved;
 use crate::norm::ObsStats;
 use crate::policy::{Actor, Policy};
 use crate::score::{PriorKind, ScoreConfig};
@@ -19,9 +20,14 @@ pub(crate) struct Teacher {
 
 impl Teacher {
     /// `model`, used as `config` says.
-    pub(crate) fn new(config: ScoreConfig, model: &SkillModel) -> Self {
-        let actors = Actors { decoder: model.nets.decoder.clone(), prior: model.nets.prior.clone() };
-        Self { config, description: model.description.clone(), actors, stats: model.stats.clone() }
+    pub(crate) fn new(config: ScoreConfig, model: &SkillModel, device: DeviceKind) -> Result<Self, LearnError> {
+        let mut actors = Actors { decoder: model.nets.decoder.clone(), prior: model.nets.prior.clone() };
+        if model.device != device {
+            device.check()?;
+            let to = device.plain();
+            actors = Actors { decoder: moved(&actors.decoder, &to)?, prior: moved(&actors.prior, &to)? };
+        }
+        Ok(Self { config, description: model.description.clone(), actors, stats: model.stats.clone() })
     }
 
     /// What a policy tied to this skill model reads and does.

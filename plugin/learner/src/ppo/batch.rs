@@ -1,0 +1,94 @@
+//! What an update learns from: a rollout with its advantages, and its minibatches in host memory.
+
+use super::PpoConfig;
+use super::objective::{PpoBatch, normalize_advantages};
+use super::step::Minibatch;
+use crate::nn::{ActionBatch, vector};
+use crate::norm::ObsStats;
+use crate::policy::InputBuilder;
+use crate::rng::{ChaCha8Rng, shuffle};
+use crate::score::{PenaltyForm, ScoreConfig, TeacherOutput};
+use crate::{ObsKind, Rollout};
+use burn::tensor::Device;
+use std::cell::Cell;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Images of a minibatch that are learned from at a time.
+const IMAGES_AT_A_TIME: usize = 256;
+
+/// A rollout with everything that an update reads beside it, one entry per row.
+#[derive(Debug)]
+pub(super) struct Batch<'a> {
+    pub(super) rollout: &'a Rollout,
+    pub(super) advantages: Vec<f32>,
+    pub(super) returns: Vec<f32>,
+    pub(super) teacher: Option<TeacherOutput>,
+    /// How many of the rollout's skill numbers the networks read: all or none.
+    pub(super) latent: usize,
+    pub(super) stats: Option<Arc<ObsStats>>,
+    pub(super) norm_adv: bool,
+    /// Time spent putting minibatches together.
+    pub(super) gathering: Cell<Duration>,
+}
+
+/// The rows of each minibatch of an update: those of the rollout in an order that each epoch draws anew, in equal parts.
+pub(super) fn minibatches(config: &PpoConfig, n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<usize>> {
+    let parts = config.minibatches.min(n);
+    let mut rows: Vec<usize> = (0..n).collect();
+    let mut all = Vec::with_capacity(config.epochs * parts);
+    for _ in 0..config.epochs {
+        shuffle(&mut rows, rng);
+        all.extend((0..parts).map(|part| rows[part * n / parts..(part + 1) * n / parts].to_vec()));
+    }
+    all
+}
+
+impl Batch<'_> {
+    pub(super) fn inputs(&self) -> InputBuilder<'_> {
+        let Rollout { z, obs, obs_kind: kind, .. } = self.rollout;
+        InputBuilder { z, latent: self.latent, obs: obs.as_slice(), kind, stats: self.stats.as_deref() }
+    }
+
+    /// A minibatch in parts, each with its share of the rows: what networks keep of images until they know the gradient
+    /// takes more memory than the rollout.
+    pub(super) fn parts<'b>(
+        &'b self,
+        rows: &'b [usize],
+        score: Option<&ScoreConfig>,
+        device: &'b Device,
+    ) -> impl Iterator<Item = (Minibatch, f64)> + 'b {
+        let mut advantages: Vec<f32> = rows.iter().map(|&r| self.advantages[r]).collect();
+        if self.norm_adv {
+            normalize_advantages(&mut advantages);
+        }
+        // The other forms of the penalty are no means over rows.
+        let is_mean = score.is_none_or(|score| score.penalty == PenaltyForm::Mean);
+        let is_image = matches!(self.rollout.obs_kind, ObsKind::Image(_));
+        let most = if is_mean && is_image { IMAGES_AT_A_TIME } else { rows.len() };
+        (0..rows.len()).step_by(most.max(1)).map(move |first| {
+            let start = Instant::now();
+            let part = first..(first + most).min(rows.len());
+            let share = part.len() as f64 / rows.len() as f64;
+            let minibatch = self.minibatch(&rows[part.clone()], advantages[part].to_vec(), device);
+            self.gathering.set(self.gathering.get() + start.elapsed());
+            (minibatch, share)
+        })
+    }
+
+    fn minibatch(&self, rows: &[usize], advantages: Vec<f32>, device: &Device) -> Minibatch {
+        let rollout = self.rollout;
+        let pick = |values: &[f32]| -> Vec<f32> { rows.iter().map(|&r| values[r]).collect() };
+        Minibatch {
+            inputs: self.inputs().input(rows, device),
+            ppo: PpoBatch {
+                actions: ActionBatch::new(&rollout.actions.gather(rows), device),
+                old_log_probs: vector(pick(&rollout.log_probs), device),
+                advantages: vector(advantages, device),
+                old_values: vector(pick(&rollout.values), device),
+                returns: vector(pick(&self.returns), device),
+            },
+            teacher: self.teacher.as_ref().map(|teacher| teacher.batch(rows, device)),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! One gradient step: minibatch → loss → gradient → Adam.
+
+use super::objective::{PpoBatch, PpoLoss, ppo_loss};
+use super::{PpoConfig, PpoNets, StepMetrics, ratio_stats};
+use crate::LearnError;
+use crate::nn::{Adam, NamedGrads, finite, host};
+use crate::policy::NetInput;
+use crate::score::{Penalty, ScoreConfig, TeacherBatch, penalty};
+use burn::tensor::Tensor;
+
+/// One minibatch on the device.
+#[derive(Clone, Debug)]
+pub struct Minibatch {
+    /// What actor and critic read.
+    pub inputs: NetInput,
+    /// Constants of the PPO loss.
+    pub ppo: PpoBatch,
+    /// Constants of the penalty, if there is one.
+    pub teacher: Option<TeacherBatch>,
+}
+
+/// The terms of a minibatch's loss.
+#[derive(Debug)]
+pub(super) struct Losses {
+    pub(super) ppo: PpoLoss,
+    pub(super) penalty: Option<Penalty>,
+    /// What is minimised.
+    pub(super) total: Tensor<1>,
+}
+
+impl Losses {
+    /// Of `nets` for `batch`. With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the networks do not read such observations.
+    pub(super) fn of(
+        nets: &PpoNets,
+        batch: &Minibatch,
+        config: &PpoConfig,
+        score: Option<&ScoreConfig>,
+    ) -> Result<Self, LearnError> {
+        let inputs = nets.actor.join(&batch.inputs)?;
+        let dist = nets.actor.forward(inputs.clone());
+        let values = nets.critic.forward(inputs);
+        let ppo = ppo_loss(&dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
+        let mut total =
+            ppo.policy_loss.clone() - ppo.entropy.clone() * config.ent_coef + ppo.value_loss.clone() * config.vf_coef;
+        let mut penalised = None;
+        if let (Some(teacher), Some(score)) = (&batch.teacher, score) {
+            let found = penalty(score, &teacher.dist, &dist, teacher.confidence.clone())?;
+            total = total + found.term.clone() * score.kl_coef;
+            penalised = Some(found);
+        }
+        Ok(Self { ppo, penalty: penalised, total })
+    }
+
+    /// In plain numbers, but for the norm of the gradient; all are checked.
+    fn metrics(&self, batch: &Minibatch, config: &PpoConfig, steps: u64) -> Result<StepMetrics, LearnError> {
+        let mut metrics = StepMetrics {
+            policy_loss: finite("policy_loss", &self.ppo.policy_loss, steps)?,
+            value_loss: finite("value_loss", &self.ppo.value_loss, steps)?,
+            entropy: finite("entropy", &self.ppo.entropy, steps)?,
+            ..StepMetrics::default()
+        };
+        if let (Some(teacher), Some(Penalty { kl, term })) = (&batch.teacher, &self.penalty) {
+            metrics.decoder_kl = finite("decoder_kl", &kl.clone().mean(), steps)?;
+            metrics.kl_penalty = finite("kl_penalty", term, steps)?;
+            metrics.confidence = teacher.mean_confidence;
+        }
+        let ratios = ratio_stats(&host(self.ppo.log_ratio.clone().inner())?, config.clip);
+        metrics.approx_kl = ratios.approx_kl;
+        metrics.clip_fraction = ratios.clip_fraction;
+        metrics.total_loss = finite("total_loss", &self.total, steps)?;
+        Ok(metrics)
+    }
+}
+
+/// Loss, gradient, clipping by the global norm, one step of Adam on tracked `nets`.
+///
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss.
+///
+/// # Errors
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
+/// first loss beyond all bounds; [`LearnError::Config`] if the networks do not read such observations.
+pub fn gradient_step(
+    nets: &mut PpoNets,
+    adam: &mut Adam,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    score: Option<&ScoreConfig>,
+    lr: f64,
+) -> Result<StepMetrics, LearnError> {
+    step_in_parts(nets, adam, std::iter::once((batch.clone(), 1.0)), config, score, lr)
+}
+
+/// [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.
+pub(super) fn step_in_parts(
+    nets: &mut PpoNets,
+    adam: &mut Adam,
+    parts: impl Iterator<Item = (Minibatch, f64)>,
+    config: &PpoConfig,
+    score: Option<&ScoreConfig>,
+    lr: f64,
+) -> Result<StepMetrics, LearnError> {
+    let (mut metrics, mut sum) = (StepMetrics::default(), NamedGrads::default());
+    let steps = adam.steps();
+    for (part, share) in parts {
+        let losses = Losses::of(nets, &part, config, score)?;
+        metrics.add(&losses.metrics(&part, config, steps)?.scaled(share));
+        // A whole minibatch is not multiplied by 1.
+        let total = if share < 1.0 { losses.total * share } else { losses.total };
+        sum.add(NamedGrads::take(nets, "", total.backward())?);
+    }
+    let (norm, scale) = sum.clip_factor(config.max_grad_norm, steps)?;
+    metrics.grad_norm = norm;
+    adam.step(nets, "", &sum, lr, scale)?;
+    Ok(metrics)
+}

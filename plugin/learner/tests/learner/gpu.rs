@@ -1,0 +1,94 @@
+//! A graphics card learns what the CPU learns, within tolerance, from the same rollouts. A software renderer will do.
+
+use crate::{corridor, image_task, score, toy};
+use playbot_learner::{
+    DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig, SkillModel, SkillTrainer,
+    UpdateMetrics,
+};
+
+const CARD: DeviceKind = DeviceKind::Wgpu;
+
+fn assert_near(found: &[f32], want: &[f32], tolerance: f32, what: &str) {
+    assert_eq!(found.len(), want.len(), "{what}");
+    for (found, want) in found.iter().zip(want) {
+        assert!((found - want).abs() <= tolerance * (1.0 + want.abs()), "{what}: {found} for {want}");
+    }
+}
+
+fn assert_alike(found: &UpdateMetrics, want: &UpdateMetrics) {
+    for ((name, found), (other, want)) in found.scalars().into_iter().zip(want.scalars()) {
+        assert_eq!(name, other);
+        assert!((found - want).abs() <= 2e-3 * (1.0 + want.abs()), "{name}: {found} for {want}");
+    }
+}
+
+/// Two learners of the same settings, one on each device, learn from what the first plays.
+fn learn_alike(make: impl Fn(DeviceKind) -> PpoLearner, mut play: impl FnMut(&PpoLearner) -> Rollout) {
+    let (mut cpu, mut card) = (make(DeviceKind::Flex), make(CARD));
+    for _ in 0..2 {
+        let rollout = play(&cpu);
+        let want = cpu.update(&rollout).expect("finite");
+        assert_alike(&card.update(&rollout).expect("finite"), &want);
+        let n = rollout.envs;
+        let (z, obs) = (&rollout.z[..n * rollout.latent], rollout.obs.rows(0..n, rollout.obs_kind.numbers()));
+        let z = if cpu.policy().latent() == 0 { &[] } else { z };
+        let (want, found) = (cpu.policy().forward(z, obs, n), card.policy().forward(z, obs, n));
+        let (want, found) = (want.expect("finite"), found.expect("finite"));
+        assert_near(&found.head, &want.head, 2e-3, "head");
+        assert_near(&found.values, &want.values, 2e-3, "values");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("learner.safetensors");
+    card.save(&path).expect("writable");
+    // What a card has learned goes on anywhere, and the other way round.
+    let mut on_cpu = PpoLearner::load(&path, DeviceKind::Flex).expect("readable");
+    let mut on_card = PpoLearner::load(&path, CARD).expect("readable");
+    let rollout = play(&cpu);
+    let want = card.update(&rollout).expect("finite");
+    assert_alike(&on_cpu.update(&rollout).expect("finite"), &want);
+    assert_alike(&on_card.update(&rollout).expect("finite"), &want);
+}
+
+#[test]
+fn ppo_on_vectors() {
+    let spec = PolicySpec { obs: toy::OBS.into(), latent: 0, action_space: toy::SPACE };
+    let mut driver = toy::Driver::new(8, 1);
+    let make = |device| PpoLearner::new(corridor::config(), spec, 1, device).expect("good settings");
+    learn_alike(make, |learner| driver.rollout(learner, 8));
+}
+
+#[test]
+fn score_on_vectors_with_skills_from_the_cpu() {
+    let model = score::model(1);
+    let mut driver = toy::Driver::new(8, 1);
+    let settings = ScoreConfig::default();
+    let make = |device| {
+        PpoLearner::with_skill(corridor::config(), settings.clone(), &model, 1, device).expect("good settings")
+    };
+    learn_alike(make, |learner| driver.rollout(learner, 8));
+}
+
+#[test]
+fn ppo_on_images() {
+    let spec = PolicySpec { obs: image_task::SHAPE.into(), latent: 0, action_space: image_task::SPACE };
+    let config = PpoConfig { num_steps: 4, ..image_task::config() };
+    let mut driver = image_task::Driver::new(8, 1);
+    let make = |device| PpoLearner::new(config.clone(), spec, 1, device).expect("good settings");
+    learn_alike(make, |learner| driver.rollout(learner, 4));
+}
+
+#[test]
+fn skills() {
+    let [mut cpu, mut card] = [DeviceKind::Flex, CARD].map(|device| {
+        SkillTrainer::new(crate::skill::config(), crate::skill::corridor_demos(20), 1, device).expect("windows fit")
+    });
+    for _ in 0..4 {
+        let (want, found) = (cpu.train_batch().expect("finite"), card.train_batch().expect("finite"));
+        let numbers = |m: playbot_learner::SkillMetrics| [m.loss, m.nll, m.kl, m.latent_norm, m.grad_norm];
+        assert_near(&numbers(found), &numbers(want), 2e-3, "metrics");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("skills.safetensors");
+    card.into_model().save(&path).expect("writable");
+    SkillModel::load(&path, DeviceKind::Flex).expect("read where it was not made");
+}
