@@ -110,11 +110,11 @@ impl GruLayer {
         let batch = x.dims()[0] / steps.max(1);
         let device = x.device();
         let initial = initial.unwrap_or_else(|| Tensor::zeros([directions, batch, hidden], &device));
-        let input = x.unsqueeze_dim(0).matmul(self.weight_ih.clone());
         let scan = if has_kernels(&device) { kernels::gru } else { gru_steps };
         scan(GruInput {
-            input,
-            weight: self.weight_hh.clone(),
+            x,
+            weight_ih: self.weight_ih.clone(),
+            weight_hh: self.weight_hh.clone(),
             bias_ih: self.bias_ih.clone(),
             bias_hh: self.bias_hh.clone(),
             initial,
@@ -134,13 +134,13 @@ impl GruLayer {
     }
 }
 
-/// The recurrent part of a layer in tensor operations, for devices without a kernel and as the kernel's yardstick:
+/// A layer in tensor operations, for devices without a kernel and as the kernel's yardstick:
 /// the same as [`kernels::gru`].
 fn gru_steps(input: GruInput) -> Tensor<2> {
-    let GruInput { input, weight, bias_ih, bias_hh, initial } = input;
+    let GruInput { x, weight_ih, weight_hh: weight, bias_ih, bias_hh, initial } = input;
     let [directions, batch, hidden] = initial.dims();
-    let steps = input.dims()[1] / batch.max(1);
-    let input = input + bias_ih.unsqueeze_dim(1);
+    let steps = x.dims()[0] / batch.max(1);
+    let input = x.unsqueeze_dim(0).matmul(weight_ih) + bias_ih.unsqueeze_dim(1);
     let bias_hh: Tensor<3> = bias_hh.unsqueeze_dim(1);
     let parts = (0..directions).map(|d| {
         let one = |tensor: &Tensor<3>| -> Tensor<2> { tensor.clone().narrow(0, d, 1).squeeze_dim(0) };
@@ -203,26 +203,27 @@ mod tests {
     ) -> Vec<(&'static str, Vec<f32>)> {
         let device = kind.plain();
         let mut rng = Streams::new(1).stream("gru kernel", 0);
-        let mut layer = Gru::new(1, hidden, 1, directions == 2, &mut rng, &device);
+        const INPUTS: usize = 7;
+        let mut layer = Gru::new(INPUTS, hidden, 1, directions == 2, &mut rng, &device);
         let mut numbers = |n: usize| (0..n).map(|_| 2.0 * normal(&mut rng)).collect::<Vec<f32>>();
         let mut cube = |rows: usize, width: usize| -> Tensor<3> {
             Tensor::from_data(TensorData::new(numbers(directions * rows * width), [directions, rows, width]), &device)
         };
-        let input = cube(STEPS * BATCH, 3 * hidden).autodiff().require_grad();
         let initial = cube(BATCH, hidden).autodiff().require_grad();
+        let x = matrix(numbers(STEPS * BATCH * INPUTS), STEPS * BATCH, INPUTS, &device).autodiff().require_grad();
         let probe = matrix(numbers(STEPS * BATCH * directions * hidden), STEPS * BATCH, directions * hidden, &device);
         layer = tracked(&layer);
-        let GruLayer { weight_hh, bias_ih, bias_hh, .. } = layer.layers[0].clone();
-        let of_scan = GruInput { input: input.clone(), weight: weight_hh, bias_ih, bias_hh, initial: initial.clone() };
+        let GruLayer { weight_ih, weight_hh, bias_ih, bias_hh } = layer.layers[0].clone();
+        let of_scan = GruInput { x: x.clone(), weight_ih, weight_hh, bias_ih, bias_hh, initial: initial.clone() };
         let output = scan(of_scan);
         let grads = (output.clone() * probe).sum().backward();
         let named = NamedGrads::read(&mut layer, "", &grads).expect("readable");
         let mut found = vec![
             ("output", host(output.inner()).expect("readable")),
-            ("input", host(input.grad(&grads).expect("tracked")).expect("readable")),
+            ("x", host(x.grad(&grads).expect("tracked")).expect("readable")),
             ("initial", host(initial.grad(&grads).expect("tracked")).expect("readable")),
         ];
-        for name in ["l0.weight_hh", "l0.bias_ih", "l0.bias_hh"] {
+        for name in ["l0.weight_ih", "l0.weight_hh", "l0.bias_ih", "l0.bias_hh"] {
             found.push((name, named.get(name).expect("a parameter").to_vec()));
         }
         found

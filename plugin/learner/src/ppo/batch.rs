@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Images of a minibatch that are learned from at a time.
-const IMAGES_AT_A_TIME: usize = 256;
+const IMAGES_AT_A_TIME: usize = 128;
 
 /// A rollout with everything that an update reads beside it, one entry per row.
 #[derive(Debug)]

@@ -1,10 +1,13 @@
-//! Reading the numbers of a tensor where they are.
+//! Between tensors and numbers in host memory.
+
+#![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
 
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Flex};
+use burn::backend::{Backend, Flex, NdArray};
+use burn::tensor::{Shape, TensorData, read_sync};
 use std::borrow::Cow;
 
-/// A backend whose numbers can be read without a copy.
+/// A backend whose numbers can be read; without a copy, if it can.
 pub(super) trait HostNumbers: Backend {
     /// The numbers, row-major.
     fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]>;
@@ -16,4 +19,21 @@ impl HostNumbers for Flex {
         let values = tensor.as_slice().map(Cow::Borrowed).or_else(|| copy().map(Cow::Owned));
         values.expect("a tensor in row-major order can be read")
     }
+}
+
+impl HostNumbers for NdArray {
+    fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]> {
+        let data = data::<Self>(tensor.clone());
+        Cow::Owned(data.into_vec().expect("tensors are made of f32"))
+    }
+}
+
+/// The numbers of a tensor in host memory; a copy only if they are shared.
+pub(super) fn data<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
+    read_sync(B::float_into_data(tensor)).expect("a backend with kernels has its numbers in host memory")
+}
+
+/// A tensor of `values`.
+pub(super) fn tensor<B: Backend>(values: Vec<f32>, shape: impl Into<Shape>, device: &B::Device) -> FloatTensor<B> {
+    B::float_from_data(TensorData::new(values, shape), device)
 }

@@ -6,13 +6,14 @@
 #![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
 
 use super::fast_math;
-use super::gru_scan::{self, Scan, ScanGrads};
+use super::gru_scan::{self, Scan, ScanGrads, ScanInput, Sizes, Wanted};
+use super::host_numbers::{HostNumbers, data, tensor};
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind, unary};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, DispatchDevice, Flex, NdArray, TensorMetadata, backend_extension};
-use burn::tensor::{Device, Shape, Tensor, TensorData, read_sync};
+use burn::tensor::{Device, Shape, Tensor};
 use std::sync::Arc;
 
 /// Whether the operations of this file can be used on `device`.
@@ -26,13 +27,15 @@ pub(in crate::nn) fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     Tensor::from_dispatch(Dispatch::kernel_tanh(x.into_dispatch()))
 }
 
-/// What the recurrent part of a layer of T steps works on.
+/// What a recurrent layer of T steps works on.
 #[derive(Clone, Debug)]
 pub(in crate::nn) struct GruInput {
-    /// x W_ih without its bias, time-major, `[directions, T * B, 3 * hidden]`.
-    pub(in crate::nn) input: Tensor<3>,
+    /// Time-major, `[T * B, inputs]`.
+    pub(in crate::nn) x: Tensor<2>,
+    /// W_ih, `[directions, inputs, 3 * hidden]`.
+    pub(in crate::nn) weight_ih: Tensor<3>,
     /// W_hh, `[directions, hidden, 3 * hidden]`.
-    pub(in crate::nn) weight: Tensor<3>,
+    pub(in crate::nn) weight_hh: Tensor<3>,
     /// `[directions, 3 * hidden]`.
     pub(in crate::nn) bias_ih: Tensor<2>,
     /// `[directions, 3 * hidden]`.
@@ -41,12 +44,13 @@ pub(in crate::nn) struct GruInput {
     pub(in crate::nn) initial: Tensor<3>,
 }
 
-/// The recurrent part of a layer on a device with kernels: `[T * B, directions * hidden]`.
+/// A layer on a device with kernels: `[T * B, directions * hidden]`.
 pub(in crate::nn) fn gru(input: GruInput) -> Tensor<2> {
-    let GruInput { input, weight, bias_ih, bias_hh, initial } = input;
+    let GruInput { x, weight_ih, weight_hh, bias_ih, bias_hh, initial } = input;
     Tensor::from_dispatch(Dispatch::kernel_gru(
-        input.into_dispatch(),
-        weight.into_dispatch(),
+        x.into_dispatch(),
+        weight_ih.into_dispatch(),
+        weight_hh.into_dispatch(),
         bias_ih.into_dispatch(),
         bias_hh.into_dispatch(),
         initial.into_dispatch(),
@@ -59,10 +63,11 @@ pub(super) trait Kernels: Backend {
     /// tanh of every element.
     fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// The recurrent part of a layer, with the tensors of [`GruInput`]. Gives `[T * B, directions * hidden]`.
+    /// A recurrent layer, with the tensors of [`GruInput`]. Gives `[T * B, directions * hidden]`.
     fn kernel_gru(
-        input: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
+        x: FloatTensor<Self>,
+        weight_ih: FloatTensor<Self>,
+        weight_hh: FloatTensor<Self>,
         bias_ih: FloatTensor<Self>,
         bias_hh: FloatTensor<Self>,
         initial: FloatTensor<Self>,
@@ -77,13 +82,14 @@ macro_rules! host_kernels {
             }
 
             fn kernel_gru(
-                input: FloatTensor<Self>,
-                weight: FloatTensor<Self>,
+                x: FloatTensor<Self>,
+                weight_ih: FloatTensor<Self>,
+                weight_hh: FloatTensor<Self>,
                 bias_ih: FloatTensor<Self>,
                 bias_hh: FloatTensor<Self>,
                 initial: FloatTensor<Self>,
             ) -> FloatTensor<Self> {
-                gru_scan::forward::<Self>(input, weight, bias_ih, bias_hh, initial).0
+                scanned::<Self>(&x, [&weight_ih, &weight_hh], [&bias_ih, &bias_hh], &initial).0
             }
         }
     };
@@ -92,7 +98,7 @@ macro_rules! host_kernels {
 host_kernels!(Flex);
 host_kernels!(NdArray);
 
-impl<B: Kernels, C: CheckpointStrategy> Kernels for Autodiff<B, C> {
+impl<B: Kernels + HostNumbers, C: CheckpointStrategy> Kernels for Autodiff<B, C> {
     fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
         let (x, node) = x.into_parts();
         let y = B::kernel_tanh(x);
@@ -103,20 +109,38 @@ impl<B: Kernels, C: CheckpointStrategy> Kernels for Autodiff<B, C> {
     }
 
     fn kernel_gru(
-        input: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
+        x: FloatTensor<Self>,
+        weight_ih: FloatTensor<Self>,
+        weight_hh: FloatTensor<Self>,
         bias_ih: FloatTensor<Self>,
         bias_hh: FloatTensor<Self>,
         initial: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
-        let parts = [input, weight, bias_ih, bias_hh, initial].map(|tensor| tensor.into_parts());
-        let [(input, n0), (weight, n1), (bias_ih, n2), (bias_hh, n3), (initial, n4)] = parts;
-        let (output, scan) = gru_scan::forward::<B>(input, weight.clone(), bias_ih, bias_hh, initial);
-        match GruScan.prepare::<C>([n0, n1, n2, n3, n4]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish((Arc::new(scan), weight), output),
+        let parts = [x, weight_ih, weight_hh, bias_ih, bias_hh, initial].map(|tensor| tensor.into_parts());
+        let [(x, n0), (weight_ih, n1), (weight_hh, n2), (bias_ih, n3), (bias_hh, n4), (initial, n5)] = parts;
+        let (output, scan) = scanned::<B>(&x, [&weight_ih, &weight_hh], [&bias_ih, &bias_hh], &initial);
+        match GruScan.prepare::<C>([n0, n1, n2, n3, n4, n5]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish((Arc::new(scan), x, weight_ih, weight_hh), output),
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
+}
+
+/// The forward pass of a recurrent layer.
+fn scanned<B: HostNumbers>(
+    x: &FloatTensor<B>,
+    [weight_ih, weight_hh]: [&FloatTensor<B>; 2],
+    [bias_ih, bias_hh]: [&FloatTensor<B>; 2],
+    initial: &FloatTensor<B>,
+) -> (FloatTensor<B>, Scan) {
+    let [directions, batch, hidden] = initial.shape().dims();
+    let [rows, inputs] = x.shape().dims();
+    let sizes = Sizes { steps: rows / batch.max(1), batch, inputs, hidden, directions };
+    let [x_numbers, weight_ih, weight_hh] = [x, weight_ih, weight_hh].map(B::numbers);
+    let [bias_ih, bias_hh, initial] = [bias_ih, bias_hh, initial].map(B::numbers);
+    let input = ScanInput { x: &x_numbers, weight_ih: &weight_ih, weight_hh: &weight_hh };
+    let (output, scan) = gru_scan::forward(input, (&bias_ih, &bias_hh), &initial, sizes);
+    (tensor::<B>(output, [rows, directions * hidden], &x.device()), scan)
 }
 
 #[derive(Debug)]
@@ -128,7 +152,7 @@ impl<B: Kernels> Backward<B, 1> for Tanh {
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
         let y = data::<B>(ops.state);
         unary::<B, _>(ops.parents, ops.node, grads, |grad| {
-            edited::<B>(grad, |grad| fast_math::tanh_backward(grad, numbers(&y)))
+            edited::<B>(grad, |grad| fast_math::tanh_backward(grad, y.as_slice().expect("tensors are made of f32")))
         });
     }
 }
@@ -136,40 +160,34 @@ impl<B: Kernels> Backward<B, 1> for Tanh {
 #[derive(Debug)]
 struct GruScan;
 
-impl<B: Kernels> Backward<B, 5> for GruScan {
-    /// What the forward pass left, and W_hh.
-    type State = (Arc<Scan>, FloatTensor<B>);
+impl<B: Kernels + HostNumbers> Backward<B, 6> for GruScan {
+    /// What the forward pass left, x, W_ih and W_hh.
+    type State = (Arc<Scan>, FloatTensor<B>, FloatTensor<B>, FloatTensor<B>);
 
-    fn backward(self, ops: Ops<Self::State, 5>, grads: &mut Gradients, _: &mut Checkpointer) {
+    fn backward(self, ops: Ops<Self::State, 6>, grads: &mut Gradients, _: &mut Checkpointer) {
         let output = grads.consume::<B>(&ops.node);
-        let (scan, weight) = ops.state;
-        let [input, hidden, bias_ih, bias_hh, initial] = ops.parents;
-        let found = gru_scan::backward::<B>(output, &scan, weight, initial.is_some());
-        let ScanGrads { input: d_input, weight: d_weight, bias_ih: d_bias_ih, bias_hh: d_bias_hh, initial: d_initial } =
-            found;
-        let pairs =
-            [(input, d_input), (hidden, d_weight), (bias_ih, d_bias_ih), (bias_hh, d_bias_hh), (initial, d_initial)];
-        for (node, grad) in pairs {
+        let (scan, x, weight_ih, weight_hh) = ops.state;
+        let Sizes { steps, batch, inputs, hidden, directions } = scan.sizes;
+        let (rows, gates, device) = (steps * batch, 3 * hidden, output.device());
+        let wanted = Wanted { x: ops.parents[0].is_some(), initial: ops.parents[5].is_some() };
+        let numbers = [&x, &weight_ih, &weight_hh].map(B::numbers);
+        let input = ScanInput { x: &numbers[0], weight_ih: &numbers[1], weight_hh: &numbers[2] };
+        let found = gru_scan::backward(&B::numbers(&output), input, &scan, wanted);
+        let ScanGrads { x, weight_ih, weight_hh, bias_ih, bias_hh, initial } = found;
+        let shaped: [(Vec<f32>, Shape); 6] = [
+            (x, [rows, inputs].into()),
+            (weight_ih, [directions, inputs, gates].into()),
+            (weight_hh, [directions, hidden, gates].into()),
+            (bias_ih, [directions, gates].into()),
+            (bias_hh, [directions, gates].into()),
+            (initial, [directions, batch, hidden].into()),
+        ];
+        for (node, (values, shape)) in ops.parents.into_iter().zip(shaped) {
             if let Some(node) = node {
-                grads.register::<B>(node.id, grad);
+                grads.register::<B>(node.id, tensor::<B>(values, shape, &device));
             }
         }
     }
-}
-
-/// The numbers of a tensor in host memory; a copy only if they are shared.
-pub(super) fn data<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
-    read_sync(B::float_into_data(tensor)).expect("a backend with kernels has its numbers in host memory")
-}
-
-/// The numbers of host data.
-pub(super) fn numbers(data: &TensorData) -> &[f32] {
-    data.as_slice().expect("tensors are made of f32")
-}
-
-/// A tensor of `values`.
-pub(super) fn tensor<B: Backend>(values: Vec<f32>, shape: impl Into<Shape>, device: &B::Device) -> FloatTensor<B> {
-    B::float_from_data(TensorData::new(values, shape), device)
 }
 
 /// The tensor after `edit`; a copy only if it is shared.

@@ -13,7 +13,7 @@ use crate::nn::cpu::tile::{LANES, Lanes, WIDE_ROWS, Window};
 const ROWS: usize = 64;
 
 /// The gradient of x W + b: `[n, columns]`, its rows filled up with zeros to whole blocks of 16.
-pub(super) struct SumGrads {
+pub(in crate::nn::cpu) struct SumGrads {
     n: usize,
     columns: usize,
     stride: usize,
@@ -22,7 +22,7 @@ pub(super) struct SumGrads {
 
 impl SumGrads {
     /// From the gradient of the output `y`, which the activation gave.
-    pub(super) fn new(grad: &[f32], y: &[f32], columns: usize, activation: Option<Activation>) -> Self {
+    pub(in crate::nn::cpu) fn new(grad: &[f32], y: &[f32], columns: usize, activation: Option<Activation>) -> Self {
         let (n, stride) = (grad.len() / columns, columns.next_multiple_of(LANES));
         let mut values = vec![0.0; n * stride];
         // Each is little work.
@@ -47,13 +47,13 @@ impl SumGrads {
     }
 
     /// The gradient of the input: `[n, inputs]`, for weights `[inputs, columns]`.
-    pub(super) fn input(&self, weights: &[f32]) -> Vec<f32> {
+    pub(in crate::nn::cpu) fn input(&self, weights: &[f32]) -> Vec<f32> {
         let turned = Packed::transposed(weights, self.columns, weights.len() / self.columns);
         product(&self.values, (self.n, self.stride), &turned, &[], None)
     }
 
     /// The gradients of weights `[inputs, columns]` and biases, for the input `[n, inputs]`.
-    pub(super) fn params(&self, x: &[f32], inputs: usize) -> (Vec<f32>, Vec<f32>) {
+    pub(in crate::nn::cpu) fn params(&self, x: &[f32], inputs: usize) -> (Vec<f32>, Vec<f32>) {
         let blocks = self.stride / LANES;
         let mut sums = vec![[0.0; LANES]; blocks * inputs];
         let mut biases = vec![[0.0; LANES]; blocks];

@@ -15,4 +15,7 @@ mod share;
 #[cfg(test)]
 mod tests;
 
+pub(super) use backward::SumGrads;
+pub(super) use forward::product;
 pub(in crate::nn) use op::dense;
+pub(super) use packed::Packed;

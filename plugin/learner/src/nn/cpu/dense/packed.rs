@@ -5,7 +5,7 @@ use crate::nn::cpu::tile::{LANES, Lanes};
 
 /// Weights for [`correlate`](crate::nn::cpu::tile::correlate): for each block of 16 columns of a product its rows, 16
 /// numbers each, zeros beyond the last column.
-pub(super) struct Packed {
+pub(in crate::nn::cpu) struct Packed {
     pub(super) rows: usize,
     pub(super) columns: usize,
     pub(super) lanes: Vec<Lanes>,
@@ -13,7 +13,7 @@ pub(super) struct Packed {
 
 impl Packed {
     /// Of the matrix `[rows, columns]`.
-    pub(super) fn new(matrix: &[f32], rows: usize, columns: usize) -> Self {
+    pub(in crate::nn::cpu) fn new(matrix: &[f32], rows: usize, columns: usize) -> Self {
         let mut lanes = vec![[0.0; LANES]; rows * columns.div_ceil(LANES)];
         share(&mut lanes, rows.max(1), matrix.len(), |block, lanes| {
             let first = block * LANES;
@@ -28,7 +28,7 @@ impl Packed {
     }
 
     /// Of the transpose of the matrix `[columns, rows]`.
-    pub(super) fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Self {
+    pub(in crate::nn::cpu) fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Self {
         let mut lanes = vec![[0.0; LANES]; rows * columns.div_ceil(LANES)];
         share(&mut lanes, rows.max(1), matrix.len(), |block, lanes| {
             let of_block = &matrix[block * LANES * rows..];

@@ -1,106 +1,108 @@
 //! The gradients of the inputs from those of the states.
 
-use super::{Direction, Scan, Sizes, per_direction};
+use super::scan::of_direction;
+use super::{Direction, Scan, ScanInput, Sizes};
+use crate::nn::cpu::dense::{Packed, SumGrads, product};
 use crate::nn::cpu::fast_math::vectorized;
-use crate::nn::cpu::kernels::{data, numbers, tensor};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, TensorMetadata};
 use rayon::prelude::*;
 
 /// Gradients of all that enters [`super::forward`], in its shapes.
-pub(in crate::nn) struct ScanGrads<B: Backend> {
-    pub(in crate::nn) input: FloatTensor<B>,
-    pub(in crate::nn) weight: FloatTensor<B>,
-    pub(in crate::nn) bias_ih: FloatTensor<B>,
-    pub(in crate::nn) bias_hh: FloatTensor<B>,
-    pub(in crate::nn) initial: FloatTensor<B>,
+pub(in crate::nn) struct ScanGrads {
+    pub(in crate::nn) x: Vec<f32>,
+    pub(in crate::nn) weight_ih: Vec<f32>,
+    pub(in crate::nn) weight_hh: Vec<f32>,
+    pub(in crate::nn) bias_ih: Vec<f32>,
+    pub(in crate::nn) bias_hh: Vec<f32>,
+    pub(in crate::nn) initial: Vec<f32>,
 }
 
-/// One direction's part of [`ScanGrads`].
-struct DirectionGrads<'a> {
-    /// `[T * B, 3 * hidden]`.
-    input: &'a mut [f32],
-    /// Of c, `[T * B, 3 * hidden]`.
-    recurrent: &'a mut [f32],
-    bias_ih: &'a mut [f32],
-    bias_hh: &'a mut [f32],
-    initial: &'a mut [f32],
+/// What of [`ScanGrads`] costs a product of its own and is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::nn) struct Wanted {
+    pub(in crate::nn) x: bool,
+    /// Else that of the initial states lacks its recurrent part.
+    pub(in crate::nn) initial: bool,
 }
 
-/// The gradients for `output`, the gradient of the outputs. That of the initial state lacks its recurrent part, which
-/// costs a product, unless `initial` asks for it.
-pub(in crate::nn) fn backward<B: Backend>(
-    output: FloatTensor<B>,
-    scan: &Scan,
-    weight: FloatTensor<B>,
-    initial: bool,
-) -> ScanGrads<B> {
-    let device = output.device();
+/// The gradients for `output`, that of the outputs.
+pub(in crate::nn) fn backward(output: &[f32], input: ScanInput<'_>, scan: &Scan, wanted: Wanted) -> ScanGrads {
     let sizes = scan.sizes;
-    let Sizes { steps, batch, hidden, directions } = sizes;
-    let (rows, gates) = (steps * batch, sizes.gates());
-    let output = data::<B>(output);
-    let zeros = |per_direction: usize| vec![0.0; directions * per_direction];
-    let (mut input, mut recurrent) = (zeros(rows * gates), zeros(rows * gates));
-    let (mut bias_ih, mut bias_hh, mut first) = (zeros(gates), zeros(gates), zeros(sizes.block()));
-    let wide = input.par_chunks_mut((rows * gates).max(1)).zip(recurrent.par_chunks_mut((rows * gates).max(1)));
-    let biases = bias_ih.par_chunks_mut(gates).zip(bias_hh.par_chunks_mut(gates));
-    let parts = wide.zip(biases.zip(first.par_chunks_mut(sizes.block().max(1))));
-    let weights = per_direction::<B>(&weight, sizes);
-    let work = parts.zip(weights.into_par_iter().zip(&scan.directions)).enumerate();
-    work.for_each(|(d, (((input, recurrent), ((bias_ih, bias_hh), state)), (weight, run)))| {
-        let grads = DirectionGrads { input, recurrent, bias_ih, bias_hh, initial: state };
-        scan_backward::<B>(grads, numbers(&output), d, run, B::float_transpose(weight), initial, sizes, &device);
+    let parts = scan.directions.par_iter().enumerate().map(|(d, run)| {
+        let part = |all| of_direction(all, d, sizes.directions);
+        let weights = (part(input.weight_ih), part(input.weight_hh));
+        of_one_direction(output, input.x, weights, d, run, wanted, sizes)
     });
-    let before = scan.directions.iter().map(|run| {
-        let from = if run.backwards { sizes.block() } else { 0 };
-        &run.states[from..from + rows * hidden]
-    });
-    let before = tensor::<B>(before.collect::<Vec<_>>().concat(), [directions, rows, hidden], &device);
-    let recurrent = tensor::<B>(recurrent, [directions, rows, gates], &device);
-    ScanGrads {
-        input: tensor::<B>(input, [directions, rows, gates], &device),
-        weight: B::float_matmul(B::float_transpose(before), recurrent),
-        bias_ih: tensor::<B>(bias_ih, [directions, gates], &device),
-        bias_hh: tensor::<B>(bias_hh, [directions, gates], &device),
-        initial: tensor::<B>(first, [directions, batch, hidden], &device),
+    let mut all = ScanGrads {
+        x: Vec::new(),
+        weight_ih: Vec::new(),
+        weight_hh: Vec::new(),
+        bias_ih: Vec::new(),
+        bias_hh: Vec::new(),
+        initial: Vec::new(),
+    };
+    for part in parts.collect::<Vec<ScanGrads>>() {
+        if all.x.is_empty() {
+            all.x = part.x;
+        } else {
+            vectorized(|| all.x.iter_mut().zip(&part.x).for_each(|(sum, x)| *sum += x));
+        }
+        all.weight_ih.extend(part.weight_ih);
+        all.weight_hh.extend(part.weight_hh);
+        all.bias_ih.extend(part.bias_ih);
+        all.bias_hh.extend(part.bias_hh);
+        all.initial.extend(part.initial);
     }
+    all
 }
 
-/// One direction of [`backward`]; `grads` start as zeros.
-fn scan_backward<B: Backend>(
-    mut grads: DirectionGrads<'_>,
+/// A direction's part of [`backward`], with its weights of input and state.
+fn of_one_direction(
     output: &[f32],
+    x: &[f32],
+    (weight_ih, weight_hh): (&[f32], &[f32]),
     direction: usize,
     run: &Direction,
-    transposed: FloatTensor<B>,
-    initial: bool,
+    wanted: Wanted,
     sizes: Sizes,
-    device: &B::Device,
-) {
-    let gates = sizes.gates();
-    // `initial` holds the gradient of the state between two steps until the first step is reached.
+) -> ScanGrads {
+    let Sizes { batch, inputs, hidden, .. } = sizes;
+    let (rows, gates) = (sizes.rows(), sizes.gates());
+    let turned = Packed::transposed(weight_hh, gates, hidden);
+    let mut sums = SumGradsOfRows { input: vec![0.0; rows * gates], recurrent: vec![0.0; rows * gates] };
+    // Of the state between two steps, until the first step is reached.
+    let mut state = vec![0.0; sizes.block()];
     let order: Vec<usize> = sizes.order(run.backwards).collect();
     for (k, &t) in order.iter().enumerate().rev() {
-        vectorized(|| step_backward(&mut grads, t, output, direction, run, sizes));
-        if k > 0 || initial {
-            let c = grads.recurrent[t * sizes.batch * gates..(t + 1) * sizes.batch * gates].to_vec();
-            let c = tensor::<B>(c, [sizes.batch, gates], device);
-            let h = data::<B>(B::float_matmul(c, transposed.clone()));
-            grads.initial.iter_mut().zip(numbers(&h)).for_each(|(grad, x)| *grad += x);
+        vectorized(|| step_backward(&mut sums, &mut state, t, output, direction, run, sizes));
+        if k > 0 || wanted.initial {
+            let c = &sums.recurrent[t * batch * gates..(t + 1) * batch * gates];
+            let h = product(c, (batch, gates), &turned, &[], None);
+            vectorized(|| state.iter_mut().zip(&h).for_each(|(grad, x)| *grad += x));
         }
     }
-    for (row, c) in grads.input.chunks_exact(gates).zip(grads.recurrent.chunks_exact(gates)) {
-        grads.bias_ih.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
-        grads.bias_hh.iter_mut().zip(c).for_each(|(sum, x)| *sum += x);
-    }
+    let before = if run.backwards { sizes.block() } else { 0 };
+    let of_rows = |grads: &[f32]| SumGrads::new(grads, grads, gates, None);
+    let of_input = of_rows(&sums.input);
+    let (weight_hh, bias_hh) = of_rows(&sums.recurrent).params(&run.states[before..before + rows * hidden], hidden);
+    let (found_ih, bias_ih) = of_input.params(x, inputs);
+    let x = if wanted.x { of_input.input(weight_ih) } else { Vec::new() };
+    ScanGrads { x, weight_ih: found_ih, weight_hh, bias_ih, bias_hh, initial: state }
+}
+
+/// The gradients of a direction's sums, `[T * B, 3 * hidden]` each.
+struct SumGradsOfRows {
+    /// Of a.
+    input: Vec<f32>,
+    /// Of c.
+    recurrent: Vec<f32>,
 }
 
 /// One step for all rows of the batch: from the gradient of the state after it to those of a, c and, but for the part
 /// that goes through c, of the state before it.
 #[inline(always)]
 fn step_backward(
-    grads: &mut DirectionGrads<'_>,
+    grads: &mut SumGradsOfRows,
+    state: &mut [f32],
     t: usize,
     output: &[f32],
     direction: usize,
@@ -117,7 +119,7 @@ fn step_backward(
         let (r, z, n, c_n) = (&run.r[here.clone()], &run.z[here.clone()], &run.n[here.clone()], &run.c_n[here]);
         let from = (before * sizes.batch + b) * hidden;
         let h = &run.states[from..from + hidden];
-        let state = &mut grads.initial[b * hidden..(b + 1) * hidden];
+        let state = &mut state[b * hidden..(b + 1) * hidden];
         let (d_r, rest) = grads.input[row * gates..(row + 1) * gates].split_at_mut(hidden);
         let (d_z, d_n) = rest.split_at_mut(hidden);
         let d_c = &mut grads.recurrent[row * gates + 2 * hidden..(row + 1) * gates];

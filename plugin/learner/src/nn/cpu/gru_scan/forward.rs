@@ -1,49 +1,32 @@
 //! The states from the inputs.
 
-use super::{Direction, Scan, Sizes, per_direction};
+use super::scan::of_direction;
+use super::{Direction, Scan, ScanInput, Sizes};
+use crate::nn::cpu::dense::{Packed, product};
 use crate::nn::cpu::fast_math::{sigmoid, tanh, vectorized};
-use crate::nn::cpu::kernels::{data, numbers, tensor};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, TensorMetadata};
 use rayon::prelude::*;
 
-/// The outputs `[T * B, directions * hidden]`; for the shapes of the inputs see [`crate::nn::cpu::kernels::GruInput`].
-pub(in crate::nn) fn forward<B: Backend>(
-    input: FloatTensor<B>,
-    weight: FloatTensor<B>,
-    bias_ih: FloatTensor<B>,
-    bias_hh: FloatTensor<B>,
-    initial: FloatTensor<B>,
-) -> (FloatTensor<B>, Scan) {
-    let device = input.device();
-    let [directions, batch, hidden] = initial.shape().dims();
-    let rows = input.shape()[1];
-    let sizes = Sizes { steps: rows / batch.max(1), batch, hidden, directions };
-    let [input, bias_ih, bias_hh, initial] = [input, bias_ih, bias_hh, initial].map(data::<B>);
-    let weights = per_direction::<B>(&weight, sizes);
-    let runs = weights.into_par_iter().enumerate().map(|(d, weight)| {
-        let part = |all| of_direction(numbers(all), d, directions);
-        scan::<B>(part(&input), weight, (part(&bias_ih), part(&bias_hh)), part(&initial), d == 1, sizes, &device)
+/// The outputs `[T * B, directions * hidden]`, with the biases of input and state, `[directions, 3 * hidden]` each, and the
+/// states before the first step, `[directions, B, hidden]`.
+pub(in crate::nn) fn forward(
+    input: ScanInput<'_>,
+    (bias_ih, bias_hh): (&[f32], &[f32]),
+    initial: &[f32],
+    sizes: Sizes,
+) -> (Vec<f32>, Scan) {
+    let runs = (0..sizes.directions).into_par_iter().map(|d| {
+        let part = |all| of_direction(all, d, sizes.directions);
+        let weights = Packed::new(part(input.weight_ih), sizes.inputs, sizes.gates());
+        let sums = product(input.x, (sizes.rows(), sizes.inputs), &weights, part(bias_ih), None);
+        let weights = Packed::new(part(input.weight_hh), sizes.hidden, sizes.gates());
+        scan(&sums, &weights, part(bias_hh), part(initial), d == 1, sizes)
     });
     let runs: Vec<Direction> = runs.collect();
-    let output = joined(&runs, sizes);
-    (tensor::<B>(output, [rows, directions * hidden], &device), Scan { sizes, directions: runs })
+    (joined(&runs, sizes), Scan { sizes, directions: runs })
 }
 
-fn of_direction(all: &[f32], d: usize, directions: usize) -> &[f32] {
-    let len = all.len() / directions;
-    &all[d * len..(d + 1) * len]
-}
-
-fn scan<B: Backend>(
-    input: &[f32],
-    weight: FloatTensor<B>,
-    bias: (&[f32], &[f32]),
-    initial: &[f32],
-    backwards: bool,
-    sizes: Sizes,
-    device: &B::Device,
-) -> Direction {
+/// One direction, for its sums x W_ih + b_ih.
+fn scan(sums: &[f32], weights: &Packed, bias: &[f32], initial: &[f32], backwards: bool, sizes: Sizes) -> Direction {
     let (block, gates) = (sizes.block(), sizes.batch * sizes.gates());
     let zeros = || vec![0.0; sizes.steps * block];
     let states = vec![0.0; (sizes.steps + 1) * block];
@@ -53,51 +36,35 @@ fn scan<B: Backend>(
     for t in sizes.order(backwards) {
         let (before, _) = run.around(t);
         let h = &run.states[before * block..(before + 1) * block];
-        // From the zero state the recurrent product is zero.
-        let product = h.iter().any(|&x| x != 0.0).then(|| {
-            let h = tensor::<B>(h.to_vec(), [sizes.batch, sizes.hidden], device);
-            data::<B>(B::float_matmul(h, weight.clone()))
-        });
-        let product = product.as_ref().map(numbers);
-        let input = &input[t * gates..(t + 1) * gates];
-        vectorized(|| step(&mut run, t, input, product, bias, sizes));
+        let recurrent = product(h, (sizes.batch, sizes.hidden), weights, bias, None);
+        let sums = &sums[t * gates..(t + 1) * gates];
+        vectorized(|| step(&mut run, t, sums, &recurrent, sizes));
     }
     run
 }
 
-/// One step for all rows of the batch; `product` is h W_hh.
+/// One step for all rows of the batch; `a` is x W_ih + b_ih, `c` is h W_hh + b_hh.
 #[inline(always)]
-fn step(
-    run: &mut Direction,
-    t: usize,
-    input: &[f32],
-    product: Option<&[f32]>,
-    (bias_ih, bias_hh): (&[f32], &[f32]),
-    sizes: Sizes,
-) {
+fn step(run: &mut Direction, t: usize, a: &[f32], c: &[f32], sizes: Sizes) {
     let (hidden, gates) = (sizes.hidden, sizes.gates());
     let (before, after) = run.around(t);
-    let zeros = vec![0.0; gates];
     let mut state = vec![0.0; hidden];
     for b in 0..sizes.batch {
         let at = |block: usize| (block * sizes.batch + b) * hidden..(block * sizes.batch + b + 1) * hidden;
-        let a = &input[b * gates..(b + 1) * gates];
-        let c = product.map_or(&zeros[..], |all| &all[b * gates..(b + 1) * gates]);
+        let (a, c) = (&a[b * gates..(b + 1) * gates], &c[b * gates..(b + 1) * gates]);
         let gate = |k: usize| {
             let part = k * hidden..(k + 1) * hidden;
-            let sums = a[part.clone()].iter().zip(&c[part.clone()]);
-            sums.zip(bias_ih[part.clone()].iter().zip(&bias_hh[part]))
+            a[part.clone()].iter().zip(&c[part])
         };
-        for (r, ((a, c), (bi, bh))) in run.r[at(t)].iter_mut().zip(gate(0)) {
-            *r = sigmoid((a + bi) + (c + bh));
+        for (r, (a, c)) in run.r[at(t)].iter_mut().zip(gate(0)) {
+            *r = sigmoid(a + c);
         }
-        for (z, ((a, c), (bi, bh))) in run.z[at(t)].iter_mut().zip(gate(1)) {
-            *z = sigmoid((a + bi) + (c + bh));
+        for (z, (a, c)) in run.z[at(t)].iter_mut().zip(gate(1)) {
+            *z = sigmoid(a + c);
         }
-        let outputs = run.c_n[at(t)].iter_mut().zip(&mut run.n[at(t)]).zip(&run.r[at(t)]);
-        for (((c_n, n), r), ((a, c), (bi, bh))) in outputs.zip(gate(2)) {
-            *c_n = c + bh;
-            *n = tanh((a + bi) + r * *c_n);
+        run.c_n[at(t)].copy_from_slice(&c[2 * hidden..]);
+        for ((n, r), (a, c)) in run.n[at(t)].iter_mut().zip(&run.r[at(t)]).zip(gate(2)) {
+            *n = tanh(a + r * c);
         }
         let inputs = run.n[at(t)].iter().zip(&run.z[at(t)]).zip(&run.states[at(before)]);
         for (new, ((n, z), h)) in state.iter_mut().zip(inputs) {

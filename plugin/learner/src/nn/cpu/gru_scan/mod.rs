@@ -1,6 +1,6 @@
-//! The recurrent part of a GRU layer over all its steps, forward and backward, in plain loops.
+//! A GRU layer over all its steps, forward and backward, in plain loops.
 //!
-//! Against a graph of tensor operations this saves the copies of gates and states, and it takes the gradient of W_hh
+//! Against a graph of tensor operations this saves the copies of gates and states, and it takes the gradients of the weights
 //! as one product over all steps. The two directions are computed at the same time; within a direction nothing
 //! depends on the number of threads.
 //!
@@ -11,7 +11,7 @@ mod backward;
 mod forward;
 mod scan;
 
-pub(super) use backward::{ScanGrads, backward};
+pub(super) use backward::{ScanGrads, Wanted, backward};
 pub(super) use forward::forward;
-pub(super) use scan::Scan;
-use scan::{Direction, Sizes, per_direction};
+use scan::Direction;
+pub(super) use scan::{Scan, ScanInput, Sizes};

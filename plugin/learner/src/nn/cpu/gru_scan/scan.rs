@@ -1,22 +1,27 @@
-//! Sizes of a recurrent layer's sequence, and what its forward pass leaves for the backward pass.
-
-use burn::backend::Backend;
-use burn::backend::tensor::FloatTensor;
-use burn::tensor::Slice;
+//! Sizes of a recurrent layer's sequence, what enters it, and what its forward pass leaves for the backward pass.
 
 /// Sizes of a layer's sequence.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sizes {
-    pub(super) steps: usize,
-    pub(super) batch: usize,
-    pub(super) hidden: usize,
-    pub(super) directions: usize,
+pub(in crate::nn) struct Sizes {
+    pub(in crate::nn) steps: usize,
+    pub(in crate::nn) batch: usize,
+    pub(in crate::nn) inputs: usize,
+    pub(in crate::nn) hidden: usize,
+    pub(in crate::nn) directions: usize,
+}
+
+/// What enters a layer, in host memory: see [`crate::nn::cpu::kernels::GruInput`].
+#[derive(Clone, Copy, Debug)]
+pub(in crate::nn) struct ScanInput<'a> {
+    pub(in crate::nn) x: &'a [f32],
+    pub(in crate::nn) weight_ih: &'a [f32],
+    pub(in crate::nn) weight_hh: &'a [f32],
 }
 
 /// What a forward pass leaves for the backward pass.
 #[derive(Debug)]
 pub(in crate::nn) struct Scan {
-    pub(super) sizes: Sizes,
+    pub(in crate::nn) sizes: Sizes,
     pub(super) directions: Vec<Direction>,
 }
 
@@ -33,6 +38,10 @@ pub(super) struct Direction {
 }
 
 impl Sizes {
+    pub(super) fn rows(self) -> usize {
+        self.steps * self.batch
+    }
+
     pub(super) fn gates(self) -> usize {
         3 * self.hidden
     }
@@ -55,13 +64,8 @@ impl Direction {
     }
 }
 
-/// W_hh of each direction, `[hidden, 3 * hidden]`.
-pub(super) fn per_direction<B: Backend>(weight: &FloatTensor<B>, sizes: Sizes) -> Vec<FloatTensor<B>> {
-    let (hidden, gates) = (sizes.hidden, sizes.gates());
-    (0..sizes.directions)
-        .map(|d| {
-            let slices = [d..d + 1, 0..hidden, 0..gates].map(Slice::from);
-            B::float_reshape(B::float_slice(weight.clone(), &slices), [hidden, gates].into())
-        })
-        .collect()
+/// A direction's share of what all directions have together.
+pub(super) fn of_direction(all: &[f32], d: usize, directions: usize) -> &[f32] {
+    let len = all.len() / directions;
+    &all[d * len..(d + 1) * len]
 }

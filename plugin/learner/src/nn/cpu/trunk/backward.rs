@@ -1,6 +1,7 @@
 //! From the gradient of the features to those of the parameters.
 
 use super::forward::SavedActivations;
+use super::group::{self, Group};
 use super::layer::{Layer, Weights};
 use super::plan::{Plan, Step};
 use super::pool;
@@ -22,17 +23,28 @@ const IMAGES: usize = 8;
 pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivations, grad: &[f32]) -> Vec<f32> {
     let n = grad.len() / plan.features();
     let part = n.div_ceil(PARTS).max(IMAGES);
-    let memory = || (Workspace::new(plan), vec![0.0; plan.lean.len]);
+    let group = Group::new(plan);
+    let at_once = if group.is_some() { group::IMAGES } else { 1 };
+    let (kept_len, lean_len) = (plan.kept.len, plan.lean.len);
+    let memory = || (Workspace::new(plan), vec![0.0; at_once * lean_len]);
     let parts = (0..n.div_ceil(part)).into_par_iter().map_init(memory, |(work, grads), i| {
         let mut sums = zeros(plan);
-        for image in i * part..n.min((i + 1) * part) {
-            let grad = &grad[image * plan.features()..][..plan.features()];
-            let values = &saved.values[image * plan.kept.len..][..plan.kept.len];
-            let marks = &saved.marks[image * plan.marks..][..plan.marks];
-            let last = plan.lean.write(plan.last, grads);
-            plan.slots[plan.last].read(grad, last);
-            mask(last, plan.kept.read(plan.last, values));
-            backward(plan, weights, values, marks, work, grads, &mut sums);
+        let end = n.min((i + 1) * part);
+        for first in (i * part..end).step_by(at_once) {
+            let images = first..end.min(first + at_once);
+            for (image, grads) in images.clone().zip(grads.chunks_exact_mut(lean_len)) {
+                let grad = &grad[image * plan.features()..][..plan.features()];
+                let values = &saved.values[image * kept_len..][..kept_len];
+                let marks = &saved.marks[image * plan.marks..][..plan.marks];
+                let last = plan.lean.write(plan.last, grads);
+                plan.slots[plan.last].read(grad, last);
+                mask(last, plan.kept.read(plan.last, values));
+                backward(plan, weights, values, marks, work, grads, &mut sums, group.is_none());
+            }
+            if let Some(group) = &group {
+                let values = &saved.values[first * kept_len..][..images.len() * kept_len];
+                group.add_gradients(plan, images.len(), values, grads, &mut sums);
+            }
         }
         sums
     });
@@ -67,7 +79,8 @@ fn mask(grads: &mut [f32], values: &[f32]) {
 }
 
 /// All steps for one image, from the last; the gradient of the image itself is not needed. `grads` is laid out as
-/// [`Plan::lean`], with zeros in the borders.
+/// [`Plan::lean`], with zeros in the borders. Weights of a convolution before a ReLU get no gradients if a [`Group`] sees to
+/// them.
 fn backward(
     plan: &Plan,
     weights: &[Weights],
@@ -76,6 +89,7 @@ fn backward(
     Workspace { wides, points }: &mut Workspace,
     grads: &mut [f32],
     sums: &mut [Vec<Lanes>],
+    alone: bool,
 ) {
     let (kept, lean, layers) = (&plan.kept, &plan.lean, &plan.layers);
     for (number, step) in plan.steps.iter().enumerate().rev() {
@@ -83,7 +97,9 @@ fn backward(
             Step::Relu { layer, input, output } => {
                 mask(lean.write(output, grads), kept.read(output, values));
                 let (to, grad) = lean.two(input, output, grads);
-                layers[layer].add_gradients(kept.read(input, values), grad, points, &mut sums[layer]);
+                if alone {
+                    layers[layer].add_gradients(kept.read(input, values), grad, points, &mut sums[layer]);
+                }
                 if number > 0 {
                     layers[layer].backward(grad, &weights[layer], points, to);
                 }

@@ -13,12 +13,12 @@ use crate::nn::window_places;
 pub(super) struct Layer {
     shape: ConvShape,
     /// Whether it is made with fewer products: see [`winograd`].
-    has_points: bool,
+    pub(super) has_points: bool,
     pub(super) input: Grid,
     pub(super) output: Grid,
     /// Where the window of each output pixel begins.
-    starts: Vec<usize>,
-    outputs: Vec<usize>,
+    pub(super) starts: Vec<usize>,
+    pub(super) outputs: Vec<usize>,
     /// For a gradient that is a convolution: where the window of each input pixel begins in the output.
     back: Vec<usize>,
     inputs: Vec<usize>,
@@ -128,13 +128,26 @@ impl Layer {
 
     /// Adds the gradients of weights and biases, for an input and the gradient of the output.
     pub(super) fn add_gradients(&self, x: &[f32], grad: &[f32], buffers: &mut PointBuffers, sums: &mut [Lanes]) {
-        let (weights, bias) = sums.split_at_mut(self.weight_sums());
-        if self.has_points {
-            winograd::add_gradients(x, grad, (self.input, self.output), buffers, weights);
-        } else {
-            outer(x, &self.starts, self.window(), grad, &self.outputs, weights);
+        if !self.has_points {
+            return self.add_gradients_at(x, &self.starts, grad, &self.outputs, sums);
         }
+        let (weights, bias) = sums.split_at_mut(self.weight_sums());
+        winograd::add_gradients(x, grad, (self.input, self.output), buffers, weights);
         column_sums(grad, &self.outputs, bias);
+    }
+
+    /// As [`Self::add_gradients`], for windows and outputs at these places.
+    pub(super) fn add_gradients_at(
+        &self,
+        x: &[f32],
+        starts: &[usize],
+        grad: &[f32],
+        outputs: &[usize],
+        sums: &mut [Lanes],
+    ) {
+        let (weights, bias) = sums.split_at_mut(self.weight_sums());
+        outer(x, starts, self.window(), grad, outputs, weights);
+        column_sums(grad, outputs, bias);
     }
 
     /// The gradients of the parameters, in their order, from sums over all images.
@@ -198,8 +211,9 @@ impl Layer {
             pixel,
             &weights.backward,
             |_| [0.0; LANES],
-            // Windows overlap: the order in which they are added must be the same on every machine.
-            false,
+            // Windows overlap: the order in which they are added must be the same on every machine. It is, if the two blocks
+            // are other channels.
+            self.shape.inputs.is_multiple_of(2 * LANES),
             |pixel, tile, sums| {
                 let first = tile % tiles * LANES;
                 let at = self.starts[pixel] + tile / tiles * step + first;

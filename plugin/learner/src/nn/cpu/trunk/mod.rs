@@ -10,6 +10,7 @@
 mod backward;
 mod forward;
 mod grid;
+mod group;
 mod kept_memory;
 mod layer;
 mod op;

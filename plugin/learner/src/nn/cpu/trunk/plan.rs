@@ -60,6 +60,11 @@ impl Layout {
         self.slots.push(self.slots[slot]);
     }
 
+    /// Where a slot begins.
+    pub(super) fn start(&self, slot: usize) -> usize {
+        self.slots[slot].0
+    }
+
     /// A slot's numbers.
     pub(super) fn read<'a>(&self, slot: usize, values: &'a [f32]) -> &'a [f32] {
         let (start, len) = self.slots[slot];
