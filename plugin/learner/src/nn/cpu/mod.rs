@@ -5,6 +5,7 @@ pub(in crate::nn) mod dense;
 pub(in crate::nn) mod fast_math;
 mod gru_scan;
 mod host_numbers;
+mod kept_memory;
 pub(in crate::nn) mod kernels;
 mod outer;
 mod relu;

@@ -5,6 +5,7 @@ use super::packed::Packed;
 use super::share::share;
 use crate::nn::Activation;
 use crate::nn::cpu::fast_math::vectorized;
+use crate::nn::cpu::kept_memory::KeptMemory;
 use crate::nn::cpu::outer::{column_sums, outer};
 use crate::nn::cpu::relu::relu_backward;
 use crate::nn::cpu::tile::{LANES, Lanes, WIDE_ROWS, Window};
@@ -17,14 +18,14 @@ pub(in crate::nn::cpu) struct SumGrads {
     n: usize,
     columns: usize,
     stride: usize,
-    values: Vec<f32>,
+    values: KeptMemory,
 }
 
 impl SumGrads {
     /// From the gradient of the output `y`, which the activation gave.
     pub(in crate::nn::cpu) fn new(grad: &[f32], y: &[f32], columns: usize, activation: Option<Activation>) -> Self {
         let (n, stride) = (grad.len() / columns, columns.next_multiple_of(LANES));
-        let mut values = vec![0.0; n * stride];
+        let mut values = KeptMemory::take(n * stride);
         // Each is little work.
         share(&mut values, ROWS * stride, grad.len(), |piece, values| {
             let first = piece * ROWS * columns;
@@ -32,6 +33,7 @@ impl SumGrads {
             let rows = values.chunks_exact_mut(stride).zip(given);
             vectorized(|| {
                 for (to, (grad, y)) in rows {
+                    to[columns..].fill(0.0);
                     let numbers = to.iter_mut().zip(grad.iter().zip(y));
                     match activation {
                         None => numbers.for_each(|(to, (&grad, _))| *to = grad),
@@ -55,12 +57,13 @@ impl SumGrads {
     /// The gradients of weights `[inputs, columns]` and biases, for the input `[n, inputs]`.
     pub(in crate::nn::cpu) fn params(&self, x: &[f32], inputs: usize) -> (Vec<f32>, Vec<f32>) {
         let blocks = self.stride / LANES;
-        let mut sums = vec![[0.0; LANES]; blocks * inputs];
+        let mut memory = KeptMemory::zeros(blocks * inputs * LANES);
+        let sums: &mut [Lanes] = memory.as_chunks_mut().0;
         let mut biases = vec![[0.0; LANES]; blocks];
         let places: Vec<usize> = (0..self.n).map(|row| row * self.stride).collect();
         let products = self.n * inputs * self.columns;
         column_sums(&self.values, &places, &mut biases);
-        share(&mut sums, 2 * inputs, products, |pair, sums| {
+        share(sums, 2 * inputs, products, |pair, sums| {
             self.add_products(x, inputs, &self.values[2 * pair * LANES..], &places, sums);
         });
         let mut weights = vec![0.0; inputs * self.columns];

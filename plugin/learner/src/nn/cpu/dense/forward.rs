@@ -20,10 +20,24 @@ pub(in crate::nn::cpu) fn product(
     bias: &[f32],
     activation: Option<Activation>,
 ) -> Vec<f32> {
-    let Packed { rows, columns, ref lanes } = *weights;
-    let mut out = vec![0.0; n * columns];
+    let mut out = vec![0.0; n * weights.columns];
+    product_into(&mut out, x, (n, stride), weights, bias, activation);
+    out
+}
+
+/// [`product`] in memory that is there already; nothing of what it held is left.
+pub(in crate::nn::cpu) fn product_into(
+    out: &mut [f32],
+    x: &[f32],
+    (n, stride): (usize, usize),
+    weights: &Packed,
+    bias: &[f32],
+    activation: Option<Activation>,
+) {
+    let Packed { rows, columns, .. } = *weights;
+    let lanes = weights.lanes();
     let window = Window { count: 1, step: 0, len: rows };
-    share(&mut out, ROWS * columns, n * rows * columns, |piece, out| {
+    share(out, ROWS * columns, n * rows * columns, |piece, out| {
         let first = piece * ROWS;
         let starts: Vec<usize> = (first..first + out.len() / columns).map(|row| row * stride).collect();
         correlate(
@@ -44,7 +58,6 @@ pub(in crate::nn::cpu) fn product(
             Some(Activation::Tanh) => vectorized(|| out.iter_mut().for_each(|y| *y = tanh(*y))),
         }
     });
-    out
 }
 
 /// The numbers of a block of 16; zeros beyond the last one.

@@ -16,6 +16,6 @@ mod share;
 mod tests;
 
 pub(super) use backward::SumGrads;
-pub(super) use forward::product;
+pub(super) use forward::product_into;
 pub(in crate::nn) use op::dense;
 pub(super) use packed::Packed;

@@ -2,8 +2,9 @@
 
 use super::scan::of_direction;
 use super::{Direction, Scan, ScanInput, Sizes};
-use crate::nn::cpu::dense::{Packed, SumGrads, product};
+use crate::nn::cpu::dense::{Packed, SumGrads, product_into};
 use crate::nn::cpu::fast_math::vectorized;
+use crate::nn::cpu::kept_memory::KeptMemory;
 use rayon::prelude::*;
 
 /// Gradients of all that enters [`super::forward`], in its shapes.
@@ -68,16 +69,17 @@ fn of_one_direction(
     let Sizes { batch, inputs, hidden, .. } = sizes;
     let (rows, gates) = (sizes.rows(), sizes.gates());
     let turned = Packed::transposed(weight_hh, gates, hidden);
-    let mut sums = SumGradsOfRows { input: vec![0.0; rows * gates], recurrent: vec![0.0; rows * gates] };
+    let mut sums = SumGradsOfRows { input: KeptMemory::take(rows * gates), recurrent: KeptMemory::take(rows * gates) };
     // Of the state between two steps, until the first step is reached.
     let mut state = vec![0.0; sizes.block()];
+    let mut h = KeptMemory::take(sizes.block());
     let order: Vec<usize> = sizes.order(run.backwards).collect();
     for (k, &t) in order.iter().enumerate().rev() {
         vectorized(|| step_backward(&mut sums, &mut state, t, output, direction, run, sizes));
         if k > 0 || wanted.initial {
             let c = &sums.recurrent[t * batch * gates..(t + 1) * batch * gates];
-            let h = product(c, (batch, gates), &turned, &[], None);
-            vectorized(|| state.iter_mut().zip(&h).for_each(|(grad, x)| *grad += x));
+            product_into(&mut h, c, (batch, gates), &turned, &[], None);
+            vectorized(|| state.iter_mut().zip(h.iter()).for_each(|(grad, x)| *grad += x));
         }
     }
     let before = if run.backwards { sizes.block() } else { 0 };
@@ -92,9 +94,9 @@ fn of_one_direction(
 /// The gradients of a direction's sums, `[T * B, 3 * hidden]` each.
 struct SumGradsOfRows {
     /// Of a.
-    input: Vec<f32>,
+    input: KeptMemory,
     /// Of c.
-    recurrent: Vec<f32>,
+    recurrent: KeptMemory,
 }
 
 /// One step for all rows of the batch: from the gradient of the state after it to those of a, c and, but for the part

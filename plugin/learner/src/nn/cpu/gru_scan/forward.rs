@@ -2,8 +2,9 @@
 
 use super::scan::of_direction;
 use super::{Direction, Scan, ScanInput, Sizes};
-use crate::nn::cpu::dense::{Packed, product};
+use crate::nn::cpu::dense::{Packed, product_into};
 use crate::nn::cpu::fast_math::{sigmoid, tanh, vectorized};
+use crate::nn::cpu::kept_memory::KeptMemory;
 use rayon::prelude::*;
 
 /// The outputs `[T * B, directions * hidden]`, with the biases of input and state, `[directions, 3 * hidden]` each, and the
@@ -17,7 +18,8 @@ pub(in crate::nn) fn forward(
     let runs = (0..sizes.directions).into_par_iter().map(|d| {
         let part = |all| of_direction(all, d, sizes.directions);
         let weights = Packed::new(part(input.weight_ih), sizes.inputs, sizes.gates());
-        let sums = product(input.x, (sizes.rows(), sizes.inputs), &weights, part(bias_ih), None);
+        let mut sums = KeptMemory::take(sizes.rows() * sizes.gates());
+        product_into(&mut sums, input.x, (sizes.rows(), sizes.inputs), &weights, part(bias_ih), None);
         let weights = Packed::new(part(input.weight_hh), sizes.hidden, sizes.gates());
         scan(&sums, &weights, part(bias_hh), part(initial), d == 1, sizes)
     });
@@ -28,15 +30,16 @@ pub(in crate::nn) fn forward(
 /// One direction, for its sums x W_ih + b_ih.
 fn scan(sums: &[f32], weights: &Packed, bias: &[f32], initial: &[f32], backwards: bool, sizes: Sizes) -> Direction {
     let (block, gates) = (sizes.block(), sizes.batch * sizes.gates());
-    let zeros = || vec![0.0; sizes.steps * block];
-    let states = vec![0.0; (sizes.steps + 1) * block];
-    let mut run = Direction { backwards, r: zeros(), z: zeros(), n: zeros(), c_n: zeros(), states };
+    let numbers = || KeptMemory::take(sizes.steps * block);
+    let states = KeptMemory::take((sizes.steps + 1) * block);
+    let mut run = Direction { backwards, r: numbers(), z: numbers(), n: numbers(), c_n: numbers(), states };
+    let mut recurrent = KeptMemory::take(gates);
     let first = if backwards { sizes.steps * block } else { 0 };
     run.states[first..first + block].copy_from_slice(initial);
     for t in sizes.order(backwards) {
         let (before, _) = run.around(t);
         let h = &run.states[before * block..(before + 1) * block];
-        let recurrent = product(h, (sizes.batch, sizes.hidden), weights, bias, None);
+        product_into(&mut recurrent, h, (sizes.batch, sizes.hidden), weights, bias, None);
         let sums = &sums[t * gates..(t + 1) * gates];
         vectorized(|| step(&mut run, t, sums, &recurrent, sizes));
     }

@@ -1,5 +1,7 @@
 //! Sizes of a recurrent layer's sequence, what enters it, and what its forward pass leaves for the backward pass.
 
+use crate::nn::cpu::kept_memory::KeptMemory;
+
 /// Sizes of a layer's sequence.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nn) struct Sizes {
@@ -29,12 +31,12 @@ pub(in crate::nn) struct Scan {
 #[derive(Debug)]
 pub(super) struct Direction {
     pub(super) backwards: bool,
-    pub(super) r: Vec<f32>,
-    pub(super) z: Vec<f32>,
-    pub(super) n: Vec<f32>,
-    pub(super) c_n: Vec<f32>,
+    pub(super) r: KeptMemory,
+    pub(super) z: KeptMemory,
+    pub(super) n: KeptMemory,
+    pub(super) c_n: KeptMemory,
     /// `[(T + 1) * B, hidden]`: the state before the first step and after each, in order of time.
-    pub(super) states: Vec<f32>,
+    pub(super) states: KeptMemory,
 }
 
 impl Sizes {

@@ -1,11 +1,11 @@
 //! From images to features.
 
-use super::kept_memory::KeptMemory;
 use super::layer::Weights;
 use super::plan::{Layout, Plan, Step};
 use super::pool;
 use super::workspace::Workspace;
 use crate::nn::cpu::fast_math::vectorized;
+use crate::nn::cpu::kept_memory::KeptMemory;
 use crate::nn::cpu::relu::relu;
 use crate::nn::cpu::store::{Add, Write, WriteRelu};
 use rayon::prelude::*;

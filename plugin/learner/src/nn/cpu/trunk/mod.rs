@@ -11,7 +11,6 @@ mod backward;
 mod forward;
 mod grid;
 mod group;
-mod kept_memory;
 mod layer;
 mod op;
 mod plan;
