@@ -15,6 +15,7 @@ use playbot_lab::{
     train::Trainer,
     worlds::build_observing_world,
 };
+use playbot_learner::waited;
 use serde_json::{Value, json};
 
 use super::{
@@ -245,7 +246,8 @@ fn peak_rss_mib() -> f64 {
     (kib.unwrap_or(0.0) / 1024.0).round()
 }
 
-/// Seconds of processor time that this process has taken so far, all threads together; 0 where the system does not say.
+/// Seconds of processor time that this process has used so far, all threads together; 0 where the system does not say.
+/// Workers that wait awake use it for nothing.
 fn busy_s() -> f64 {
     // A hundredth of a second on every Linux.
     const TICKS_PER_S: f64 = 100.0;
@@ -253,7 +255,7 @@ fn busy_s() -> f64 {
     // The name of the program, in brackets, may hold anything.
     let numbers = stat.rsplit(')').next().unwrap_or_default();
     let ticks: f64 = numbers.split_whitespace().skip(11).take(2).filter_map(|word| word.parse::<f64>().ok()).sum();
-    ticks / TICKS_PER_S
+    (ticks / TICKS_PER_S - waited().as_secs_f64()).max(0.0)
 }
 
 fn idle_share(busy_s: f64, seconds: f64, threads: usize) -> Option<f64> {

@@ -52,7 +52,8 @@ pub mod skill;
 mod space;
 mod spec;
 
-pub use among_workers::among_workers;
+pub(crate) use among_workers::are_awake;
+pub use among_workers::{among_awake_workers, among_workers, waited};
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
 pub use file::{write_atomically, write_atomically_with};

@@ -3,7 +3,7 @@
 use burn::tensor::{Tensor, TensorData};
 use criterion::Criterion;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind, among_workers,
+    ActionSpace, Actions, Dataset, DemoEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind, among_awake_workers,
     nn::{ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, tracked},
     policy::{Actor, Critic, NetShape},
     ppo::{Minibatch, PpoBatch, PpoNets, gradient_step},
@@ -39,7 +39,7 @@ pub fn mlp(criterion: &mut Criterion) {
         };
         criterion.bench_function(&format!("step/mlp-37-200-200-8/{batch}"), |bencher| {
             // As updates do.
-            among_workers(|| bencher.iter(&mut step));
+            among_awake_workers(|| bencher.iter(&mut step));
         });
     }
 }
@@ -70,7 +70,7 @@ pub fn ppo(criterion: &mut Criterion) {
     };
     let (config, mut adam) = (PpoConfig::default(), Adam::new(AdamConfig::default()));
     criterion.bench_function("step/ppo-563-200-200-15/2048", |bencher| {
-        among_workers(|| {
+        among_awake_workers(|| {
             bencher.iter(|| gradient_step(&mut nets, &mut adam, &batch, &config, None, 3e-4).expect("finite"));
         });
     });
@@ -94,7 +94,7 @@ pub fn images(criterion: &mut Criterion) {
                     let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");
                     adam.step(&mut net, "", &grads, 3e-4, 1.0).expect("fits");
                 };
-                among_workers(|| bencher.iter(&mut step));
+                among_awake_workers(|| bencher.iter(&mut step));
             });
         }
     }

@@ -3,7 +3,7 @@
 use super::grads::NamedGrads;
 use super::moments::{FlatMoments, Moments};
 use super::params::{ParamVisitor, Parameters};
-use crate::LearnError;
+use crate::{LearnError, are_awake};
 use burn::tensor::{Tensor, TensorData};
 use macerator::Simd;
 use rayon::prelude::*;
@@ -16,6 +16,8 @@ use std::iter::Peekable;
 const CHUNK: usize = 1 << 14;
 /// Numbers up to which a second thread costs more than it saves.
 const FEW: usize = 1 << 16;
+/// The same where other threads are awake.
+const FEW_AWAKE: usize = 1 << 15;
 /// Numbers that are updated side by side.
 const LANES: usize = 16;
 
@@ -159,7 +161,8 @@ impl<I: Iterator> Step<'_, I> {
         }
         let moments = self.moments.get_mut(name).expect("inserted above if it was missing");
         let formula = &self.formula;
-        let is_finite = if weights.len() <= FEW {
+        let few = if are_awake() { FEW_AWAKE } else { FEW };
+        let is_finite = if weights.len() <= few {
             formula.apply(weights, grad, &mut moments.m, &mut moments.v)
         } else {
             let rows = weights.par_chunks_mut(CHUNK).zip(grad.par_chunks(CHUNK));

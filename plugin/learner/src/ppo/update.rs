@@ -10,7 +10,7 @@ use crate::device::{guarded, is_host};
 use crate::policy::StateBatch;
 use crate::rng::ChaCha8Rng;
 use crate::score::TeacherOutput;
-use crate::{LearnError, Observations, Rollout, among_workers};
+use crate::{LearnError, Observations, Rollout, among_awake_workers};
 use std::cell::Cell;
 
 impl PpoLearner {
@@ -22,7 +22,7 @@ impl PpoLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then, as after [`LearnError::DeviceFailed`].
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
-        guarded(&self.base.device.plain(), || among_workers(|| self.update_here(rollout)))
+        guarded(&self.base.device.plain(), || among_awake_workers(|| self.update_here(rollout)))
     }
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {

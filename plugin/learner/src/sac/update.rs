@@ -7,7 +7,7 @@ use super::{EntropyCoef, SacBatch, SacLearner, SacMetrics, actor_step, critic_st
 use crate::device::guarded;
 use crate::nn::matrix;
 use crate::rng::{ChaCha8Rng, normal};
-use crate::{ActionSpace, LearnError, Rollout, among_workers};
+use crate::{ActionSpace, LearnError, Rollout, among_awake_workers};
 use burn::tensor::Tensor;
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ impl SacLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
-        guarded(&self.base.device.plain(), || among_workers(|| self.update_here(rollout)))
+        guarded(&self.base.device.plain(), || among_awake_workers(|| self.update_here(rollout)))
     }
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {

@@ -7,7 +7,7 @@ use crate::nn::{
 };
 use crate::norm::ObsStats;
 use crate::rng::{Streams, normal};
-use crate::{Actions, DeviceKind, LearnError, Observations, among_workers};
+use crate::{Actions, DeviceKind, LearnError, Observations, among_awake_workers};
 use burn::tensor::Tensor;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -150,7 +150,7 @@ impl SkillTrainer {
     pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
         let end = (self.next + self.config.batch).min(self.windows.len());
         let windows = self.windows[self.next..end].to_vec();
-        let metrics = guarded(&self.device.plain(), || among_workers(|| self.step(&windows)))?;
+        let metrics = guarded(&self.device.plain(), || among_awake_workers(|| self.step(&windows)))?;
         self.sums.add(&metrics);
         self.next = end;
         if end == self.windows.len() {

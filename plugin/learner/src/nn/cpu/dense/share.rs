@@ -1,13 +1,16 @@
 //! How work is shared among threads.
 
+use crate::are_awake;
 use rayon::prelude::*;
 
 /// Products below which a second thread costs more than it saves: waking one takes as long as a million of them.
 const FEW: usize = 1 << 22;
+/// The same where other threads are awake.
+const FEW_AWAKE: usize = 1 << 18;
 
 /// Calls `work` with each piece of `len` items and its number, on all threads if there are many products in all.
 pub(super) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work: impl Fn(usize, &mut [T]) + Sync) {
-    if products < FEW {
+    if products < if are_awake() { FEW_AWAKE } else { FEW } {
         items.chunks_mut(len).enumerate().for_each(|(piece, items)| work(piece, items));
     } else {
         items.par_chunks_mut(len).enumerate().for_each(|(piece, items)| work(piece, items));
