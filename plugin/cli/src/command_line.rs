@@ -4,6 +4,7 @@ use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
 use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
 use playbot_lab::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
+use playbot_learner::UnknownDevice;
 
 use crate::{
     bench, bugs, config, demo, doctor,
@@ -89,9 +90,15 @@ where
     match Cli::try_parse_from(args) {
         Ok(_) => Ok(()),
         // Asking for help is no mistake.
-        Err(error) if !error.use_stderr() || is_about_missing_files(&error) => Ok(()),
+        Err(error) if !error.use_stderr() || is_about_missing_files(&error) || is_about_device(&error) => Ok(()),
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// Whether only another build has the device.
+fn is_about_device(error: &clap::Error) -> bool {
+    let device = std::error::Error::source(error).and_then(|source| source.downcast_ref::<UnknownDevice>());
+    matches!(device, Some(UnknownDevice::NotBuilt { .. }))
 }
 
 fn is_about_missing_files(error: &clap::Error) -> bool {

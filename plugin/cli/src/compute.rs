@@ -22,7 +22,7 @@ impl Default for Threads {
 /// What networks are computed on.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct Device {
-    /// Where to compute: flex or ndarray.
+    /// Where to compute: flex or ndarray on the CPU; wgpu or cuda on a graphics card, in programs built with these features.
     #[arg(long, default_value_t)]
     pub device: DeviceKind,
 }

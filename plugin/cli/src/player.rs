@@ -24,7 +24,7 @@ use super::{compute::Device, error::CliError, methods, open};
 
 /// A policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
-#[command(mut_arg("device", |device| device.help("Where the policy computes: flex or ndarray")))]
+#[command(mut_arg("device", |device| device.help("Where the policy computes: flex or ndarray, or wgpu or cuda if built in")))]
 pub struct PlayerArgs {
     /// Policy file, as written by `playbot policy export`.
     #[arg(long, value_name = "FILE", group = "player")]

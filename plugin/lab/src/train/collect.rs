@@ -1,9 +1,10 @@
 //! One World that plays with the current policy and keeps what the learner needs.
 
 use bevy::prelude::*;
-use playbot_learner::{Actions, LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout, RolloutStep};
+use playbot_learner::{LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout};
 
 use super::{
+    agents_tick::AgentsTick,
     arena_state::ActionLog,
     cut_episodes::{CutEpisodes, cut_episodes, push_state},
 };
@@ -193,48 +194,6 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
         rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
     }
     Ok(())
-}
-
-/// One tick of all agents, before it becomes part of the rollout.
-struct AgentsTick {
-    obs: Observations,
-    z: Vec<f32>,
-    actions: Actions,
-    log_probs: Vec<f32>,
-    values: Vec<f32>,
-    rewards: Vec<f32>,
-    terminated: Vec<bool>,
-    truncated: Vec<bool>,
-}
-
-impl AgentsTick {
-    fn new(policy: &Policy, kind: &ObsKind, agents: usize) -> Self {
-        let empty = Vec::new;
-        Self {
-            obs: Observations::with_capacity(kind, agents),
-            z: empty(),
-            actions: Actions::empty(&policy.action_space()),
-            log_probs: empty(),
-            values: empty(),
-            rewards: empty(),
-            terminated: Vec::new(),
-            truncated: Vec::new(),
-        }
-    }
-
-    fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
-        RolloutStep {
-            obs: self.obs.as_slice(),
-            z: &self.z,
-            actions: &self.actions,
-            log_probs: &self.log_probs,
-            values: &self.values,
-            rewards: &self.rewards,
-            terminated: &self.terminated,
-            truncated: &self.truncated,
-            final_values,
-        }
-    }
 }
 
 /// Appends one row per agent to the rollout.

@@ -1,5 +1,6 @@
 //! Headless training over many levels: collecting with the current policy, learning from what was collected.
 
+mod agents_tick;
 mod algorithm;
 pub mod arena_state;
 pub mod checkpoint;

@@ -147,6 +147,20 @@ impl ImageNet {
         })
     }
 
+    /// Images of 64×64 pixels that are learned from at a time: what is kept of them until their gradient is known stays below
+    /// a hundred megabytes.
+    pub(crate) fn images_at_a_time(&self) -> usize {
+        match self {
+            // 0.7 MB per image with 80 channels in all.
+            Self::Impala(net) => {
+                let channels: usize = net.stages.iter().map(|stage| stage.conv.weight.dims()[0]).sum();
+                (128 * 80 / channels.max(1)).clamp(16, 1024)
+            }
+            // 0.1 MB per image.
+            Self::Nature(_) => 1024,
+        }
+    }
+
     fn fc(&self) -> &Linear {
         match self {
             Self::Impala(net) => &net.fc,

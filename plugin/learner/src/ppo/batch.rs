@@ -3,19 +3,16 @@
 use super::PpoConfig;
 use super::objective::{PpoBatch, normalize_advantages};
 use super::step::Minibatch;
-use crate::nn::{ActionBatch, vector};
+use crate::Rollout;
+use crate::nn::{ActionBatch, ImageNet, vector};
 use crate::norm::ObsStats;
 use crate::policy::InputBuilder;
 use crate::rng::{ChaCha8Rng, shuffle};
 use crate::score::{PenaltyForm, ScoreConfig, TeacherOutput};
-use crate::{ObsKind, Rollout};
 use burn::tensor::Device;
 use std::cell::Cell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// Images of a minibatch that are learned from at a time.
-const IMAGES_AT_A_TIME: usize = 128;
 
 /// A rollout with everything that an update reads beside it, one entry per row.
 #[derive(Debug)]
@@ -55,6 +52,7 @@ impl Batch<'_> {
     pub(super) fn parts<'b>(
         &'b self,
         rows: &'b [usize],
+        cnn: Option<&ImageNet>,
         score: Option<&ScoreConfig>,
         device: &'b Device,
     ) -> impl Iterator<Item = (Minibatch, f64)> + 'b {
@@ -64,8 +62,7 @@ impl Batch<'_> {
         }
         // The other forms of the penalty are no means over rows.
         let is_mean = score.is_none_or(|score| score.penalty == PenaltyForm::Mean);
-        let is_image = matches!(self.rollout.obs_kind, ObsKind::Image(_));
-        let most = if is_mean && is_image { IMAGES_AT_A_TIME } else { rows.len() };
+        let most = cnn.filter(|_| is_mean).map_or(rows.len(), ImageNet::images_at_a_time);
         (0..rows.len()).step_by(most.max(1)).map(move |first| {
             let start = Instant::now();
             let part = first..(first + most).min(rows.len());

@@ -65,7 +65,7 @@ impl PpoLearner {
         let mut sum = StepMetrics::default();
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
             let score = self.base.score_config();
-            let parts = batch.parts(&rows, score, &device);
+            let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), score, &device);
             sum.add(&step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, score, lr)?);
         }
         Ok(sum)
