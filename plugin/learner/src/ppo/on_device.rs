@@ -19,6 +19,7 @@ pub(super) struct SentRollout<'a> {
     device: Device,
 }
 
+#[expect(clippy::large_enum_variant, reason = "there is one per update")]
 enum States {
     Joined(Tensor<2>),
     Images { z: Option<Tensor<2>>, pixels: PackedPixels },
