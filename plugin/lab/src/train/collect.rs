@@ -111,12 +111,11 @@ impl Collector {
         latent: usize,
         steps: usize,
     ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
-        let kind = self.obs_kind();
+        let kind = self.world.resource::<Collecting>().kind;
         let mut obs = Observations::empty(&kind);
-        let mut columns = obs.columns(&kind, steps, &[self.agents.len()]);
-        let collected = columns.pop().map(|mut columns| self.collect_into(&mut columns, policy, latent, steps));
-        drop(columns);
-        let (rollout, ended) = collected.unwrap_or_else(|| Err(Fault("there are no agents".to_owned())))?;
+        // One share has one column.
+        let mut columns = obs.columns(&kind, steps, &[self.agents.len()]).remove(0);
+        let (rollout, ended) = self.collect_into(&mut columns, policy, latent, steps)?;
         Ok((Rollout { obs, ..rollout }, ended))
     }
 
@@ -147,11 +146,6 @@ impl Collector {
         bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
         world.resource_mut::<Faults>().take()?;
         Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
-    }
-
-    /// What an observation of its agents is.
-    pub fn obs_kind(&self) -> ObsKind {
-        self.world.resource::<Collecting>().kind
     }
 
     /// The World, for saving and restoring its arenas.

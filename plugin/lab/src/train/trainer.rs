@@ -7,7 +7,9 @@ use std::{
 
 use bevy::prelude::World;
 use bevy_playbot::{episode::EpisodeEnded, fault::Fault, skill_prior::SkillPrior};
-use playbot_learner::{ActionSpace, DeviceKind, LearnError, Observations, Policy, Rollout, SkillModel, SkillSource};
+use playbot_learner::{
+    ActionSpace, DeviceKind, LearnError, ObsKind, Observations, Policy, Rollout, SkillModel, SkillSource,
+};
 
 use super::{
     collect::Collector,
@@ -30,8 +32,9 @@ pub struct Trainer {
     pub(crate) learner: TrainedLearner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
+    obs_kind: ObsKind,
     /// Memory of the last rollout's observations, for the next.
-    obs: Option<Observations>,
+    obs: Observations,
 }
 
 impl Trainer {
@@ -68,7 +71,9 @@ impl Trainer {
             .map(|first| Collector::new(game, levels, &observation_config, seed, first, share, prior.clone()))
             .collect();
         let (experiment, collectors) = (experiment.clone(), collectors?);
-        Ok(Self { experiment, threads, learner, collectors, progress: Progress::default(), obs: None })
+        let obs_kind = observation_config.obs_kind(game);
+        let (progress, obs) = (Progress::default(), Observations::empty(&obs_kind));
+        Ok(Self { experiment, threads, learner, collectors, progress, obs_kind, obs })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -84,7 +89,7 @@ impl Trainer {
         let collect_s = start.elapsed().as_secs_f64();
         let initial_kl = self.initial_kl(&rollout)?;
         let learner = self.learner.learn(&rollout)?;
-        self.obs = Some(rollout.obs);
+        self.obs = rollout.obs;
         self.progress.note(&finished);
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();
@@ -102,12 +107,9 @@ impl Trainer {
         latent: usize,
         steps: usize,
     ) -> Result<(Rollout, Vec<EpisodeEnded>), TrainError> {
-        let Some(kind) = self.collectors.first().map(Collector::obs_kind) else {
-            return Ok((Rollout::join(Vec::new())?, Vec::new()));
-        };
-        let mut obs = self.obs.take().unwrap_or_else(|| Observations::empty(&kind));
+        let mut obs = std::mem::replace(&mut self.obs, Observations::empty(&self.obs_kind));
         let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
-        let columns = obs.columns(&kind, steps, &shares);
+        let columns = obs.columns(&self.obs_kind, steps, &shares);
         let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
         let collected = on_threads(&mut work, self.threads, |(collector, columns)| {
             collector.collect_into(columns, policy, latent, steps)

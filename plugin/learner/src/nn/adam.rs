@@ -42,7 +42,8 @@ impl Default for AdamConfig {
 
 /// Adam with one step counter for all parameters.
 ///
-/// The moments live on the host, by parameter name, so that a checkpoint holds all of the state.
+/// The moments live on the host, by parameter name, so that a checkpoint holds all of the state; those of a network that is
+/// trained on a graphics card live there, and are read when a checkpoint is written.
 #[derive(Clone, Debug)]
 pub struct Adam {
     pub(crate) config: AdamConfig,

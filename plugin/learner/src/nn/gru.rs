@@ -1,8 +1,9 @@
 //! A stack of gated recurrent layers, in one or both directions.
 
-use super::cpu::kernels::{self, GruInput, has_kernels};
+use super::cpu::kernels::{self, GruInput};
 use super::params::{ParamVisitor, Parameters, path};
 use super::source::{Init, ParamSource, RandomInit};
+use crate::device::is_host;
 use burn::tensor::{Device, Tensor, activation::sigmoid};
 use rand::Rng;
 
@@ -110,7 +111,7 @@ impl GruLayer {
         let batch = x.dims()[0] / steps.max(1);
         let device = x.device();
         let initial = initial.unwrap_or_else(|| Tensor::zeros([directions, batch, hidden], &device));
-        let scan = if has_kernels(&device) { kernels::gru } else { gru_steps };
+        let scan = if is_host(&device) { kernels::gru } else { gru_steps };
         scan(GruInput {
             x,
             weight_ih: self.weight_ih.clone(),

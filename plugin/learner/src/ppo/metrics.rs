@@ -91,33 +91,18 @@ pub struct StepMetrics {
 }
 
 impl StepMetrics {
-    /// Each number times `share`.
-    pub(super) fn scaled(self, share: f64) -> Self {
-        Self {
-            policy_loss: self.policy_loss * share,
-            value_loss: self.value_loss * share,
-            entropy: self.entropy * share,
-            total_loss: self.total_loss * share,
-            approx_kl: self.approx_kl * share,
-            clip_fraction: self.clip_fraction * share,
-            decoder_kl: self.decoder_kl * share,
-            kl_penalty: self.kl_penalty * share,
-            confidence: self.confidence * share,
-            grad_norm: self.grad_norm * share,
-        }
-    }
-
-    pub(super) fn add(&mut self, other: &Self) {
-        self.policy_loss += other.policy_loss;
-        self.value_loss += other.value_loss;
-        self.entropy += other.entropy;
-        self.total_loss += other.total_loss;
-        self.approx_kl += other.approx_kl;
-        self.clip_fraction += other.clip_fraction;
-        self.decoder_kl += other.decoder_kl;
-        self.kl_penalty += other.kl_penalty;
-        self.confidence += other.confidence;
-        self.grad_norm += other.grad_norm;
+    /// Adds each number times `share`.
+    pub(super) fn add(&mut self, other: &Self, share: f64) {
+        self.policy_loss += other.policy_loss * share;
+        self.value_loss += other.value_loss * share;
+        self.entropy += other.entropy * share;
+        self.total_loss += other.total_loss * share;
+        self.approx_kl += other.approx_kl * share;
+        self.clip_fraction += other.clip_fraction * share;
+        self.decoder_kl += other.decoder_kl * share;
+        self.kl_penalty += other.kl_penalty * share;
+        self.confidence += other.confidence * share;
+        self.grad_norm += other.grad_norm * share;
     }
 }
 

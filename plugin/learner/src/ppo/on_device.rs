@@ -168,7 +168,7 @@ impl Reports {
             if !number(8).is_finite() {
                 return Err(LearnError::NotFinite { tensor: "gradient".to_owned(), steps: Some(steps) });
             }
-            sum.add(&StepMetrics {
+            let step = StepMetrics {
                 policy_loss: number(0),
                 value_loss: number(1),
                 entropy: number(2),
@@ -179,7 +179,8 @@ impl Reports {
                 clip_fraction: number(7),
                 grad_norm: number(8),
                 confidence,
-            });
+            };
+            sum.add(&step, 1.0);
         }
         Ok(sum)
     }

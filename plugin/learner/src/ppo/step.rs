@@ -106,7 +106,7 @@ pub(super) fn step_in_parts(
     let steps = adam.steps();
     for (part, share) in parts {
         let losses = Losses::of(nets, &part, config, score)?;
-        metrics.add(&losses.metrics(&part, config, steps)?.scaled(share));
+        metrics.add(&losses.metrics(&part, config, steps)?, share);
         // A whole minibatch is not multiplied by 1.
         let total = if share < 1.0 { losses.total * share } else { losses.total };
         sum.add(NamedGrads::take(nets, "", total.backward())?);

@@ -66,7 +66,8 @@ impl PpoLearner {
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
             let score = self.base.score_config();
             let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), score, &device);
-            sum.add(&step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, score, lr)?);
+            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, score, lr)?;
+            sum.add(&step, 1.0);
         }
         Ok(sum)
     }

@@ -1,7 +1,7 @@
 //! Rollouts of several Worlds as one.
 
 use super::Rollout;
-use crate::{ActionSpace, LearnError, Observations};
+use crate::{ActionSpace, LearnError, ObsKind, Observations};
 
 impl Rollout {
     /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ... A
@@ -15,8 +15,9 @@ impl Rollout {
         if parts.len() == 1 {
             return Ok(parts.remove(0));
         }
-        let obs = side_by_side(&parts)?;
-        Self::join_around(obs, parts)
+        let mut all = Self::join_beside_obs(&parts)?;
+        all.obs = side_by_side(&parts, &all.obs_kind)?;
+        Ok(all)
     }
 
     /// [`Self::join`], of parts whose observations lie in `obs` already, each in its
@@ -91,18 +92,12 @@ impl Rollout {
     }
 }
 
-/// The observations of all parts, tick by tick.
-fn side_by_side(parts: &[Rollout]) -> Result<Observations, LearnError> {
-    let Some(first) = parts.first() else {
-        return Err(LearnError::Config("no rollouts to join".to_owned()));
-    };
-    let (kind, width) = (first.obs_kind, first.obs_kind.numbers());
-    let mut obs = Observations::with_capacity(&kind, parts.iter().map(Rollout::rows).sum());
-    for t in 0..first.steps {
+/// The observations of parts that fit together, tick by tick.
+fn side_by_side(parts: &[Rollout], kind: &ObsKind) -> Result<Observations, LearnError> {
+    let mut obs = Observations::with_capacity(kind, parts.iter().map(Rollout::rows).sum());
+    for t in 0..parts.first().map_or(0, |part| part.steps) {
         for part in parts {
-            LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
-            kind.same_as(&part.obs_kind, "a joined rollout")?;
-            obs.push(part.obs.rows(t * part.envs..(t + 1) * part.envs, width))?;
+            obs.push(part.obs.rows(t * part.envs..(t + 1) * part.envs, kind.numbers()))?;
         }
     }
     Ok(obs)

@@ -1,7 +1,7 @@
 //! Operations with loops of our own, for the backends whose numbers are in host memory.
 //!
 //! Each has its backward pass beside it and enters the gradient graph as one node. Devices without a kernel
-//! ([`has_kernels`]) take the path of plain tensor operations instead.
+//! (see [`is_host`](crate::device::is_host)) take the path of plain tensor operations instead.
 
 #![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
 
@@ -12,15 +12,9 @@ use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::Checkpoi
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind, unary};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, DispatchDevice, Flex, NdArray, TensorMetadata, backend_extension};
-use burn::tensor::{Device, Shape, Tensor};
+use burn::backend::{Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension};
+use burn::tensor::{Shape, Tensor};
 use std::sync::Arc;
-
-/// Whether the operations of this file can be used on `device`.
-pub(in crate::nn) fn has_kernels(device: &Device) -> bool {
-    let device = device.clone().inner();
-    matches!(device.as_dispatch(), DispatchDevice::Flex(_) | DispatchDevice::NdArray(_))
-}
 
 /// tanh of every element, on a device with kernels.
 pub(in crate::nn) fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {

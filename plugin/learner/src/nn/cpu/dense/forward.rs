@@ -13,7 +13,7 @@ const ROWS: usize = 32;
 
 /// x W + b, and the activation of that: `[n, columns]` for the rows `[n, rows of W]`, which begin every `stride` numbers of
 /// `x`. Without `bias` sums start from 0.
-pub(in crate::nn::cpu) fn product(
+pub(super) fn product(
     x: &[f32],
     (n, stride): (usize, usize),
     weights: &Packed,
