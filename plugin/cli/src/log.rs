@@ -23,8 +23,9 @@ use tracing_subscriber::{
 };
 
 /// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
-/// to warn of.
-const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off";
+/// to warn of; what a graphics card that failed could not do is told by the error that follows.
+const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off,\
+                     cubecl_runtime=error";
 
 /// What broken games log is not news.
 const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot_cli=warn,playbot_lab=warn,playbot_learner=warn";

@@ -24,7 +24,20 @@ pub(crate) fn guarded<T>(device: &Device, work: impl FnOnce() -> Result<T, Learn
     if is_host(device) {
         return work();
     }
-    caught(work).unwrap_or_else(|reason| Err(LearnError::DeviceFailed { reason }))
+    match caught(work) {
+        Ok(Err(LearnError::Device(said))) => Err(LearnError::DeviceFailed { reason: first_cause(&said) }),
+        Ok(result) => result,
+        Err(reason) => Err(LearnError::DeviceFailed { reason }),
+    }
+}
+
+/// What it all came from: a driver that fails tells it last, after everything that could not be done any more.
+fn first_cause(said: &str) -> String {
+    let is_filler = |line: &&str| {
+        let fillers = ["Caused by:", "Asked at:", "No backtrace available", "skipped ", "("];
+        line.is_empty() || fillers.iter().any(|filler| line.starts_with(filler))
+    };
+    said.lines().map(str::trim).rfind(|line| !is_filler(line)).unwrap_or("no reason given").to_owned()
 }
 
 #[cfg(test)]
@@ -37,5 +50,14 @@ mod tests {
         assert_eq!(caught(|| panic!("out of\n  memory")), Err::<(), _>("out of memory".to_owned()));
         let number = 3;
         assert_eq!(caught(|| panic!("{number} left")), Err::<(), _>("3 left".to_owned()));
+    }
+
+    #[test]
+    fn what_it_came_from_is_told() {
+        let said = "An error happened\nCaused by:\n  An IO error happened\n  skipped `Kernel`: it failed\nCaused by:\n  \
+                    can't allocate buffer of size: 268435456\nNo backtrace available\nAsked at:\nNo backtrace available";
+        assert_eq!(first_cause(said), "can't allocate buffer of size: 268435456");
+        assert_eq!(first_cause("no memory"), "no memory");
+        assert_eq!(first_cause(""), "no reason given");
     }
 }

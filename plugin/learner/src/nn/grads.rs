@@ -1,5 +1,6 @@
 //! Gradients by parameter name.
 
+use super::cpu::KeptMemory;
 use super::params::{ParamVisitor, Parameters};
 use crate::LearnError;
 use burn::tensor::{Gradients, Tensor, TensorData};
@@ -12,6 +13,17 @@ const FEW: usize = 1 << 17;
 #[derive(Clone, Debug, Default)]
 pub struct NamedGrads {
     entries: Vec<(String, TensorData)>,
+}
+
+impl Drop for NamedGrads {
+    fn drop(&mut self) {
+        // The next step's gradients are written into the same memory.
+        for (_, values) in self.entries.drain(..) {
+            if let Ok(numbers) = values.try_into_vec::<f32>() {
+                KeptMemory::leave(numbers);
+            }
+        }
+    }
 }
 
 impl NamedGrads {

@@ -1,7 +1,7 @@
 //! A linear layer.
 
 use super::Activation;
-use super::cpu::dense::dense;
+use super::cpu::dense::{Dense, dense};
 use super::params::{ParamVisitor, Parameters, path};
 use super::source::{Init, ParamSource, RandomInit};
 use burn::tensor::{Device, Tensor, module::linear};
@@ -39,12 +39,26 @@ impl Linear {
 
     /// `[n, inputs]` to `[n, outputs]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
-        dense(&x, &self.weight, &self.bias, None).unwrap_or_else(|| self.plain(x))
+        Self::chain(x, &[(self, None)])
     }
 
     /// The activation of [`Self::forward`].
     pub fn activated(&self, x: Tensor<2>, activation: Activation) -> Tensor<2> {
-        dense(&x, &self.weight, &self.bias, Some(activation)).unwrap_or_else(|| activation.forward(self.plain(x)))
+        Self::chain(x, &[(self, Some(activation))])
+    }
+
+    /// Layers, one after the other, with the activation of each.
+    pub(super) fn chain(x: Tensor<2>, layers: &[(&Self, Option<Activation>)]) -> Tensor<2> {
+        let of_layers = layers.iter().map(|(layer, activation)| {
+            let Self { weight, bias } = layer;
+            Dense { weight, bias, activation: *activation }
+        });
+        dense(&x, &of_layers.collect::<Vec<_>>()).unwrap_or_else(|| {
+            layers.iter().fold(x, |x, (layer, activation)| match activation {
+                Some(activation) => activation.forward(layer.plain(x)),
+                None => layer.plain(x),
+            })
+        })
     }
 
     /// By the backend's own operations.

@@ -60,22 +60,27 @@ impl Mlp {
 
     /// The last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
     pub fn features(&self, x: Tensor<2>) -> Tensor<2> {
-        self.layers.iter().fold(x, |x, layer| layer.activated(x, self.activation))
+        Linear::chain(x, &self.hidden().collect::<Vec<_>>())
+    }
+
+    /// The hidden layers with their activations.
+    fn hidden(&self) -> impl Iterator<Item = (&Linear, Option<Activation>)> {
+        self.layers.iter().map(|layer| (layer, Some(self.activation)))
     }
 
     /// [`Self::features`] of `[held, x]` joined, where row `b` of `held` `[B, H]` goes with the rows `t * B + b` of
     /// `x` `[steps * B, inputs - H]`.
     pub fn features_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
-        let Some((first, rest)) = self.layers.split_first() else {
+        let Some(first) = self.layers.first() else {
             return Tensor::cat(vec![held.repeat_dim(0, steps), x], 1);
         };
         let first = self.activation.forward(first.forward_held(held, x, steps));
-        rest.iter().fold(first, |x, layer| layer.activated(x, self.activation))
+        Linear::chain(first, &self.hidden().skip(1).collect::<Vec<_>>())
     }
 
     /// `[n, inputs]` to `[n, outputs]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
-        self.head.forward(self.features(x))
+        Linear::chain(x, &self.hidden().chain([(&self.head, None)]).collect::<Vec<_>>())
     }
 }
 

@@ -1,5 +1,6 @@
 //! The learner as a whole: does it learn, is it exact, does it survive a restart.
 
+mod allocations;
 mod checkpoint;
 mod corridor;
 mod determinism;

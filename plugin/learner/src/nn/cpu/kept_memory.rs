@@ -4,43 +4,49 @@ use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
 /// Most pieces that wait to be taken.
-const MOST: usize = 48;
+const MOST: usize = 128;
+/// Numbers below which memory is not worth keeping.
+const LEAST: usize = 1 << 10;
 
 static WAITING: Mutex<Vec<Vec<f32>>> = Mutex::new(Vec::new());
 
 /// Numbers of which nothing is known before they are written. They are left to others when it is dropped.
 #[derive(Debug)]
-pub(super) struct KeptMemory {
-    /// At least `len`.
-    numbers: Vec<f32>,
-    len: usize,
-}
+pub(in crate::nn) struct KeptMemory(Vec<f32>);
 
 impl KeptMemory {
     /// So many numbers.
     pub(super) fn take(len: usize) -> Self {
         let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
         // The smallest that is large enough; what is much larger waits for others.
-        let fits = |numbers: &Vec<f32>| (len..=2 * len).contains(&numbers.len());
+        let fits = |numbers: &Vec<f32>| (len.max(LEAST)..=2 * len).contains(&numbers.capacity());
         let places = (0..waiting.len()).filter(|place| fits(&waiting[*place]));
-        let place = places.min_by_key(|place| waiting[*place].len());
+        let place = places.min_by_key(|place| waiting[*place].capacity());
         let found = place.map(|place| waiting.swap_remove(place));
         drop(waiting);
-        Self { numbers: found.unwrap_or_else(|| vec![0.0; len]), len }
+        let mut numbers = found.unwrap_or_else(|| vec![0.0; len]);
+        numbers.resize(len, 0.0);
+        Self(numbers)
     }
 
-    /// So many zeros.
-    pub(super) fn zeros(len: usize) -> Self {
-        let mut memory = Self::take(len);
-        memory.fill(0.0);
-        memory
+    /// The numbers, for a tensor. [`Self::leave`] brings them back.
+    pub(super) fn into_vec(mut self) -> Vec<f32> {
+        std::mem::take(&mut self.0)
+    }
+
+    /// Leaves numbers that nobody needs any more to others.
+    pub(in crate::nn) fn leave(numbers: Vec<f32>) {
+        drop(Self(numbers));
     }
 }
 
 impl Drop for KeptMemory {
     fn drop(&mut self) {
+        if self.0.capacity() < LEAST {
+            return;
+        }
         let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
-        waiting.push(std::mem::take(&mut self.numbers));
+        waiting.push(std::mem::take(&mut self.0));
         if waiting.len() > MOST {
             // The one that has waited longest: nobody asks for its size any more.
             waiting.remove(0);
@@ -52,13 +58,13 @@ impl Deref for KeptMemory {
     type Target = [f32];
 
     fn deref(&self) -> &[f32] {
-        &self.numbers[..self.len]
+        &self.0
     }
 }
 
 impl DerefMut for KeptMemory {
     fn deref_mut(&mut self) -> &mut [f32] {
-        &mut self.numbers[..self.len]
+        &mut self.0
     }
 }
 
@@ -68,13 +74,12 @@ mod tests {
 
     #[test]
     fn memory_has_the_length_that_is_asked_for_whatever_waits() {
-        for len in [7, 3, 900, 0, 8, 901, 500] {
+        for len in [7, 3, 2900, 0, 8, 2901, 1500, 2901] {
             let mut memory = KeptMemory::take(len);
             assert_eq!(memory.len(), len);
             memory.fill(1.0);
-            assert!(KeptMemory::zeros(len).iter().all(|x| *x == 0.0));
         }
-        let several: Vec<KeptMemory> = (0..2 * MOST).map(|_| KeptMemory::take(5)).collect();
+        let several: Vec<KeptMemory> = (0..2 * MOST).map(|_| KeptMemory::take(LEAST)).collect();
         drop(several);
         assert!(WAITING.lock().expect("sound").len() <= MOST);
     }

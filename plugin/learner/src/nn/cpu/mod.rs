@@ -12,3 +12,5 @@ mod relu;
 mod store;
 mod tile;
 pub(in crate::nn) mod trunk;
+
+pub(in crate::nn) use kept_memory::KeptMemory;

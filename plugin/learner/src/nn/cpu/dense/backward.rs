@@ -1,96 +1,75 @@
-//! From the gradient of a layer's output to those of its parameters and its input.
+//! From the gradient of the last layer's output to those of all parameters and the input.
 
-use super::forward::product;
+use super::forward::{Layer, MOST_LAYERS, ROWS, pieces, products, rows_product};
 use super::packed::Packed;
-use super::share::share;
-use crate::nn::Activation;
-use crate::nn::cpu::fast_math::vectorized;
-use crate::nn::cpu::kept_memory::KeptMemory;
-use crate::nn::cpu::outer::{column_sums, outer};
-use crate::nn::cpu::relu::relu_backward;
-use crate::nn::cpu::tile::{LANES, Lanes, WIDE_ROWS, Window};
+use super::params::{LayerSums, ParamGrads, param_grads};
+use super::share::share_each;
+use super::sum_grads::{SumGrads, through_activation};
 
-/// Rows whose gradients a thread takes through the activation at a time.
-const ROWS: usize = 64;
-
-/// The gradient of x W + b: `[n, columns]`, its rows filled up with zeros to whole blocks of 16.
-pub(in crate::nn::cpu) struct SumGrads {
-    n: usize,
-    columns: usize,
-    stride: usize,
-    values: KeptMemory,
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// Otherwise the gradient of the input is empty, which saves a product.
+    pub(super) x: bool,
+    /// Otherwise those of the parameters are.
+    pub(super) params: bool,
 }
 
-impl SumGrads {
-    /// From the gradient of the output `y`, which the activation gave.
-    pub(in crate::nn::cpu) fn new(grad: &[f32], y: &[f32], columns: usize, activation: Option<Activation>) -> Self {
-        let (n, stride) = (grad.len() / columns, columns.next_multiple_of(LANES));
-        let mut values = KeptMemory::take(n * stride);
-        // Each is little work.
-        share(&mut values, ROWS * stride, grad.len(), |piece, values| {
-            let first = piece * ROWS * columns;
-            let given = grad[first..].chunks_exact(columns).zip(y[first..].chunks_exact(columns));
-            let rows = values.chunks_exact_mut(stride).zip(given);
-            vectorized(|| {
-                for (to, (grad, y)) in rows {
-                    to[columns..].fill(0.0);
-                    let numbers = to.iter_mut().zip(grad.iter().zip(y));
-                    match activation {
-                        None => numbers.for_each(|(to, (&grad, _))| *to = grad),
-                        Some(Activation::Relu) => {
-                            numbers.for_each(|(to, (&grad, &y))| *to = relu_backward(y, grad));
-                        }
-                        Some(Activation::Tanh) => numbers.for_each(|(to, (&grad, &y))| *to = grad * (1.0 - y * y)),
-                    }
-                }
-            });
-        });
-        Self { n, columns, stride, values }
+/// The gradients of the input `[n, inputs]` and of each layer's parameters, for `grad`, that of the last layer's output.
+///
+/// `outputs` are those of all layers.
+pub(super) fn backward(
+    grad: &[f32],
+    x: &[f32],
+    layers: &[Layer<'_>],
+    outputs: &[&[f32]],
+    wanted: Wanted,
+) -> (Vec<f32>, Vec<ParamGrads>) {
+    let inputs = layers.first().map_or(0, Layer::inputs);
+    let n = x.len() / inputs.max(1);
+    let mut sums: Vec<SumGrads> = layers.iter().map(|layer| SumGrads::unwritten(n, layer.outputs())).collect();
+    let mut of_x = if wanted.x { vec![0.0; x.len()] } else { Vec::new() };
+    to_sums(grad, layers, outputs, &mut sums, &mut of_x);
+    if !wanted.params {
+        return (of_x, Vec::new());
     }
+    let befores = std::iter::once(x).chain(outputs.iter().copied());
+    let of_layers = befores.zip(layers).zip(&sums);
+    let of_layers = of_layers.map(|((x, layer), sums)| LayerSums { x, inputs: layer.inputs(), sums });
+    (of_x, param_grads(&of_layers.collect::<Vec<_>>()))
+}
 
-    /// The gradient of the input: `[n, inputs]`, for weights `[inputs, columns]`.
-    pub(in crate::nn::cpu) fn input(&self, weights: &[f32]) -> Vec<f32> {
-        let turned = Packed::transposed(weights, self.columns, weights.len() / self.columns);
-        product(&self.values, (self.n, self.stride), &turned, &[], None)
-    }
-
-    /// The gradients of weights `[inputs, columns]` and biases, for the input `[n, inputs]`.
-    pub(in crate::nn::cpu) fn params(&self, x: &[f32], inputs: usize) -> (Vec<f32>, Vec<f32>) {
-        let blocks = self.stride / LANES;
-        let mut memory = KeptMemory::zeros(blocks * inputs * LANES);
-        let sums: &mut [Lanes] = memory.as_chunks_mut().0;
-        let mut biases = vec![[0.0; LANES]; blocks];
-        let places: Vec<usize> = (0..self.n).map(|row| row * self.stride).collect();
-        let products = self.n * inputs * self.columns;
-        column_sums(&self.values, &places, &mut biases);
-        share(sums, 2 * inputs, products, |pair, sums| {
-            self.add_products(x, inputs, &self.values[2 * pair * LANES..], &places, sums);
-        });
-        let mut weights = vec![0.0; inputs * self.columns];
-        share(&mut weights, self.columns * ROWS, inputs * self.columns, |piece, weights| {
-            for (row, weights) in (piece * ROWS..).zip(weights.chunks_exact_mut(self.columns)) {
-                let (whole, rest) = weights.as_chunks_mut::<LANES>();
-                whole.iter_mut().enumerate().for_each(|(block, to)| *to = sums[block * inputs + row]);
-                if !rest.is_empty() {
-                    rest.copy_from_slice(&sums[whole.len() * inputs + row][..rest.len()]);
+/// The gradients of all layers' sums, and that of the input unless it is empty.
+fn to_sums(grad: &[f32], layers: &[Layer<'_>], outputs: &[&[f32]], sums: &mut [SumGrads], of_x: &mut [f32]) {
+    // The layers whose inputs have gradients; the first one's only if it is asked for.
+    let first = usize::from(of_x.is_empty());
+    let turned = Packed::all(&layers.iter().skip(first).map(Layer::turned).collect::<Vec<_>>());
+    let strides: Vec<usize> = sums.iter().map(SumGrads::stride).collect();
+    let inputs = layers.first().map_or(0, Layer::inputs);
+    let width = layers.last().map_or(1, Layer::outputs);
+    let n = grad.len() / width;
+    let numbers = sums.iter_mut().map(SumGrads::values_mut).zip(strides.iter().copied());
+    let mut x_rows = of_x.chunks_mut(ROWS * inputs);
+    let rows = pieces(numbers, n).into_iter().map(|sums| (sums, x_rows.next().unwrap_or_default()));
+    let mut rows: Vec<([&mut [f32]; MOST_LAYERS], &mut [f32])> = rows.collect();
+    share_each(&mut rows, n * products(layers), |piece, (sums, of_x)| {
+        let last = layers.len() - 1;
+        let given = grad[piece * ROWS * width..].chunks_exact(width);
+        for (to, grad) in sums[last].chunks_exact_mut(strides[last]).zip(given) {
+            to[..width].copy_from_slice(grad);
+            to[width..].fill(0.0);
+        }
+        for (place, layer) in layers.iter().enumerate().rev() {
+            let (before, here) = sums.split_at_mut(place);
+            let (sums, columns) = (&mut *here[0], layer.outputs());
+            through_activation(sums, &outputs[place][piece * ROWS * columns..], columns, layer.activation);
+            match before.last_mut() {
+                Some(before) => {
+                    rows_product(before, strides[place - 1], sums, strides[place], &turned[place - first], &[]);
                 }
+                None if first == 0 => rows_product(of_x, inputs, sums, strides[0], &turned[0], &[]),
+                None => {}
             }
-        });
-        let mut bias = biases.into_flattened();
-        bias.truncate(self.columns);
-        (weights, bias)
-    }
-
-    /// Adds the products of inputs and gradients to those of two blocks.
-    fn add_products(&self, x: &[f32], inputs: usize, y: &[f32], places: &[usize], sums: &mut [Lanes]) {
-        let window = Window { count: 1, step: 0, len: inputs };
-        let starts: Vec<usize> = (0..self.n).map(|row| row * inputs).collect();
-        // A few numbers beyond a row are read and not used. The last rows have none behind them.
-        let few = WIDE_ROWS.div_ceil(inputs).min(self.n);
-        let (places, last) = places.split_at(self.n - few);
-        outer(x, &starts[..places.len()], window, y, places, sums);
-        let mut end = x[places.len() * inputs..].to_vec();
-        end.resize(end.len() + WIDE_ROWS, 0.0);
-        outer(&end, &starts[..few], window, y, last, sums);
-    }
+        }
+    });
 }

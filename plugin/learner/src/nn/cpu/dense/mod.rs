@@ -1,8 +1,9 @@
-//! A dense layer with its activation as one operation, for the flex backend.
+//! Dense layers with their activations, one after the other, as one operation for the flex backend.
 //!
 //! burn writes what a product gives, reads it to add the bias, and reads it again for the activation; each of these is a
-//! node of the gradient graph of its own. Here the sums start from the bias, and the activation is taken while they are
-//! in the cache. Gradients of weights, biases and input come from one node.
+//! node of the gradient graph of its own. Here a few rows at a time go through all layers while they are in the cache, and
+//! back again; one node gives the gradients of all weights and biases and of the input. Threads meet twice in each direction,
+//! however many layers there are, so that small networks can be shared, too.
 //!
 //! A row of the output does not depend on the rest of the batch, every sum is made by one thread in an order of its own, and
 //! so nothing depends on the number of threads.
@@ -11,11 +12,14 @@ mod backward;
 mod forward;
 mod op;
 mod packed;
+mod params;
 mod share;
+mod sum_grads;
 #[cfg(test)]
 mod tests;
 
-pub(super) use backward::SumGrads;
 pub(super) use forward::product_into;
-pub(in crate::nn) use op::dense;
-pub(super) use packed::Packed;
+pub(in crate::nn) use op::{Dense, dense};
+pub(super) use packed::{Matrix, Packed};
+pub(super) use params::{LayerSums, param_grads};
+pub(super) use sum_grads::SumGrads;

@@ -1,8 +1,47 @@
 //! Weights in the orders in which products read them.
 
-use super::share::share;
+use super::share::{OF_A_MOVE, share_each};
 use crate::nn::cpu::kept_memory::KeptMemory;
 use crate::nn::cpu::tile::{LANES, Lanes};
+
+/// A matrix to multiply with.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::nn::cpu) struct Matrix<'a> {
+    pub(in crate::nn::cpu) numbers: &'a [f32],
+    /// Numbers that the product takes of each row.
+    pub(in crate::nn::cpu) rows: usize,
+    /// Numbers that it gives for each.
+    pub(in crate::nn::cpu) columns: usize,
+    /// Whether the numbers are those of the transpose, `[columns, rows]`.
+    pub(in crate::nn::cpu) is_turned: bool,
+}
+
+impl Matrix<'_> {
+    /// Writes a block of 16 columns.
+    fn write(&self, block: usize, lanes: &mut [Lanes]) {
+        let first = block * LANES;
+        let count = LANES.min(self.columns - first);
+        if self.is_turned {
+            let of_block = &self.numbers[first * self.rows..];
+            for (row, lanes) in lanes.iter_mut().enumerate() {
+                lanes[count..].fill(0.0);
+                for (lane, number) in lanes.iter_mut().enumerate().take(count) {
+                    *number = of_block[lane * self.rows + row];
+                }
+            }
+            return;
+        }
+        for (lanes, row) in lanes.iter_mut().zip(self.numbers.chunks_exact(self.columns)) {
+            match row[first..].first_chunk() {
+                Some(row) => *lanes = *row,
+                None => {
+                    *lanes = [0.0; LANES];
+                    lanes[..count].copy_from_slice(&row[first..]);
+                }
+            }
+        }
+    }
+}
 
 /// Weights for [`correlate`](crate::nn::cpu::tile::correlate): for each block of 16 columns of a product its rows, 16
 /// numbers each, zeros beyond the last column.
@@ -18,37 +57,31 @@ impl Packed {
         self.numbers.as_chunks().0
     }
 
-    /// Of the matrix `[rows, columns]`.
-    pub(in crate::nn::cpu) fn new(matrix: &[f32], rows: usize, columns: usize) -> Self {
-        let mut numbers = KeptMemory::take(rows * columns.next_multiple_of(LANES));
-        share(numbers.as_chunks_mut::<LANES>().0, rows.max(1), matrix.len(), |block, lanes| {
-            let first = block * LANES;
-            for (lanes, row) in lanes.iter_mut().zip(matrix.chunks_exact(columns)) {
-                match row[first..].first_chunk() {
-                    Some(row) => *lanes = *row,
-                    None => {
-                        *lanes = [0.0; LANES];
-                        lanes.iter_mut().zip(&row[first..]).for_each(|(lane, number)| *lane = *number);
-                    }
-                }
-            }
-        });
-        Self { rows, columns, numbers }
+    /// Of one matrix.
+    pub(in crate::nn::cpu) fn new(matrix: Matrix<'_>) -> Self {
+        let mut packed = Self::unwritten(&matrix);
+        Self::write(std::slice::from_mut(&mut packed), &[matrix]);
+        packed
     }
 
-    /// Of the transpose of the matrix `[columns, rows]`.
-    pub(in crate::nn::cpu) fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Self {
-        let mut numbers = KeptMemory::take(rows * columns.next_multiple_of(LANES));
-        share(numbers.as_chunks_mut::<LANES>().0, rows.max(1), matrix.len(), |block, lanes| {
-            let of_block = &matrix[block * LANES * rows..];
-            let count = LANES.min(columns - block * LANES);
-            for (row, lanes) in lanes.iter_mut().enumerate() {
-                lanes[count..].fill(0.0);
-                for (lane, number) in lanes.iter_mut().enumerate().take(count) {
-                    *number = of_block[lane * rows + row];
-                }
-            }
+    /// Of each matrix.
+    pub(super) fn all(matrices: &[Matrix<'_>]) -> Vec<Self> {
+        let mut all: Vec<Self> = matrices.iter().map(Self::unwritten).collect();
+        Self::write(&mut all, matrices);
+        all
+    }
+
+    fn unwritten(&Matrix { rows, columns, .. }: &Matrix<'_>) -> Self {
+        Self { rows, columns, numbers: KeptMemory::take(rows * columns.next_multiple_of(LANES)) }
+    }
+
+    fn write(all: &mut [Self], matrices: &[Matrix<'_>]) {
+        let numbers: usize = matrices.iter().map(|matrix| matrix.numbers.len()).sum();
+        let blocks = all.iter_mut().zip(matrices).flat_map(|(packed, matrix)| {
+            let blocks = packed.numbers.as_chunks_mut::<LANES>().0.chunks_mut(matrix.rows);
+            blocks.enumerate().map(move |(block, lanes)| (matrix, block, lanes))
         });
-        Self { rows, columns, numbers }
+        let mut blocks: Vec<_> = blocks.collect();
+        share_each(&mut blocks, numbers * OF_A_MOVE, |_, (matrix, block, lanes)| matrix.write(*block, lanes));
     }
 }

@@ -7,6 +7,8 @@ use rayon::prelude::*;
 const FEW: usize = 1 << 22;
 /// The same where other threads are awake.
 const FEW_AWAKE: usize = 1 << 18;
+/// Products that take as long as a number that is put elsewhere.
+pub(super) const OF_A_MOVE: usize = 8;
 
 /// Calls `work` with each piece of `len` items and its number, on all threads if there are many products in all.
 pub(super) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work: impl Fn(usize, &mut [T]) + Sync) {
@@ -15,4 +17,9 @@ pub(super) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work:
     } else {
         items.par_chunks_mut(len).enumerate().for_each(|(piece, items)| work(piece, items));
     }
+}
+
+/// [`share`] for items that are pieces already.
+pub(super) fn share_each<T: Send>(items: &mut [T], products: usize, work: impl Fn(usize, &mut T) + Sync) {
+    share(items, 1, products, |piece, items| items.iter_mut().for_each(|item| work(piece, item)));
 }

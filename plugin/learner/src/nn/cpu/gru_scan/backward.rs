@@ -2,7 +2,7 @@
 
 use super::scan::of_direction;
 use super::{Direction, Scan, ScanInput, Sizes};
-use crate::nn::cpu::dense::{Packed, SumGrads, product_into};
+use crate::nn::cpu::dense::{LayerSums, Matrix, Packed, SumGrads, param_grads, product_into};
 use crate::nn::cpu::fast_math::vectorized;
 use crate::nn::cpu::kept_memory::KeptMemory;
 use rayon::prelude::*;
@@ -68,8 +68,10 @@ fn of_one_direction(
 ) -> ScanGrads {
     let Sizes { batch, inputs, hidden, .. } = sizes;
     let (rows, gates) = (sizes.rows(), sizes.gates());
-    let turned = Packed::transposed(weight_hh, gates, hidden);
-    let mut sums = SumGradsOfRows { input: KeptMemory::take(rows * gates), recurrent: KeptMemory::take(rows * gates) };
+    let turned = |numbers, columns| Packed::new(Matrix { numbers, rows: gates, columns, is_turned: true });
+    let to_state = turned(weight_hh, hidden);
+    let mut sums = GateGrads { input: SumGrads::unwritten(rows, gates), recurrent: SumGrads::unwritten(rows, gates) };
+    let stride = sums.input.stride();
     // Of the state between two steps, until the first step is reached.
     let mut state = vec![0.0; sizes.block()];
     let mut h = KeptMemory::take(sizes.block());
@@ -77,33 +79,37 @@ fn of_one_direction(
     for (k, &t) in order.iter().enumerate().rev() {
         vectorized(|| step_backward(&mut sums, &mut state, t, output, direction, run, sizes));
         if k > 0 || wanted.initial {
-            let c = &sums.recurrent[t * batch * gates..(t + 1) * batch * gates];
-            product_into(&mut h, c, (batch, gates), &turned, &[], None);
+            let c = &sums.recurrent.values()[t * batch * stride..];
+            product_into(&mut h, c, stride, &to_state, &[]);
             vectorized(|| state.iter_mut().zip(h.iter()).for_each(|(grad, x)| *grad += x));
         }
     }
     let before = if run.backwards { sizes.block() } else { 0 };
-    let of_rows = |grads: &[f32]| SumGrads::new(grads, grads, gates, None);
-    let of_input = of_rows(&sums.input);
-    let (weight_hh, bias_hh) = of_rows(&sums.recurrent).params(&run.states[before..before + rows * hidden], hidden);
-    let (found_ih, bias_ih) = of_input.params(x, inputs);
-    let x = if wanted.x { of_input.input(weight_ih) } else { Vec::new() };
-    ScanGrads { x, weight_ih: found_ih, weight_hh, bias_ih, bias_hh, initial: state }
+    let states = &run.states[before..before + rows * hidden];
+    let layers = [(x, inputs, &sums.input), (states, hidden, &sums.recurrent)];
+    let layers = layers.map(|(x, inputs, sums)| LayerSums { x, inputs, sums });
+    let Ok([ih, hh]) = <[_; 2]>::try_from(param_grads(&layers)) else { unreachable!("one for each") };
+    let mut x = Vec::new();
+    if wanted.x {
+        x.resize(rows * inputs, 0.0);
+        product_into(&mut x, sums.input.values(), stride, &turned(weight_ih, inputs), &[]);
+    }
+    ScanGrads { x, weight_ih: ih.weights, weight_hh: hh.weights, bias_ih: ih.bias, bias_hh: hh.bias, initial: state }
 }
 
-/// The gradients of a direction's sums, `[T * B, 3 * hidden]` each.
-struct SumGradsOfRows {
+/// The gradients of a direction's sums, for T * B rows.
+struct GateGrads {
     /// Of a.
-    input: KeptMemory,
+    input: SumGrads,
     /// Of c.
-    recurrent: KeptMemory,
+    recurrent: SumGrads,
 }
 
 /// One step for all rows of the batch: from the gradient of the state after it to those of a, c and, but for the part
 /// that goes through c, of the state before it.
 #[inline(always)]
 fn step_backward(
-    grads: &mut SumGradsOfRows,
+    grads: &mut GateGrads,
     state: &mut [f32],
     t: usize,
     output: &[f32],
@@ -113,6 +119,8 @@ fn step_backward(
 ) {
     let (hidden, gates) = (sizes.hidden, sizes.gates());
     let (before, _) = run.around(t);
+    let stride = grads.input.stride();
+    let (of_input, of_recurrent) = (grads.input.values_mut(), grads.recurrent.values_mut());
     for b in 0..sizes.batch {
         let row = t * sizes.batch + b;
         let here = row * hidden..(row + 1) * hidden;
@@ -122,9 +130,9 @@ fn step_backward(
         let from = (before * sizes.batch + b) * hidden;
         let h = &run.states[from..from + hidden];
         let state = &mut state[b * hidden..(b + 1) * hidden];
-        let (d_r, rest) = grads.input[row * gates..(row + 1) * gates].split_at_mut(hidden);
+        let (d_r, rest) = of_input[row * stride..][..gates].split_at_mut(hidden);
         let (d_z, d_n) = rest.split_at_mut(hidden);
-        let d_c = &mut grads.recurrent[row * gates + 2 * hidden..(row + 1) * gates];
+        let d_c = &mut of_recurrent[row * stride..][2 * hidden..gates];
         for j in 0..hidden {
             let d_state = state[j] + output[j];
             d_n[j] = d_state * (1.0 - z[j]) * (1.0 - n[j] * n[j]);
@@ -133,7 +141,7 @@ fn step_backward(
             d_c[j] = d_n[j] * r[j];
             state[j] = d_state * z[j];
         }
-        let same = row * gates..row * gates + 2 * hidden;
-        grads.recurrent[same.clone()].copy_from_slice(&grads.input[same]);
+        let same = row * stride..row * stride + 2 * hidden;
+        of_recurrent[same.clone()].copy_from_slice(&of_input[same]);
     }
 }

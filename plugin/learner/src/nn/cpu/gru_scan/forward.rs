@@ -2,7 +2,7 @@
 
 use super::scan::of_direction;
 use super::{Direction, Scan, ScanInput, Sizes};
-use crate::nn::cpu::dense::{Packed, product_into};
+use crate::nn::cpu::dense::{Matrix, Packed, product_into};
 use crate::nn::cpu::fast_math::{sigmoid, tanh, vectorized};
 use crate::nn::cpu::kept_memory::KeptMemory;
 use rayon::prelude::*;
@@ -17,10 +17,11 @@ pub(in crate::nn) fn forward(
 ) -> (Vec<f32>, Scan) {
     let runs = (0..sizes.directions).into_par_iter().map(|d| {
         let part = |all| of_direction(all, d, sizes.directions);
-        let weights = Packed::new(part(input.weight_ih), sizes.inputs, sizes.gates());
+        let packed = |numbers, rows| Packed::new(Matrix { numbers, rows, columns: sizes.gates(), is_turned: false });
+        let weights = packed(part(input.weight_ih), sizes.inputs);
         let mut sums = KeptMemory::take(sizes.rows() * sizes.gates());
-        product_into(&mut sums, input.x, (sizes.rows(), sizes.inputs), &weights, part(bias_ih), None);
-        let weights = Packed::new(part(input.weight_hh), sizes.hidden, sizes.gates());
+        product_into(&mut sums, input.x, sizes.inputs, &weights, part(bias_ih));
+        let weights = packed(part(input.weight_hh), sizes.hidden);
         scan(&sums, &weights, part(bias_hh), part(initial), d == 1, sizes)
     });
     let runs: Vec<Direction> = runs.collect();
@@ -39,7 +40,7 @@ fn scan(sums: &[f32], weights: &Packed, bias: &[f32], initial: &[f32], backwards
     for t in sizes.order(backwards) {
         let (before, _) = run.around(t);
         let h = &run.states[before * block..(before + 1) * block];
-        product_into(&mut recurrent, h, (sizes.batch, sizes.hidden), weights, bias, None);
+        product_into(&mut recurrent, h, sizes.hidden, weights, bias);
         let sums = &sums[t * gates..(t + 1) * gates];
         vectorized(|| step(&mut run, t, sums, &recurrent, sizes));
     }

@@ -7,6 +7,7 @@ use super::plan::{Plan, Step};
 use super::pool;
 use super::workspace::Workspace;
 use crate::nn::cpu::fast_math::vectorized;
+use crate::nn::cpu::kept_memory::KeptMemory;
 use crate::nn::cpu::relu::relu_backward;
 use crate::nn::cpu::store::{AddWhere, Write};
 use crate::nn::cpu::tile::{LANES, Lanes};
@@ -26,9 +27,10 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivatio
     let group = Group::new(plan);
     let at_once = if group.is_some() { group::IMAGES } else { 1 };
     let (kept_len, lean_len) = (plan.kept.len, plan.lean.len);
-    let memory = || (Workspace::new(plan), vec![0.0; at_once * lean_len]);
+    let memory = || (Workspace::new(plan), zeros(at_once * lean_len));
     let parts = (0..n.div_ceil(part)).into_par_iter().map_init(memory, |(work, grads), i| {
-        let mut sums = zeros(plan);
+        let mut memory = zeros(plan.layers.iter().map(Layer::sums).sum::<usize>() * LANES);
+        let mut sums: Vec<&mut [Lanes]> = by_layer(plan, memory.as_chunks_mut().0, Layer::sums);
         let end = n.min((i + 1) * part);
         for first in (i * part..end).step_by(at_once) {
             let images = first..end.min(first + at_once);
@@ -46,31 +48,38 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivatio
                 group.add_gradients(plan, images.len(), values, grads, &mut sums);
             }
         }
-        sums
+        memory
     });
-    let parts: Vec<Vec<Vec<Lanes>>> = parts.collect();
-    let mut params = vec![0.0; plan.layers.iter().map(Layer::params).sum()];
-    let mut rest = &mut params[..];
-    let mut of_layers = Vec::new();
-    for layer in &plan.layers {
-        let (of_layer, others) = rest.split_at_mut(layer.params());
-        of_layers.push(of_layer);
-        rest = others;
-    }
-    plan.layers.par_iter().zip(of_layers).enumerate().for_each(|(number, (layer, params))| {
-        let mut total = vec![[0.0; LANES]; layer.sums()];
-        for part in &parts {
-            let pairs = total.as_flattened_mut().iter_mut().zip(part[number].as_flattened());
+    let mut parts: Vec<KeptMemory> = parts.collect();
+    let mut params = KeptMemory::take(plan.layers.iter().map(Layer::params).sum()).into_vec();
+    let Some((total, others)) = parts.split_first_mut() else { return vec![0.0; params.len()] };
+    let mut first = 0;
+    let totals = by_layer(plan, total.as_chunks_mut::<LANES>().0, Layer::sums).into_iter().map(|total| {
+        first += total.len();
+        (first - total.len(), total)
+    });
+    let of_layers: Vec<_> = totals.zip(by_layer(plan, &mut params, Layer::params)).collect();
+    plan.layers.par_iter().zip(of_layers).for_each(|(layer, ((first, total), params))| {
+        for part in &*others {
+            let sums = &part.as_chunks::<LANES>().0[first..][..total.len()];
+            let pairs = total.as_flattened_mut().iter_mut().zip(sums.as_flattened());
             vectorized(|| pairs.for_each(|(sum, x)| *sum += x));
         }
-        layer.gradients(&total, params);
+        layer.gradients(total, params);
     });
     params
 }
 
-/// For each layer, where its gradients are summed.
-fn zeros(plan: &Plan) -> Vec<Vec<Lanes>> {
-    plan.layers.iter().map(|layer| vec![[0.0; LANES]; layer.sums()]).collect()
+/// `all` in pieces, one for each layer, which have so many of them.
+fn by_layer<'a, T>(plan: &Plan, mut all: &'a mut [T], count: fn(&Layer) -> usize) -> Vec<&'a mut [T]> {
+    let of_layer = |layer| all.split_off_mut(..count(layer)).expect("there is some for each layer");
+    plan.layers.iter().map(of_layer).collect()
+}
+
+fn zeros(len: usize) -> KeptMemory {
+    let mut memory = KeptMemory::take(len);
+    memory.fill(0.0);
+    memory
 }
 
 /// From the gradients of what a ReLU gave to those of what it got.
@@ -88,7 +97,7 @@ fn backward(
     marks: &[u8],
     Workspace { wides, points }: &mut Workspace,
     grads: &mut [f32],
-    sums: &mut [Vec<Lanes>],
+    sums: &mut [&mut [Lanes]],
     alone: bool,
 ) {
     let (kept, lean, layers) = (&plan.kept, &plan.lean, &plan.layers);
@@ -98,7 +107,7 @@ fn backward(
                 mask(lean.write(output, grads), kept.read(output, values));
                 let (to, grad) = lean.two(input, output, grads);
                 if alone {
-                    layers[layer].add_gradients(kept.read(input, values), grad, points, &mut sums[layer]);
+                    layers[layer].add_gradients(kept.read(input, values), grad, points, sums[layer]);
                 }
                 if number > 0 {
                     layers[layer].backward(grad, &weights[layer], points, to);
@@ -108,7 +117,7 @@ fn backward(
                 let (to, grad) = lean.two(input, output, grads);
                 let (buffer, grid, of) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
                 pool::backward(grad, of, &marks[from..][..of.numbers()], buffer, grid);
-                layers[layer].add_gradients(kept.read(input, values), buffer, points, &mut sums[layer]);
+                layers[layer].add_gradients(kept.read(input, values), buffer, points, sums[layer]);
                 if number > 0 {
                     layers[layer].backward(buffer, &weights[layer], points, to);
                 }
@@ -116,10 +125,10 @@ fn backward(
             Step::Residual { layers: [layer0, layer1], x, relu, inner } => {
                 let (relu, hidden) = (kept.read(relu, values), kept.read(inner, values));
                 let (x, inside) = lean.two(x, inner, grads);
-                layers[layer1].add_gradients(hidden, x, points, &mut sums[layer1]);
+                layers[layer1].add_gradients(hidden, x, points, sums[layer1]);
                 layers[layer1].backward_same(x, &weights[layer1], points, Write(inside));
                 mask(inside, hidden);
-                layers[layer0].add_gradients(relu, inside, points, &mut sums[layer0]);
+                layers[layer0].add_gradients(relu, inside, points, sums[layer0]);
                 layers[layer0].backward_same(inside, &weights[layer0], points, AddWhere(x, relu));
             }
         }

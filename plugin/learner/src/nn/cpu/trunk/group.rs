@@ -43,7 +43,7 @@ impl Group {
         count: usize,
         values: &[f32],
         grads: &[f32],
-        sums: &mut [Vec<Lanes>],
+        sums: &mut [&mut [Lanes]],
     ) {
         for ((layer, places), sums) in plan.layers.iter().zip(&self.layers).zip(sums) {
             let pixels = places.starts.len() / IMAGES * count;

@@ -1,0 +1,110 @@
+//! Gradients of weights and biases: sums over all rows.
+
+use super::share::share_each;
+use super::sum_grads::SumGrads;
+use crate::nn::cpu::kept_memory::KeptMemory;
+use crate::nn::cpu::outer::{column_sums, outer};
+use crate::nn::cpu::tile::{LANES, Lanes, WIDE_ROWS, Window};
+
+/// Rows of weights that a thread takes at a time.
+const PART: usize = 32;
+
+/// What the gradients of a layer's parameters are made from.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::nn::cpu) struct LayerSums<'a> {
+    /// What came in, `[n, inputs]`.
+    pub(in crate::nn::cpu) x: &'a [f32],
+    pub(in crate::nn::cpu) inputs: usize,
+    /// The gradients of what x W + b gave.
+    pub(in crate::nn::cpu) sums: &'a SumGrads,
+}
+
+/// The gradients of weights `[inputs, outputs]` and of biases.
+#[derive(Debug)]
+pub(in crate::nn::cpu) struct ParamGrads {
+    pub(in crate::nn::cpu) weights: Vec<f32>,
+    pub(in crate::nn::cpu) bias: Vec<f32>,
+}
+
+/// The gradients of each layer's parameters.
+pub(in crate::nn::cpu) fn param_grads(layers: &[LayerSums<'_>]) -> Vec<ParamGrads> {
+    let empty = layers.iter().map(|LayerSums { inputs, sums, .. }| ParamGrads {
+        weights: KeptMemory::take(inputs * sums.columns).into_vec(),
+        bias: vec![0.0; sums.columns],
+    });
+    let mut found: Vec<ParamGrads> = empty.collect();
+    let places: Vec<Places> = layers.iter().map(Places::new).collect();
+    let parts = found.iter_mut().zip(layers).zip(&places).flat_map(|((found, layer), places)| {
+        let mut bias = Some(&mut *found.bias);
+        let weights = found.weights.chunks_mut(PART * layer.sums.columns).enumerate();
+        weights.map(move |(part, weights)| Part { layer, places, first: part * PART, weights, bias: bias.take() })
+    });
+    let products = |layer: &LayerSums<'_>| layer.x.len() * layer.sums.columns;
+    share_each(&mut parts.collect::<Vec<_>>(), layers.iter().map(products).sum(), |_, part| part.sum());
+    found
+}
+
+/// Where rows begin.
+struct Places {
+    x: Vec<usize>,
+    sums: Vec<usize>,
+}
+
+impl Places {
+    fn new(layer: &LayerSums<'_>) -> Self {
+        let every = |width: usize| (0..layer.x.len() / layer.inputs).map(|row| row * width).collect();
+        Self { x: every(layer.inputs), sums: every(layer.sums.stride()) }
+    }
+}
+
+/// Some rows of weights.
+struct Part<'a> {
+    layer: &'a LayerSums<'a>,
+    places: &'a Places,
+    /// The first of them.
+    first: usize,
+    weights: &'a mut [f32],
+    /// The first part has the biases, too.
+    bias: Option<&'a mut [f32]>,
+}
+
+impl Part<'_> {
+    fn sum(&mut self) {
+        let (columns, y) = (self.layer.sums.columns, self.layer.sums.values());
+        let rows = self.weights.len() / columns;
+        let mut memory = KeptMemory::take(columns.div_ceil(LANES) * rows * LANES);
+        memory.fill(0.0);
+        let sums: &mut [Lanes] = memory.as_chunks_mut().0;
+        self.add_products(y, rows, sums);
+        for (block, sums) in sums.chunks_exact(rows).enumerate() {
+            let first = block * LANES;
+            for (sums, row) in sums.iter().zip(self.weights.chunks_exact_mut(columns)) {
+                match row[first..].first_chunk_mut() {
+                    Some(to) => *to = *sums,
+                    None => row[first..].iter_mut().zip(sums).for_each(|(to, sum)| *to = *sum),
+                }
+            }
+        }
+        if let Some(bias) = &mut self.bias {
+            let mut sums = vec![[0.0; LANES]; columns.div_ceil(LANES)];
+            column_sums(y, &self.places.sums, &mut sums);
+            bias.copy_from_slice(&sums.as_flattened()[..columns]);
+        }
+    }
+
+    /// Adds the products of inputs and gradients.
+    fn add_products(&self, y: &[f32], rows: usize, sums: &mut [Lanes]) {
+        let LayerSums { x, inputs, .. } = *self.layer;
+        let Places { x: starts, sums: places } = self.places;
+        let window = Window { count: 1, step: 0, len: rows };
+        // A few numbers beyond a row are read and not used. The last rows may have none behind them.
+        let beyond = (self.first + rows + WIDE_ROWS).saturating_sub(inputs);
+        let (safe, last) = places.split_at(places.len() - beyond.div_ceil(inputs).min(places.len()));
+        outer(&x[self.first..], &starts[..safe.len()], window, y, safe, sums);
+        if !last.is_empty() {
+            let mut end = x[safe.len() * inputs + self.first..].to_vec();
+            end.resize(end.len() + rows + WIDE_ROWS, 0.0);
+            outer(&end, &starts[..last.len()], window, y, last, sums);
+        }
+    }
+}
