@@ -1,12 +1,19 @@
-//! How long learning takes, at the sizes of the paper and of the experiments: one training step, and whole updates.
+//! How long learning takes, at the sizes of the paper and of the experiments: single kernels, one training step, and whole
+//! updates.
 //!
 //! `cargo bench -p playbot_learner`; a word after it runs only the cases whose names have it (`-- impala`). That the
 //! numbers are the same on any number of threads is for tests.
 
 mod data;
+mod kernels;
 mod steps;
 mod updates;
 
+criterion::criterion_group! {
+    name = kernels;
+    config = data::measured(20);
+    targets = kernels::dense, kernels::gru, kernels::convolutions, kernels::numbers
+}
 criterion::criterion_group! {
     name = steps;
     config = data::measured(20);
@@ -17,4 +24,4 @@ criterion::criterion_group! {
     config = data::measured(10);
     targets = updates::skill_epoch, updates::vectors, updates::images
 }
-criterion::criterion_main!(steps, updates);
+criterion::criterion_main!(kernels, steps, updates);
