@@ -1,5 +1,7 @@
 //! One training step: forward, backward and Adam.
 
+use std::cell::LazyCell;
+
 use burn::tensor::{Tensor, TensorData};
 use criterion::Criterion;
 use playbot_learner::{
@@ -80,15 +82,18 @@ pub fn ppo(criterion: &mut Criterion) {
 pub fn images(criterion: &mut Criterion) {
     for (name, kind) in [("nature", CnnKind::Nature { feature: 512 }), ("impala", CnnKind::default())] {
         for batch in [64, 256, 2048] {
-            let mut rng = rng("images");
-            let frozen = ImageNet::new(&kind, IMAGE, &mut rng, &DEVICE.plain()).expect("fits");
-            let bytes = pixels(batch, &mut rng);
-            criterion.bench_function(&format!("features/{name}/{batch}"), |bencher| {
-                bencher.iter(|| frozen.forward(image_tensor(bytes.clone())).sum().into_scalar::<f32>());
+            let made = LazyCell::new(|| {
+                let mut rng = rng("images");
+                let net = ImageNet::new(&kind, IMAGE, &mut rng, &DEVICE.plain()).expect("fits");
+                (net, pixels(batch, &mut rng), matrix(batch, kind.features(), &mut rng))
             });
-            let (mut net, target) = (tracked(&frozen), matrix(batch, kind.features(), &mut rng));
-            let mut adam = Adam::new(AdamConfig::default());
+            criterion.bench_function(&format!("features/{name}/{batch}"), |bencher| {
+                let (net, bytes, _) = &*made;
+                bencher.iter(|| net.forward(image_tensor(bytes.clone())).sum().into_scalar::<f32>());
+            });
             criterion.bench_function(&format!("step/{name}/{batch}"), |bencher| {
+                let (net, bytes, target) = &*made;
+                let (mut net, mut adam) = (tracked(net), Adam::new(AdamConfig::default()));
                 let mut step = || {
                     let loss = (net.forward(image_tensor(bytes.clone())) - target.clone()).square().mean();
                     let grads = NamedGrads::take(&mut net, "", loss.backward()).expect("finite");

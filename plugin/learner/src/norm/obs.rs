@@ -38,15 +38,18 @@ impl ObsStats {
 
     /// All of `rows` normalised.
     pub(crate) fn normalize(&self, rows: &[f32]) -> Vec<f32> {
-        let mut out = Vec::with_capacity(rows.len());
-        rows.chunks_exact(self.mean.len().max(1)).for_each(|row| self.normalize_into(row, &mut out));
+        let (mut out, width) = (vec![0.0; rows.len()], self.mean.len().max(1));
+        let pairs = rows.chunks_exact(width).zip(out.chunks_exact_mut(width));
+        pairs.for_each(|(row, to)| self.normalize_into(row, to));
         out
     }
 
-    /// Adds the normalised `observation` to the end of `out`: clip((x - mean) / deviation, ±10).
-    pub fn normalize_into(&self, observation: &[f32], out: &mut Vec<f32>) {
+    /// Writes the normalised `observation` to `out`, which is as long: clip((x - mean) / deviation, ±10).
+    pub fn normalize_into(&self, observation: &[f32], out: &mut [f32]) {
         let dims = observation.iter().zip(&self.mean).zip(&self.inv_std);
-        out.extend(dims.map(|((&x, m), s)| ((f64::from(x) - m) * s).clamp(-CLIP, CLIP) as f32));
+        for (to, ((&x, m), s)) in out.iter_mut().zip(dims) {
+            *to = ((f64::from(x) - m) * s).clamp(-CLIP, CLIP) as f32;
+        }
     }
 }
 

@@ -4,6 +4,12 @@ use crate::nn::{ObsBatch, matrix};
 use crate::norm::ObsStats;
 use crate::{ObsKind, ObsSlice};
 use burn::tensor::{Device, Tensor};
+use rayon::prelude::*;
+
+/// Numbers up to which a second thread costs more than it saves.
+const FEW: usize = 1 << 17;
+/// Rows that a thread joins at a time.
+const ROWS: usize = 64;
 
 /// What actor and critic read of many states, on a device.
 #[derive(Clone, Debug)]
@@ -54,17 +60,16 @@ impl InputBuilder<'_> {
     /// The given rows on `device`. Of images only these become numbers.
     pub(crate) fn input(&self, rows: &[usize], device: &Device) -> NetInput {
         let (n, width) = (rows.len(), self.kind.numbers());
-        let rows_of = rows.iter().copied();
         match (self.obs, self.kind) {
             (ObsSlice::Image(pixels), ObsKind::Image(shape)) => {
-                let skills = || matrix(joined_rows(&[], 0, self.z, self.latent, None, rows_of), n, self.latent, device);
+                let skills = || matrix(joined_rows(&[], 0, self.z, self.latent, None, rows), n, self.latent, device);
                 NetInput::Images {
                     z: (self.latent > 0).then(skills),
                     pixels: ObsBatch::gather(pixels, [shape.channels, shape.height, shape.width], rows, device),
                 }
             }
             (ObsSlice::Vector(values), _) => {
-                let joined = joined_rows(self.z, self.latent, values, width, self.stats, rows_of);
+                let joined = joined_rows(self.z, self.latent, values, width, self.stats, rows);
                 NetInput::Joined(matrix(joined, n, self.latent + width, device))
             }
             (ObsSlice::Image(_), ObsKind::Vector(_)) => unreachable!("observations are checked to be of their kind"),
@@ -80,16 +85,25 @@ pub(crate) fn joined_rows(
     obs: &[f32],
     obs_dim: usize,
     stats: Option<&ObsStats>,
-    rows: impl ExactSizeIterator<Item = usize>,
+    rows: &[usize],
 ) -> Vec<f32> {
-    let mut out = Vec::with_capacity(rows.len() * (latent + obs_dim));
-    for row in rows {
-        out.extend_from_slice(&z[row * latent..(row + 1) * latent]);
-        let observation = &obs[row * obs_dim..(row + 1) * obs_dim];
-        match stats {
-            None => out.extend_from_slice(observation),
-            Some(stats) => stats.normalize_into(observation, &mut out),
+    let width = latent + obs_dim;
+    let mut out = vec![0.0; rows.len() * width];
+    let join = |(joined, rows): (&mut [f32], &[usize])| {
+        for (joined, &row) in joined.chunks_exact_mut(width.max(1)).zip(rows) {
+            let (skill, to) = joined.split_at_mut(latent);
+            skill.copy_from_slice(&z[row * latent..(row + 1) * latent]);
+            let observation = &obs[row * obs_dim..(row + 1) * obs_dim];
+            match stats {
+                None => to.copy_from_slice(observation),
+                Some(stats) => stats.normalize_into(observation, to),
+            }
         }
+    };
+    if out.len() <= FEW {
+        join((&mut out, rows));
+    } else {
+        out.par_chunks_mut(ROWS * width).zip(rows.par_chunks(ROWS)).for_each(join);
     }
     out
 }

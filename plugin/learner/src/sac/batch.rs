@@ -36,8 +36,7 @@ impl SacLearner {
         let (stats, device) = (base.obs_stats(), base.device.plain());
         let (latent, obs_dim) = (base.spec.latent, buffer.obs_dim);
         let inputs = |z: &[f32], obs: &[f32]| {
-            let rows = slots.iter().copied();
-            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), rows);
+            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), slots);
             matrix(rows, n, self.inputs(), &device)
         };
         let reward = |&slot: &usize| match &base.rewards {
@@ -48,7 +47,7 @@ impl SacLearner {
         let teacher = match base.teacher.as_ref().filter(|_| with_actor) {
             None => None,
             Some(teacher) => {
-                let gather = |values: &[f32], width| joined_rows(&[], 0, values, width, None, slots.iter().copied());
+                let gather = |values: &[f32], width| joined_rows(&[], 0, values, width, None, slots);
                 let (z, obs) = (gather(&buffer.z, buffer.latent), gather(&buffer.obs, buffer.obs_dim));
                 let squashed = self.nets.actor.is_squashed();
                 let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);

@@ -5,8 +5,8 @@ use playbot_learner::norm::{ObsNormalizer, RewardNormalizer, RewardReset, Runnin
 
 fn normalized(normalizer: &ObsNormalizer, rows: &[f32], dim: usize) -> Vec<f32> {
     let stats = normalizer.snapshot();
-    let mut out = Vec::new();
-    rows.chunks_exact(dim).for_each(|row| stats.normalize_into(row, &mut out));
+    let mut out = vec![0.0; rows.len()];
+    rows.chunks_exact(dim).zip(out.chunks_exact_mut(dim)).for_each(|(row, to)| stats.normalize_into(row, to));
     out
 }
 

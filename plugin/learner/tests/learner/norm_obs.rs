@@ -91,7 +91,7 @@ fn normalised_numbers_are_learned_from_faster() {
 #[test]
 fn a_value_that_no_demonstration_holds_stays_small() {
     let model = model(PLANE);
-    let mut seen = Vec::new();
+    let mut seen = [0.0; 4];
     model.obs_stats().expect("normalised").normalize_into(&[1e9, -1e9, 30.0, 3.25], &mut seen);
     assert_eq!(seen[..3], [10.0, -10.0, 10.0]);
     assert!((seen[3] - 2.0).abs() < 1e-5, "a constant is centred only: {}", seen[3]);
