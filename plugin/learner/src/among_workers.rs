@@ -102,13 +102,27 @@ mod tests {
     use super::*;
     use rayon::prelude::*;
 
+    /// Waits for the updates of other tests in this process.
+    fn nobody_is_awake_in_the_end() -> bool {
+        (0..2000).any(|_| {
+            std::thread::sleep(Duration::from_millis(5));
+            !are_awake()
+        })
+    }
+
     #[test]
     fn work_is_done_and_workers_go_back_to_sleep() {
+        let before = waited();
         let sum = among_awake_workers(|| {
             assert!(are_awake());
+            std::thread::sleep(Duration::from_millis(50));
             (0..1000u64).into_par_iter().sum::<u64>()
         });
         assert_eq!(sum, 499_500);
+        if rayon::current_num_threads() > 1 {
+            assert!(waited() > before, "the others waited meanwhile");
+        }
+        assert!(nobody_is_awake_in_the_end());
     }
 
     #[test]
@@ -128,6 +142,6 @@ mod tests {
     #[test]
     fn a_panic_ends_it() {
         let result = std::panic::catch_unwind(|| among_awake_workers(|| panic!("stop")));
-        assert!(result.is_err());
+        assert!(result.is_err() && nobody_is_awake_in_the_end());
     }
 }

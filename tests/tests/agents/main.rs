@@ -2,6 +2,7 @@
 
 mod assertions;
 mod calibration;
+mod collecting;
 mod corridor_defects;
 mod detectors;
 mod episodes;

@@ -72,7 +72,7 @@ fn the_last_state_of_a_cut_episode_is_the_one_after_its_last_action() {
 }
 
 #[test]
-fn the_state_is_valued_under_the_skill_that_is_held_or_the_mean_of_the_next() {
+fn the_state_is_valued_under_the_skill_that_is_held_or_one_that_is_drawn() {
     let policy = policy();
     // Skills of 8 ticks are drawn in ticks 0, 8 and 16: after tick 19 the third one has 4 ticks to go.
     let held = rollout(&policy, 8);
@@ -80,12 +80,18 @@ fn the_state_is_valued_under_the_skill_that_is_held_or_the_mean_of_the_next() {
     for (i, &row) in held.ends.cut_rows.iter().enumerate() {
         assert_eq!(held.ends.cut_z[i * 2..i * 2 + 2], held.z[row * 2..row * 2 + 2], "row {row}");
     }
-    // Skills of 5 ticks are drawn in ticks 0, 5, 10 and 15: after tick 19 the fourth has run out. The mean of the prior is 0,
-    // and nothing is drawn for it: the next episode gets what the stream gives next, so that both rollouts see the same
-    // stream.
+    // Skills of 5 ticks are drawn in ticks 0, 5, 10 and 15: after tick 19 the fourth has run out, and another one is drawn from
+    // a copy of the agent's stream. The next episode gets what the stream gives next, so that both rollouts see the same
+    // stream; and since this prior does not look at the state, it is the same skill.
     let run_out = rollout(&policy, 5);
     assert_eq!(run_out.ends.cut_rows, held.ends.cut_rows, "the policy ignores skills");
-    assert_eq!(run_out.ends.cut_z, vec![0.0; 2 * run_out.ends.cut_rows.len()]);
+    for (i, &row) in run_out.ends.cut_rows.iter().enumerate() {
+        let cut = &run_out.ends.cut_z[i * 2..i * 2 + 2];
+        assert_ne!(cut, &run_out.z[row * 2..row * 2 + 2], "row {row}: the old skill has run out");
+        if let Some(next) = run_out.z.get((row + AGENTS) * 2..(row + AGENTS) * 2 + 2) {
+            assert_eq!(cut, next, "row {row}");
+        }
+    }
     for agent in 0..AGENTS {
         let drawn = |rollout: &Rollout| {
             let mut skills: Vec<[f32; 2]> = Vec::new();

@@ -192,6 +192,29 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
 
 /// Appends one row per agent to the rollout.
 fn collect_tick(world: &mut World) {
+    let Some(policy) = world.get_resource::<ActivePolicy>().map(|active| active.policy.clone()) else {
+        // Arenas are being restored, not played.
+        return;
+    };
+    // The rollout is put back whatever happens to the tick.
+    let pushed = world.try_resource_scope(|world, mut collecting: Mut<Collecting>| {
+        let entities = world.resource::<AgentOrder>().entities().to_vec();
+        let kind = collecting.kind;
+        let cut = cut_episodes(world, &entities, &policy, &kind)?;
+        let mut final_values = vec![0.0; entities.len()];
+        for (&row, &value) in cut.agents.iter().zip(&cut.values) {
+            final_values[row] = value;
+        }
+        let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind, entities.len()))?;
+        push_tick(&mut collecting.rollout, &tick, &final_values, &cut)
+    });
+    if let Some(Err(error)) = pushed {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+}
+
+/// What each agent has seen, done and got, added to `tick`.
+fn tick_of(world: &mut World, entities: &[Entity], mut tick: AgentsTick) -> Result<AgentsTick, LearnError> {
     let mut query = world.query_filtered::<(
         &Observation,
         &ActiveSkill,
@@ -201,31 +224,13 @@ fn collect_tick(world: &mut World) {
         &Episode,
         &mut ActionLog,
     ), With<Agent>>();
-    let entities = world.resource::<AgentOrder>().entities().to_vec();
-    let Some(policy) = world.get_resource::<ActivePolicy>().map(|active| active.policy.clone()) else {
-        // Arenas are being restored, not played.
-        return;
-    };
-    let Some(mut collecting) = world.remove_resource::<Collecting>() else { return };
-    let kind = collecting.kind;
-    let cut = cut_episodes(world, &entities, &policy, &kind).unwrap_or_else(|error| {
-        world.resource_mut::<Faults>().report(error.to_string());
-        CutEpisodes::new(Vec::new(), &kind)
-    });
-    let mut final_values = vec![0.0; entities.len()];
-    for (&row, &value) in cut.agents.iter().zip(&cut.values) {
-        final_values[row] = value;
-    }
-    let mut tick = AgentsTick::new(&policy, &kind, entities.len());
-    for &entity in &entities {
+    for &entity in entities {
         let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
             continue;
         };
         observation.push_to(&mut tick.obs);
         tick.z.extend_from_slice(&skill.z);
-        if let Err(error) = tick.actions.push(&action.0) {
-            return world.resource_mut::<Faults>().report(error.to_string());
-        }
+        tick.actions.push(&action.0)?;
         tick.log_probs.push(decision.log_prob);
         tick.values.push(decision.value);
         tick.rewards.push(reward.get());
@@ -233,10 +238,7 @@ fn collect_tick(world: &mut World) {
         tick.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
         log.note(episode, &action.0);
     }
-    if let Err(error) = push_tick(&mut collecting.rollout, &tick, &final_values, &cut) {
-        world.resource_mut::<Faults>().report(error.to_string());
-    }
-    world.insert_resource(collecting);
+    Ok(tick)
 }
 
 fn push_tick(

@@ -167,7 +167,8 @@ impl Experiment {
     /// the experiment says otherwise.
     pub fn ppo_config(&self) -> PpoConfig {
         let mut config = self.ppo.clone();
-        if config.anneal_lr && self.steps_per_update() > 0 {
+        let changes = config.anneal_lr || self.score.kl_coef_end.is_some();
+        if changes && self.steps_per_update() > 0 {
             config.total_updates = config.total_updates.or_else(|| Some(self.updates()));
         }
         config

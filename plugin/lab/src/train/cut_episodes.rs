@@ -5,9 +5,10 @@ use bevy_playbot::{
     episode::{Episode, EpisodeEnd},
     observation::Observation,
     skill_prior::{ActiveSkill, SkillPrior},
+    streams::AgentStreams,
     systems::ObserveSchedule,
 };
-use playbot_learner::{LearnError, ObsKind, Observations, Policy};
+use playbot_learner::{LearnError, ObsKind, Observations, Policy, rng::normal};
 
 /// The last states of the episodes that ran out of time in one tick.
 pub(super) struct CutEpisodes {
@@ -25,8 +26,8 @@ impl CutEpisodes {
 
 /// The last state of each episode that ran out of time in this tick, with its value.
 ///
-/// The skill is the one the agent holds, or the prior's mean if it has just run out: the next draw belongs to the next
-/// episode.
+/// The skill is the one the agent holds, or one drawn as at any other end of a skill if it has just run out. That is drawn
+/// from a copy of the agent's stream: the next draw belongs to the next episode.
 pub(super) fn cut_episodes(
     world: &mut World,
     entities: &[Entity],
@@ -48,11 +49,12 @@ pub(super) fn cut_episodes(
         let skill_from = cut.z.len();
         push_state(world, entities[row], &mut cut.z, &mut cut.obs);
         let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
-        if let (false, Some(prior)) = (held, world.get_resource::<SkillPrior>()) {
-            let last = cut.obs.row(i, kind.numbers());
-            let mean = prior.prior.sample(last, 1, playbot_learner::SkillDraw::Mean, &mut |_| 0.0)?;
+        let streams = world.get::<AgentStreams>(entities[row]);
+        if let (false, Some(prior), Some(streams)) = (held, world.get_resource::<SkillPrior>(), streams) {
+            let (last, mut stream) = (cut.obs.row(i, kind.numbers()), streams.skill.clone());
+            let drawn = prior.prior.sample(last, 1, prior.draw, &mut |_| normal(&mut stream))?;
             cut.z.truncate(skill_from);
-            cut.z.extend(mean);
+            cut.z.extend(drawn);
         }
     }
     cut.values = policy.values(&cut.z, &cut.obs, cut.agents.len())?;

@@ -1,21 +1,46 @@
 //! What a graphics card does to a program that it fails: an error, not a panic.
 
 use super::is_host;
-use crate::LearnError;
+use crate::{LearnError, among_awake_workers};
 use burn::tensor::Device;
-use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::cell::{Cell, RefCell};
+use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};
+use std::sync::Once;
 
-/// Does `work`, and gives what a panic said instead of printing it.
+thread_local! {
+    /// How many guards this thread is in.
+    static DEPTH: Cell<u32> = const { Cell::new(0) };
+    /// Where its last guarded panic happened.
+    static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+/// Does `work`, and gives what a panic of this thread said, and where, instead of printing it.
 pub(super) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    let hook = take_hook();
-    set_hook(Box::new(|_| {}));
+    listen();
+    DEPTH.set(DEPTH.get() + 1);
     let result = catch_unwind(AssertUnwindSafe(work));
-    set_hook(hook);
+    DEPTH.set(DEPTH.get() - 1);
     result.map_err(|payload| {
         let words = payload.downcast_ref::<String>().map(String::as_str);
         let words = words.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no reason given");
-        words.split_whitespace().collect::<Vec<_>>().join(" ")
+        let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
+        format!("{words} (at {})", PLACE.take())
     })
+}
+
+/// Puts a hook before the one that is there, once: guards of several threads would else take each other's for it.
+fn listen() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = take_hook();
+        set_hook(Box::new(move |info: &PanicHookInfo<'_>| {
+            if DEPTH.get() == 0 {
+                return before(info);
+            }
+            let place = info.location().map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
+            PLACE.replace(place);
+        }));
+    });
 }
 
 /// Does `work` on `device`. A graphics card that is lost, or has no memory left, is an error; what computes in host memory
@@ -24,6 +49,19 @@ pub(crate) fn guarded<T>(device: &Device, work: impl FnOnce() -> Result<T, Learn
     if is_host(device) {
         return work();
     }
+    failures(work)
+}
+
+/// Does the work of an update on `device`: in host memory among workers that wait awake, on a graphics card as [`guarded`].
+pub(crate) fn update_on<T: Send>(
+    device: &Device,
+    work: impl FnOnce() -> Result<T, LearnError> + Send,
+) -> Result<T, LearnError> {
+    if is_host(device) { among_awake_workers(work) } else { failures(work) }
+}
+
+/// [`guarded`] on a graphics card.
+fn failures<T>(work: impl FnOnce() -> Result<T, LearnError>) -> Result<T, LearnError> {
     match caught(work) {
         Ok(Err(LearnError::Device(said))) => Err(LearnError::DeviceFailed { reason: first_cause(&said) }),
         Ok(result) => result,
@@ -47,9 +85,33 @@ mod tests {
     #[test]
     fn panics_become_words() {
         assert_eq!(caught(|| 7), Ok(7));
-        assert_eq!(caught(|| panic!("out of\n  memory")), Err::<(), _>("out of memory".to_owned()));
-        let number = 3;
-        assert_eq!(caught(|| panic!("{number} left")), Err::<(), _>("3 left".to_owned()));
+        let said = |work: fn()| caught(work).expect_err("it panics");
+        assert!(said(|| panic!("out of\n  memory")).starts_with("out of memory (at "));
+        let here = said(|| panic!("{} left", 3));
+        assert!(here.starts_with("3 left (at ") && here.contains("guard.rs:"), "{here}");
+    }
+
+    #[test]
+    fn whatever_a_card_does_is_one_kind_of_error() {
+        let reason = |work: fn() -> Result<(), LearnError>| match failures(work) {
+            Err(LearnError::DeviceFailed { reason }) => reason,
+            other => panic!("{other:?}"),
+        };
+        assert!(reason(|| panic!("the device was lost")).starts_with("the device was lost"));
+        assert_eq!(reason(|| Err(LearnError::Device("Caused by:\n  no memory".to_owned()))), "no memory");
+        let other = failures::<()>(|| Err(LearnError::Config("too few".to_owned())));
+        assert!(matches!(other, Err(LearnError::Config(_))), "an error of our own stays what it is");
+    }
+
+    #[test]
+    fn guards_of_several_threads_leave_the_hook_alone() {
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| (0..50).for_each(|_| assert!(caught(|| panic!("here")).is_err())));
+            }
+        });
+        // A panic outside of them still reaches whoever listened before, which here is the harness.
+        assert_eq!(DEPTH.get(), 0);
     }
 
     #[test]

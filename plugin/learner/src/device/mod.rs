@@ -6,6 +6,6 @@ mod probe;
 
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 use guard::caught;
-pub(crate) use guard::guarded;
+pub(crate) use guard::{guarded, update_on};
 pub(crate) use kind::is_host;
 pub use kind::{DeviceKind, UnknownDevice};

@@ -56,12 +56,14 @@ impl Batch<'_> {
         score: Option<&ScoreConfig>,
         device: &'b Device,
     ) -> impl Iterator<Item = (Minibatch, f64)> + 'b {
+        let start = Instant::now();
         let mut advantages: Vec<f32> = rows.iter().map(|&r| self.advantages[r]).collect();
         if self.norm_adv {
             normalize_advantages(&mut advantages);
         }
         // The other forms of the penalty are no means over rows.
         let is_mean = score.is_none_or(|score| score.penalty == PenaltyForm::Mean);
+        self.gathering.set(self.gathering.get() + start.elapsed());
         let most = cnn.filter(|_| is_mean).map_or(rows.len(), ImageNet::images_at_a_time);
         (0..rows.len()).step_by(most.max(1)).map(move |first| {
             let start = Instant::now();

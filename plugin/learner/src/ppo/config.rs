@@ -13,7 +13,7 @@ pub struct PpoConfig {
     pub lr: f64,
     /// Whether the learning rate falls linearly to 0 over `total_updates`.
     pub anneal_lr: bool,
-    /// Updates of the whole run; needed only by `anneal_lr`.
+    /// Updates of the whole run; needed only by `anneal_lr` and by SCORE's `kl_coef_end`.
     pub total_updates: Option<u64>,
     /// Steps per environment in a rollout.
     pub num_steps: usize,
@@ -58,6 +58,14 @@ pub struct PpoConfig {
     pub cnn: CnnKind,
     /// ε of Adam.
     pub adam_eps: f64,
+    /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
+    pub weight_decay: f64,
+    /// Updates in which only the critic learns: a critic that knows nothing yet would drive a policy that starts as a copy of
+    /// the decoder away from it.
+    pub critic_warmup: u64,
+    /// Whether the critic's loss trains the convolutions over images, too, or reads what they make for the policy. It never
+    /// does while the critic warms up.
+    pub critic_trains_cnn: bool,
 }
 
 impl Default for PpoConfig {
@@ -86,6 +94,9 @@ impl Default for PpoConfig {
             activation: Activation::Relu,
             cnn: CnnKind::default(),
             adam_eps: 1e-5,
+            weight_decay: 0.0,
+            critic_warmup: 0,
+            critic_trains_cnn: true,
         }
     }
 }
@@ -120,6 +131,9 @@ impl PpoConfig {
         let weights = [("vf_coef", self.vf_coef), ("ent_coef", self.ent_coef)];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !x.is_finite()) {
             return bad(format!("ppo {name} must be finite, not {x}"));
+        }
+        if !(self.weight_decay >= 0.0 && self.weight_decay.is_finite()) {
+            return bad(format!("ppo weight_decay must not be negative, but is {}", self.weight_decay));
         }
         if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
             return bad("ppo anneal_lr needs total_updates".into());

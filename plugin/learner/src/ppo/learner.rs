@@ -1,6 +1,7 @@
 //! The learner: PPO, and SCORE-PPO if it is given a skill model.
 
 use super::{PpoConfig, PpoNets};
+use crate::device::guarded;
 use crate::file::FileKind;
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
 use crate::nn::{Adam, AdamConfig, tracked};
@@ -63,7 +64,7 @@ impl PpoLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         let base = Self::new_base(&config, spec, teacher, seed, device)?;
-        let nets = PpoNets::fresh(&config, &base)?;
+        let nets = guarded(&base.device.plain(), || PpoNets::fresh(&config, &base))?;
         Ok(Self::with_nets(config, base, &nets))
     }
 
@@ -84,7 +85,8 @@ impl PpoLearner {
     }
 
     fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets) -> Self {
-        let adam = Adam::new(AdamConfig { eps: config.adam_eps, ..AdamConfig::default() });
+        let PpoConfig { adam_eps: eps, weight_decay, .. } = config;
+        let adam = Adam::new(AdamConfig { eps, weight_decay, ..AdamConfig::default() });
         Self { config, base, nets: tracked(nets), adam }
     }
 

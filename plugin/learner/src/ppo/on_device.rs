@@ -2,7 +2,7 @@
 
 use super::batch::Batch;
 use super::objective::{PpoBatch, PpoLoss};
-use super::step::{Losses, Minibatch};
+use super::step::{Losses, Minibatch, Moment};
 use super::{PpoConfig, PpoNets, StepMetrics};
 use crate::nn::{ActionBatch, Adam, Dist, PackedPixels, check_loss, host, matrix, vector};
 use crate::policy::NetInput;
@@ -128,9 +128,9 @@ impl Reports {
         batch: &Minibatch,
         config: &PpoConfig,
         score: Option<&ScoreConfig>,
-        lr: f64,
+        moment: &Moment,
     ) -> Result<(), LearnError> {
-        let Losses { ppo, penalty, total } = Losses::of(nets, batch, config, score)?;
+        let Losses { ppo, penalty, total } = Losses::of(nets, batch, config, score, moment.is_warming_up)?;
         let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
         let zero = || Tensor::zeros([1], &log_ratio.device().inner());
         let (kl, term) = match penalty {
@@ -143,7 +143,7 @@ impl Reports {
         let clipped = moved.abs().greater_elem(config.clip).float().mean();
         let losses = [policy_loss, value_loss, entropy].map(Tensor::inner);
         let whole = total.clone().inner();
-        let norm = adam.step_on_device(nets, total.backward(), lr, config.max_grad_norm);
+        let norm = adam.step_on_device(nets, total.backward(), moment.lr, config.max_grad_norm);
         let [policy_loss, value_loss, entropy] = losses;
         let all = vec![policy_loss, value_loss, entropy, kl, term, whole, approx_kl, clipped, norm];
         self.numbers.push(Tensor::cat(all, 0));
@@ -154,7 +154,8 @@ impl Reports {
     /// The sum over all steps, read at once; `before` optimizer steps were made before the first.
     ///
     /// # Errors
-    /// As [`super::gradient_step`], of the first step that has any.
+    /// [`LearnError::NotFinite`] or [`LearnError::Exploded`] for the first step whose losses or gradient ran away; which
+    /// parameter it was is not known here. Weights that the last step spoils show in the next update.
     pub(super) fn sum(self, before: u64) -> Result<StepMetrics, LearnError> {
         let mut sum = StepMetrics::default();
         let numbers = host(Tensor::cat(self.numbers, 0))?;

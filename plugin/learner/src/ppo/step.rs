@@ -29,7 +29,8 @@ pub(super) struct Losses {
 }
 
 impl Losses {
-    /// Of `nets` for `batch`. With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added.
+    /// Of `nets` for `batch`. With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added. While the
+    /// critic warms up its loss is all that is minimised.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the networks do not read such observations.
@@ -38,17 +39,24 @@ impl Losses {
         batch: &Minibatch,
         config: &PpoConfig,
         score: Option<&ScoreConfig>,
+        is_warming_up: bool,
     ) -> Result<Self, LearnError> {
         let inputs = nets.actor.join(&batch.inputs)?;
         let dist = nets.actor.forward(inputs.clone());
-        let values = nets.critic.forward(inputs);
+        let is_apart = is_warming_up || !config.critic_trains_cnn;
+        let values = nets.critic.forward(if is_apart { inputs.detach() } else { inputs });
         let ppo = ppo_loss(&dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
-        let mut total =
-            ppo.policy_loss.clone() - ppo.entropy.clone() * config.ent_coef + ppo.value_loss.clone() * config.vf_coef;
+        let of_critic = ppo.value_loss.clone() * config.vf_coef;
+        let mut total = match is_warming_up {
+            true => of_critic,
+            false => ppo.policy_loss.clone() - ppo.entropy.clone() * config.ent_coef + of_critic,
+        };
         let mut penalised = None;
         if let (Some(teacher), Some(score)) = (&batch.teacher, score) {
             let found = penalty(score, &teacher.dist, &dist, teacher.confidence.clone())?;
-            total = total + found.term.clone() * score.kl_coef;
+            if !is_warming_up {
+                total = total + found.term.clone() * score.kl_coef;
+            }
             penalised = Some(found);
         }
         Ok(Self { ppo, penalty: penalised, total })
@@ -90,7 +98,17 @@ pub fn gradient_step(
     score: Option<&ScoreConfig>,
     lr: f64,
 ) -> Result<StepMetrics, LearnError> {
-    step_in_parts(nets, adam, std::iter::once((batch.clone(), 1.0)), config, score, lr)
+    let part = std::iter::once((batch.clone(), 1.0));
+    step_in_parts(nets, adam, part, config, score, &Moment { lr, is_warming_up: false })
+}
+
+/// What changes from update to update.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    /// Learning rate.
+    pub(super) lr: f64,
+    /// Whether only the critic learns.
+    pub(super) is_warming_up: bool,
 }
 
 /// [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.
@@ -100,12 +118,12 @@ pub(super) fn step_in_parts(
     parts: impl Iterator<Item = (Minibatch, f64)>,
     config: &PpoConfig,
     score: Option<&ScoreConfig>,
-    lr: f64,
+    moment: &Moment,
 ) -> Result<StepMetrics, LearnError> {
     let (mut metrics, mut sum) = (StepMetrics::default(), NamedGrads::default());
     let steps = adam.steps();
     for (part, share) in parts {
-        let losses = Losses::of(nets, &part, config, score)?;
+        let losses = Losses::of(nets, &part, config, score, moment.is_warming_up)?;
         metrics.add(&losses.metrics(&part, config, steps)?, share);
         // A whole minibatch is not multiplied by 1.
         let total = if share < 1.0 { losses.total * share } else { losses.total };
@@ -113,6 +131,6 @@ pub(super) fn step_in_parts(
     }
     let (norm, scale) = sum.clip_factor(config.max_grad_norm, steps)?;
     metrics.grad_norm = norm;
-    adam.step(nets, "", &sum, lr, scale)?;
+    adam.step(nets, "", &sum, moment.lr, scale)?;
     Ok(metrics)
 }

@@ -4,14 +4,15 @@
 use super::batch::{Batch, minibatches};
 use super::objective::gae;
 use super::on_device::{Reports, SentRollout};
-use super::step::step_in_parts;
+use super::step::{Moment, step_in_parts};
 use super::{PpoLearner, StepMetrics, UpdateMetrics, explained_variance};
-use crate::device::{guarded, is_host};
+use crate::device::{is_host, update_on};
 use crate::policy::StateBatch;
 use crate::rng::ChaCha8Rng;
-use crate::score::TeacherOutput;
-use crate::{LearnError, Observations, Rollout, among_awake_workers};
+use crate::score::{ScoreConfig, TeacherOutput};
+use crate::{LearnError, Observations, Rollout};
 use std::cell::Cell;
+use std::time::Instant;
 
 impl PpoLearner {
     /// Trains on a rollout: epochs × minibatches gradient steps.
@@ -22,7 +23,7 @@ impl PpoLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then, as after [`LearnError::DeviceFailed`].
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
-        guarded(&self.base.device.plain(), || among_awake_workers(|| self.update_here(rollout)))
+        update_on(&self.base.device.plain(), || self.update_here(rollout))
     }
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
@@ -45,11 +46,13 @@ impl PpoLearner {
             gathering: Cell::default(),
         };
         let lr = config.lr_at(self.base.updates);
+        let moment = Moment { lr, is_warming_up: self.base.updates < config.critic_warmup };
+        let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
         let sum = if is_host(&self.base.device.plain()) {
-            self.steps(&batch, &mut rng, lr)?
+            self.steps(&batch, &mut rng, score.as_ref(), &moment)?
         } else {
-            self.steps_on_device(&batch, &mut rng, lr)?
+            self.steps_on_device(&batch, &mut rng, score.as_ref(), &moment)?
         };
         self.base.updates += 1;
         self.base.gathering += batch.gathering.get();
@@ -60,25 +63,37 @@ impl PpoLearner {
         Ok(UpdateMetrics::mean(&sum, steps, batch.teacher.is_some(), explained_variance, lr))
     }
 
-    fn steps(&mut self, batch: &Batch<'_>, rng: &mut ChaCha8Rng, lr: f64) -> Result<StepMetrics, LearnError> {
+    fn steps(
+        &mut self,
+        batch: &Batch<'_>,
+        rng: &mut ChaCha8Rng,
+        score: Option<&ScoreConfig>,
+        moment: &Moment,
+    ) -> Result<StepMetrics, LearnError> {
         let device = self.base.device.plain();
         let mut sum = StepMetrics::default();
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
-            let score = self.base.score_config();
             let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), score, &device);
-            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, score, lr)?;
+            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, score, moment)?;
             sum.add(&step, 1.0);
         }
         Ok(sum)
     }
 
-    fn steps_on_device(&mut self, batch: &Batch<'_>, rng: &mut ChaCha8Rng, lr: f64) -> Result<StepMetrics, LearnError> {
+    fn steps_on_device(
+        &mut self,
+        batch: &Batch<'_>,
+        rng: &mut ChaCha8Rng,
+        score: Option<&ScoreConfig>,
+        moment: &Moment,
+    ) -> Result<StepMetrics, LearnError> {
+        let start = Instant::now();
         let sent = SentRollout::send(batch, &self.base.device.plain());
+        batch.gathering.set(batch.gathering.get() + start.elapsed());
         let (mut reports, before) = (Reports::default(), self.adam.steps());
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
             let minibatch = sent.minibatch(&rows);
-            let score = self.base.score_config();
-            reports.step(&mut self.nets, &mut self.adam, &minibatch, &self.config, score, lr)?;
+            reports.step(&mut self.nets, &mut self.adam, &minibatch, &self.config, score, moment)?;
         }
         reports.sum(before)
     }

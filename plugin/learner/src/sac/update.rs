@@ -4,10 +4,10 @@
 use super::metrics::MetricSums;
 use super::transitions::check_ends;
 use super::{EntropyCoef, SacBatch, SacLearner, SacMetrics, actor_step, critic_step, soft_update, temperature_step};
-use crate::device::guarded;
+use crate::device::update_on;
 use crate::nn::matrix;
 use crate::rng::{ChaCha8Rng, normal};
-use crate::{ActionSpace, LearnError, Rollout, among_awake_workers};
+use crate::{ActionSpace, LearnError, Rollout};
 use burn::tensor::Tensor;
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ impl SacLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
-        guarded(&self.base.device.plain(), || among_awake_workers(|| self.update_here(rollout)))
+        update_on(&self.base.device.plain(), || self.update_here(rollout))
     }
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {

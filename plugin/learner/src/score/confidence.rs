@@ -29,7 +29,7 @@ pub fn penalty_weights<R: Rng + ?Sized>(
     actions: &Actions,
     rng: &mut R,
 ) -> Result<Vec<f32>, LearnError> {
-    match (config.penalty, config.confidence) {
+    match (config.penalty, config.confidence.resolved(decoder.log_std.is_some())) {
         (PenaltyForm::LegacyD4rl, _) => marginal_densities(decoder, actions),
         (PenaltyForm::LegacyCoinrun, _) => confidences(ConfidenceKind::PolicyAction, decoder, actions),
         (PenaltyForm::Mean, ConfidenceKind::OwnSample) => {
@@ -49,7 +49,7 @@ pub fn penalty_weights<R: Rng + ?Sized>(
 /// # Errors
 /// [`LearnError::Action`] or [`LearnError::Shape`] if the actions do not fit the decoder.
 pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) -> Result<Vec<f32>, LearnError> {
-    let dim = decoder.dim;
+    let (dim, kind) = (decoder.dim, kind.resolved(decoder.log_std.is_some()));
     let rows = decoder.head.chunks_exact(dim);
     if kind == ConfidenceKind::Off {
         return Ok(vec![1.0; rows.len()]);
@@ -121,6 +121,18 @@ mod tests {
         close(&confidence(ConfidenceKind::BoundedDensity), &[(-2.5f64).exp(), 1.0]);
         let top = 1.0 / (2.0 * std::f64::consts::TAU);
         close(&confidence(ConfidenceKind::Density), &[top * (-2.5f64).exp(), top]);
+    }
+
+    #[test]
+    fn by_default_a_gaussian_tells_states_apart() {
+        let decoder = HostDist { dim: 1, head: vec![0.0, 0.0], log_std: Some(vec![0.0, 0.0]) };
+        let actions = Actions::Continuous { dim: 1, values: vec![0.0, 2.0] };
+        let mut rng = Streams::new(1).stream("own", 0);
+        let weights = penalty_weights(&ScoreConfig::default(), &decoder, &actions, &mut rng).expect("they fit");
+        close(&weights, &[1.0, (-2.0f64).exp()]);
+        let own = ConfidenceKind::OwnSample;
+        assert_eq!(ConfidenceKind::Auto.resolved(false), own);
+        assert_eq!(own.resolved(true), own, "who asks for it gets it");
     }
 
     #[test]

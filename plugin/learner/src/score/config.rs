@@ -16,6 +16,9 @@ pub enum KlDirection {
 /// The weight of each row's divergence, α in the paper: how sure the decoder is of an action.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfidenceKind {
+    /// [`Self::OwnSample`] for discrete actions, as in the paper, and [`Self::BoundedDensity`] for continuous ones, where
+    /// that would tell nothing.
+    Auto,
     /// Always 1.
     Off,
     /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous. The latter
@@ -29,6 +32,18 @@ pub enum ConfidenceKind {
     /// That density divided by the largest one of the row, in 0..1: p(a) / max p, or exp(-½ Σ squared z-scores) if
     /// continuous.
     BoundedDensity,
+}
+
+impl ConfidenceKind {
+    /// What [`Self::Auto`] stands for with such actions; any other kind itself.
+    #[must_use]
+    pub fn resolved(self, is_continuous: bool) -> Self {
+        match (self, is_continuous) {
+            (Self::Auto, true) => Self::BoundedDensity,
+            (Self::Auto, false) => Self::OwnSample,
+            (kind, _) => kind,
+        }
+    }
 }
 
 /// How the divergences of a minibatch become one number, which times kl_coef is added to the loss.
@@ -68,6 +83,9 @@ pub struct ScoreConfig {
     pub kl: bool,
     /// Weight of the penalty. The paper gives none.
     pub kl_coef: f64,
+    /// Where PPO takes `kl_coef` to, linearly over the whole run; it stays where it is if `None`. The decoder holds the
+    /// hesitation of its demonstrators, which a policy that has learned needs no more.
+    pub kl_coef_end: Option<f64>,
     /// Which divergence is penalised.
     pub kl_direction: KlDirection,
     /// The weight of each row, α in the paper.
@@ -90,8 +108,9 @@ impl Default for ScoreConfig {
             init_from_decoder: true,
             kl: true,
             kl_coef: 0.1,
+            kl_coef_end: None,
             kl_direction: KlDirection::DecoderPolicy,
-            confidence: ConfidenceKind::OwnSample,
+            confidence: ConfidenceKind::Auto,
             penalty: PenaltyForm::Mean,
             skill_draw: SkillDraw::Sample,
             horizon: 8,
@@ -113,8 +132,9 @@ impl ScoreConfig {
         if self.horizon == 0 {
             return bad("score horizon must be at least 1".into());
         }
-        if !(self.kl_coef >= 0.0 && self.kl_coef.is_finite()) {
-            return bad(format!("score kl_coef must not be negative, but is {}", self.kl_coef));
+        let coefs = [("kl_coef", self.kl_coef), ("kl_coef_end", self.kl_coef_end.unwrap_or(0.0))];
+        if let Some((name, x)) = coefs.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+            return bad(format!("score {name} must not be negative, but is {x}"));
         }
         Ok(())
     }
@@ -135,11 +155,32 @@ impl ScoreConfig {
         }
     }
 
+    /// The settings of update number `update`, from 0, of `total`: with the weight that the penalty has come to.
+    pub(crate) fn at(&self, update: u64, total: Option<u64>) -> Self {
+        let share = total.map_or(0.0, |total| (update as f64 / total.max(1) as f64).min(1.0));
+        let end = self.kl_coef_end.unwrap_or(self.kl_coef);
+        Self { kl_coef: self.kl_coef + share * (end - self.kl_coef), ..self.clone() }
+    }
+
     /// The divergence that the penalty measures.
     pub fn direction(&self) -> KlDirection {
         match self.penalty {
             PenaltyForm::Mean => self.kl_direction,
             PenaltyForm::LegacyD4rl | PenaltyForm::LegacyCoinrun => KlDirection::PolicyDecoder,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_weight_goes_linearly_to_its_end_and_stays_there() {
+        let score = ScoreConfig { kl_coef: 0.4, kl_coef_end: Some(0.0), ..ScoreConfig::default() };
+        let at = |update, total| score.at(update, total).kl_coef;
+        assert_eq!([at(0, Some(4)), at(2, Some(4)), at(4, Some(4)), at(9, Some(4))], [0.4, 0.2, 0.0, 0.0]);
+        assert_eq!(at(3, None), 0.4, "nobody knows when the end is");
+        assert_eq!(ScoreConfig::default().at(3, Some(4)), ScoreConfig::default());
     }
 }

@@ -91,12 +91,14 @@ impl Prior {
                 let obs = obs.into();
                 obs.check("observations of the prior", kind, n)?;
                 let inputs = InputBuilder { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
-                let mut x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
-                if n == 1 {
-                    // As in `Policy`: a single row would be summed in another order.
-                    x = x.repeat_dim(0, 2);
-                }
-                let dist = guarded(device, || actor.forward(x).to_host())?;
+                let dist = guarded(device, || {
+                    let mut x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
+                    if n == 1 {
+                        // As in `Policy`: a single row would be summed in another order.
+                        x = x.repeat_dim(0, 2);
+                    }
+                    actor.forward(x).to_host()
+                })?;
                 (dist.head, dist.log_std.unwrap_or_default())
             }
         };

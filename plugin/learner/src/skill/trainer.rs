@@ -1,13 +1,13 @@
 //! Training of the skill model.
 
 use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
-use crate::device::{guarded, is_host};
+use crate::device::{is_host, update_on};
 use crate::nn::{
     ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, host, matrix, scalar, tracked,
 };
 use crate::norm::ObsStats;
 use crate::rng::{Streams, normal};
-use crate::{Actions, DeviceKind, LearnError, Observations, among_awake_workers};
+use crate::{Actions, DeviceKind, LearnError, Observations};
 use burn::tensor::Tensor;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -150,7 +150,7 @@ impl SkillTrainer {
     pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
         let end = (self.next + self.config.batch).min(self.windows.len());
         let windows = self.windows[self.next..end].to_vec();
-        let metrics = guarded(&self.device.plain(), || among_awake_workers(|| self.step(&windows)))?;
+        let metrics = update_on(&self.device.plain(), || self.step(&windows))?;
         self.sums.add(&metrics);
         self.next = end;
         if end == self.windows.len() {

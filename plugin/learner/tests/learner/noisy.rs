@@ -2,8 +2,8 @@
 
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, Learner, PpoConfig, PpoLearner, Rollout,
-    ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, StdKind,
+    ActionSpace, Actions, ConfidenceKind, Dataset, DemoEpisode, DeviceKind, LearnError, Learner, PpoConfig, PpoLearner,
+    Rollout, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, StdKind,
 };
 use std::ops::ControlFlow;
 
@@ -50,7 +50,8 @@ fn the_decoder_is_as_noisy_as_the_players_and_so_is_its_copy() {
         }
 
         let ppo = PpoConfig { lr: 1e-7, epochs: 1, minibatches: 1, ..PpoConfig::default() };
-        let learner = PpoLearner::with_skill(ppo, ScoreConfig::default(), &model, 1, DeviceKind::Flex);
+        let score = ScoreConfig { confidence: ConfidenceKind::OwnSample, ..ScoreConfig::default() };
+        let learner = PpoLearner::with_skill(ppo, score, &model, 1, DeviceKind::Flex);
         let mut learner = learner.expect("good settings");
         let played = learner.policy().forward(&z, &obs, n).expect("finite");
         assert_eq!((&played.head, &played.log_std), (&decoded.head, &decoded.log_std), "{decoder_std:?}");

@@ -214,3 +214,63 @@ fn switches_that_do_not_go_together_are_refused() {
     let error = SacLearner::with_skill(bad, base(), &model, 1, DeviceKind::Flex).expect_err("raw observations");
     assert!(error.to_string().contains("norm_obs"), "{error}");
 }
+
+/// Where each policy is after so many updates.
+fn heads(learner: &PpoLearner, rollout: &Rollout) -> (Vec<f32>, Vec<f32>) {
+    let output = learner.policy().forward(&rollout.z, &rollout.obs, rollout.rows()).expect("finite");
+    (output.head, output.values)
+}
+
+#[test]
+fn while_the_critic_warms_up_the_policy_stays_where_it_is() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    let config = PpoConfig { critic_warmup: 2, ..corridor::config() };
+    let mut learner =
+        PpoLearner::with_skill(config, ScoreConfig::default(), &model, 1, DeviceKind::Flex).expect("good");
+    let (start, opinion) = heads(&learner, &rollout);
+    for _ in 0..2 {
+        let metrics = learner.update(&rollout).expect("finite");
+        assert_eq!(metrics.decoder_kl, Some(0.0));
+    }
+    let (head, values) = heads(&learner, &rollout);
+    assert!(head == start && values != opinion, "only the critic learns");
+    learner.update(&rollout).expect("finite");
+    assert_ne!(heads(&learner, &rollout).0, start, "and then both do");
+}
+
+#[test]
+fn the_penalty_goes_where_it_is_sent() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    // After two updates of two: in the second the weight is half way to the end.
+    let after = |kl_coef, kl_coef_end| {
+        let config = PpoConfig { total_updates: Some(2), epochs: 1, minibatches: 1, lr: 0.05, ..corridor::config() };
+        let score = ScoreConfig { kl_coef, kl_coef_end, ..ScoreConfig::default() };
+        let mut learner = PpoLearner::with_skill(config, score, &model, 1, DeviceKind::Flex).expect("good");
+        let of_decoder = [0, 1, 2].map(|_| learner.update(&rollout).expect("finite").decoder_kl.expect("penalised"));
+        of_decoder[2]
+    };
+    let (kept, freed) = (after(10.0, None), after(10.0, Some(0.0)));
+    assert!(freed > kept, "{freed} is further from the decoder than {kept}");
+    assert_eq!(after(10.0, Some(10.0)), kept);
+    let bad = ScoreConfig { kl_coef_end: Some(-1.0), ..ScoreConfig::default() };
+    assert!(bad.validate().expect_err("negative").to_string().contains("kl_coef_end"));
+}
+
+#[test]
+fn weights_decay_if_they_shall() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    let after = |weight_decay| {
+        let config = PpoConfig { weight_decay, lr: 1e-6, ..corridor::config() };
+        let score = ScoreConfig::default();
+        let mut learner = PpoLearner::with_skill(config, score, &model, 1, DeviceKind::Flex).expect("good");
+        learner.update(&rollout).expect("finite");
+        heads(&learner, &rollout).1.iter().map(|x| x.abs()).sum::<f32>()
+    };
+    let (plain, decayed) = (after(0.0), after(1e5));
+    assert!(decayed < 0.9 * plain, "{decayed} of {plain}");
+    let bad = PpoConfig { weight_decay: -1.0, ..PpoConfig::default() };
+    assert!(bad.validate().expect_err("negative").to_string().contains("weight_decay"));
+}

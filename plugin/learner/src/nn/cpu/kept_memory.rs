@@ -22,7 +22,7 @@ impl KeptMemory {
         let fits = |numbers: &Vec<f32>| (len.max(LEAST)..=2 * len).contains(&numbers.capacity());
         let places = (0..waiting.len()).filter(|place| fits(&waiting[*place]));
         let place = places.min_by_key(|place| waiting[*place].capacity());
-        let found = place.map(|place| waiting.swap_remove(place));
+        let found = place.map(|place| waiting.remove(place));
         drop(waiting);
         let mut numbers = found.unwrap_or_else(|| vec![0.0; len]);
         numbers.resize(len, 0.0);
@@ -47,10 +47,10 @@ impl Drop for KeptMemory {
         }
         let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
         waiting.push(std::mem::take(&mut self.0));
-        if waiting.len() > MOST {
-            // The one that has waited longest: nobody asks for its size any more.
-            waiting.remove(0);
-        }
+        // The one that has waited longest: nobody asks for its size any more.
+        let unwanted = (waiting.len() > MOST).then(|| waiting.remove(0));
+        drop(waiting);
+        drop(unwanted);
     }
 }
 

@@ -1,5 +1,5 @@
-//! Loops of our own for the backends whose numbers are in host memory: tanh, dense layers, the recurrent part of a GRU layer,
-//! and the convolutions of an image encoder.
+//! Loops of our own for the backends whose numbers are in host memory: tanh and recurrent layers; and, for flex alone, dense
+//! layers and the convolutions of an image encoder.
 
 pub(in crate::nn) mod dense;
 pub(in crate::nn) mod fast_math;

@@ -127,9 +127,7 @@ pub(super) fn column_sums<S: Simd>(y: &[f32], places: &[usize], sums: &mut [Lane
             let y = &y[block * LANES..];
             let mut total = *sums;
             for &place in places {
-                if let Some(y) = y[place..].first_chunk::<LANES>() {
-                    total.iter_mut().zip(y).for_each(|(sum, y)| *sum += y);
-                }
+                total.iter_mut().zip(lanes_at(y, place)).for_each(|(sum, y)| *sum += y);
             }
             *sums = total;
         }

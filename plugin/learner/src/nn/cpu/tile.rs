@@ -2,7 +2,7 @@
 //! goes.
 //!
 //! Each sum is made by fused multiply-adds in an order of its own: it does not depend on what else is in the tile, on
-//! the width of vectors, or on threads.
+//! the width of vectors, or on threads. A machine without such instructions rounds twice, and gets other last bits.
 
 use macerator::{Scalar, Simd, VFma};
 

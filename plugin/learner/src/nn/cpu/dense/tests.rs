@@ -1,9 +1,9 @@
 //! The operation against plain tensor operations.
 
 use super::{Dense, dense};
-use crate::DeviceKind;
 use crate::nn::{Activation, host, matrix, vector};
 use crate::rng::{ChaCha8Rng, Streams, below, normal};
+use crate::{DeviceKind, among_awake_workers};
 use burn::tensor::{Device, Tensor, module::linear};
 use rayon::ThreadPoolBuilder;
 
@@ -119,7 +119,7 @@ fn a_row_does_not_depend_on_the_others_and_nothing_on_threads() {
     for case in cases() {
         let on = |threads: usize| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| case.run(own))
+            pool.install(|| among_awake_workers(|| case.run(own)))
         };
         let alone = on(1);
         assert!(alone == on(3), "{:?}", case.widths);

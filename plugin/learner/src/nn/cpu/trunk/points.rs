@@ -11,6 +11,7 @@ use std::ops::Range;
 pub(super) const POINTS: usize = 16;
 /// A side of it.
 const SIDE: usize = 4;
+
 /// Some rows of the tiles of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Strip {
@@ -105,7 +106,7 @@ pub(super) fn transform_seen<S: Simd>(x: &[f32], grid: Grid, strip: Strip, v: &m
 
 /// A y of a column: (y₀, y₀ + y₁, y₀ − y₁, −y₁).
 #[inline(always)]
-fn splanes_at(y0: &Lanes, y1: &Lanes) -> [Lanes; SIDE] {
+fn spread(y0: &Lanes, y1: &Lanes) -> [Lanes; SIDE] {
     [*y0, plus(y0, y1), minus(y0, y1), minus(&[0.0; LANES], y1)]
 }
 
@@ -120,11 +121,11 @@ pub(super) fn transform_gradient<S: Simd>(grad: &[f32], grid: Grid, strip: Strip
             for tx in 0..across {
                 for first in (0..channels).step_by(LANES) {
                     let from = &grad[grid.at(2 * ty, 2 * tx) + first..];
-                    let left = splanes_at(lanes_at(from, 0), lanes_at(from, row));
-                    let right = splanes_at(lanes_at(from, channels), lanes_at(from, row + channels));
+                    let left = spread(lanes_at(from, 0), lanes_at(from, row));
+                    let right = spread(lanes_at(from, channels), lanes_at(from, row + channels));
                     let to = &mut v[(number * across + tx) * channels + first..][..(POINTS - 1) * step + LANES];
                     for i in 0..SIDE {
-                        let points = splanes_at(&left[i], &right[i]);
+                        let points = spread(&left[i], &right[i]);
                         for j in 0..SIDE {
                             to[(i * SIDE + j) * step..][..LANES].copy_from_slice(&points[j]);
                         }

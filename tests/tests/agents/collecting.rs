@@ -1,0 +1,46 @@
+//! What becomes of a rollout when a game breaks its contract in the middle of it.
+
+use bevy::prelude::*;
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{prelude::*, train::collect::Collector};
+use playbot_learner::PpoConfig;
+use playbot_tests::{as_corridor, corridor_plugin, training::untrained};
+
+/// A corridor that once puts an action of another kind in the place of the one that was decided.
+struct Meddling;
+
+impl Game for Meddling {
+    as_corridor! {
+        fn name() -> &'static str;
+        fn version() -> u32;
+        fn modes() -> &'static [&'static str];
+        fn tick_hz() -> f64;
+        fn actions() -> ActionSpace;
+        fn observation() -> ObservationSpace;
+        fn spawn_agent(world: &mut World, index: u32) -> Entity;
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        corridor_plugin(app);
+        app.add_systems(FixedUpdate, meddle);
+    }
+}
+
+fn meddle(mut ticks: Local<u32>, mut actions: Query<&mut Action>) {
+    *ticks += 1;
+    if *ticks == 3 {
+        actions.iter_mut().for_each(|mut action| action.0 = ActionValue::Continuous(vec![0.5]));
+    }
+}
+
+#[test]
+fn a_collector_that_met_a_fault_goes_on() {
+    let observation_config = ObservationConfig::default();
+    let split: LevelSplit = "plain:0..7".parse().expect("a split");
+    let mut collector = Collector::new(&Meddling, &split, &observation_config, 1, 0, 2, None).expect("can be seen");
+    let policy = untrained(&Meddling, &observation_config, PpoConfig { hidden: vec![8], ..PpoConfig::default() });
+    let fault = collector.collect(&policy, 0, 10).expect_err("the action is of another kind").to_string();
+    assert!(fault.contains("action"), "{fault}");
+    let (rollout, _) = collector.collect(&policy, 0, 10).expect("the game meddles no more");
+    assert_eq!((rollout.steps, rollout.rewards.len()), (10, 20));
+}
