@@ -77,7 +77,7 @@ const MAZES: [(&str, &[&str]); 10] = [
     ("antmaze-xl", &["score-ppo", "sac", "ppo"]),
     ("antmaze-to-large", &["score-medium", "score-large", "ppo-medium"]),
     ("antmaze-to-xl", &["score-medium", "score-large", "score-xl", "ppo-large"]),
-    ("antmaze-ablation", &["score-ppo", "no-init", "no-kl", "no-alpha", "ppo"]),
+    ("antmaze-ablation", &["score-ppo", "no-init", "no-kl", "no-alpha", "own-sample-alpha", "ppo"]),
     ("antmaze-random", &["score-ppo", "ppo", "bc"]),
     ("maze2d-medium", &["score-ppo", "sac", "ppo"]),
     ("maze2d-large", &["score-ppo", "sac", "ppo"]),

@@ -104,6 +104,7 @@ fn a_training_goes_on_from_its_checkpoint_as_it_went_on_then() {
 fn a_training_starts_from_a_skill_model() {
     let folder = older();
     let args = ["train", "--experiment", "small.ron", "--skills", "skills.safetensors", "--run", "again"];
-    done(folder.path(), &args);
+    // The weight of the penalty that was usual then.
+    done(folder.path(), &[&args[..], &["--set", "score.alpha=OwnSample"]].concat());
     trained_as_then(folder.path(), "again", &read(folder.path(), "run/metrics.jsonl"));
 }

@@ -63,6 +63,21 @@ fn runs_are_listed_shown_and_compared() {
 }
 
 #[test]
+fn a_run_goes_on_where_there_is_no_such_device_any_more() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let settings = r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", demos: "none", steps: 256, arenas: 8,
+        worlds: 2, ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]))"#;
+    fs::write(folder.join("a.ron"), settings).expect("writable");
+    let begin = ["train", "--algorithm", "ppo", "--experiment", "a.ron", "--run", "runs/a", "--device", "ndarray"];
+    ended(folder, &begin, 0);
+    let (_, told) = ended(folder, &["train", "--run", "runs/a", "--resume", "--steps", "512", "--device", "flex"], 0);
+    assert!(told.contains("begun on ndarray and goes on on flex"), "{told}");
+    let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
+    assert!(rows.iter().any(|row| row["path"] == "runs/a" && row["steps"] == 512), "{rows:?}");
+}
+
+#[test]
 fn runs_without_an_episode_are_left_out_and_early_ones_say_so() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

@@ -16,6 +16,7 @@ from pathlib import Path
 import torch
 from torch.nn import functional as F
 
+import report
 from networks import Skills, impala, mlp, nature
 
 # Seconds for which a case is timed in a round, after the warm-up.
@@ -113,6 +114,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--case", default="", help="only cases whose names contain this")
     parser.add_argument("--json", type=Path, help="file for all times")
+    parser.add_argument("--write", type=Path, help="document that gets the table")
     args = parser.parse_args()
     cases = [case for case in CASES if args.case in case]
     times = {case: {"ours": [], "theirs": []} for case in cases}
@@ -122,13 +124,23 @@ def main():
             times[case]["theirs"].append(theirs(case))
             print(f"round {number + 1}: {case}: ours {times[case]['ours'][-1]:.2f} ms, "
                   f"PyTorch {times[case]['theirs'][-1]:.2f} ms", flush=True)
-    print(f"\n{machine()}, PyTorch {torch.__version__}, medians of {args.rounds} rounds in turn\n")
-    print("| case | ours, ms | PyTorch, ms | PyTorch / ours |\n|---|---|---|---|")
-    for case in cases:
-        mine, other = (statistics.median(times[case][who]) for who in ("ours", "theirs"))
-        print(f"| {case} | {mine:.2f} | {other:.2f} | {other / mine:.2f} |")
+    text = markdown(times)
+    print(f"\n{text}")
     if args.json:
         args.json.write_text(json.dumps({"machine": machine(), "torch": torch.__version__, "times": times}, indent=1))
+    if args.write:
+        report.put(args.write, "learning", text)
+
+
+def markdown(times):
+    """The medians, and what they are of."""
+    rounds = len(next(iter(times.values()))["ours"])
+    rows = []
+    for case, found in times.items():
+        mine, other = (statistics.median(found[who]) for who in ("ours", "theirs"))
+        rows.append([f"`{case}`", report.number(mine), report.number(other), f"{other / mine:.2f}"])
+    what = f"Milliseconds on {machine()}, PyTorch {torch.__version__}, medians of {rounds} rounds in turn:"
+    return f"{what}\n\n{report.table(['case', 'ours', 'PyTorch', 'PyTorch / ours'], rows)}"
 
 
 if __name__ == "__main__":

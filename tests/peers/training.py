@@ -20,6 +20,7 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+import report
 from learning import machine
 from networks import impala, mlp, nature
 
@@ -150,7 +151,7 @@ class Ppo:
 
 
 def theirs(name):
-    """Steps per second, milliseconds of playing and learning per update, and MiB, of one process."""
+    """Steps per second, the share of the time that playing takes, and MiB, of one process."""
     ppo = Ppo(CASES[name])
     ppo.learn(ppo.play())
     begin, play_s, updates = time.perf_counter(), 0.0, 0
@@ -167,7 +168,7 @@ def theirs(name):
 
 
 def run(words):
-    return json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()[-1])
+    return json.loads(subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()[-1])
 
 
 def main():
@@ -176,6 +177,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--case", default="", help="only cases whose names contain this")
     parser.add_argument("--json", type=Path, help="file for all measurements")
+    parser.add_argument("--write", type=Path, help="document that gets the tables")
     parser.add_argument("--theirs", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.theirs:
@@ -189,16 +191,36 @@ def main():
             found[name]["theirs"].append(run([sys.executable, __file__, args.playbot, "--theirs", name]))
             mine, other = (found[name][who][-1] for who in ("ours", "theirs"))
             print(f"round {number + 1}: {name}: ours {mine}, PyTorch {other}", flush=True)
-    print(f"\n{machine()}, PyTorch {torch.__version__}, EnvPool {envpool.__version__}, "
-          f"medians of {args.rounds} rounds in turn\n")
-    print("| case | ours, steps/s | PyTorch, steps/s | ours / PyTorch | ours, MiB | PyTorch, MiB |\n|---|---:|---:|---:|---:|---:|")
-    for name in cases:
-        middle = lambda who, key: statistics.median(one[key] for one in found[name][who])
-        (mine, other), (small, large) = ([middle(who, key) for who in ("ours", "theirs")]
-                                         for key in ("steps_per_s", "peak_rss_mib"))
-        print(f"| {name} | {mine:.0f} | {other:.0f} | {mine / other:.2f} | {small:.0f} | {large:.0f} |")
+    text = markdown(found)
+    print(f"\n{text}")
     if args.json:
         args.json.write_text(json.dumps({"machine": machine(), "found": found}, indent=1))
+    if args.write:
+        report.put(args.write, "training", text)
+
+
+PARTS = ["simulate", "observe", "infer", "record", "gather", "learn"]
+
+
+def markdown(found):
+    """The medians, and where our time went."""
+    rows, parts = [], []
+    for name, measured in found.items():
+        middle = lambda who, key: statistics.median(one[key] for one in measured[who])
+        (mine, other), (small, large) = ([middle(who, key) for who in ("ours", "theirs")]
+                                         for key in ("steps_per_s", "peak_rss_mib"))
+        rows.append([f"`{name}`", str(len(measured["ours"])), f"{mine:,.0f}", f"{other:,.0f}", f"{mine / other:.2f}",
+                     f"{small:,.0f}", f"{large:,.0f}"])
+        ours = measured["ours"]
+        times = [report.number(statistics.median(one["us_per_step"][part] for one in ours)) for part in PARTS]
+        parts.append([f"`{name}`", *times, f"{100 * middle('ours', 'idle_share'):.0f} %"])
+    header = ["case", "rounds", "ours, steps/s", "PyTorch", "ours / PyTorch", "ours, MiB", "PyTorch, MiB"]
+    return "\n".join([
+        f"{machine()}, PyTorch {torch.__version__}, EnvPool {envpool.__version__}, medians of rounds in turn:", "",
+        report.table(header, rows), "",
+        "Where our time goes, in microseconds per step of both threads together:", "",
+        report.table(["case", *PARTS, "idle"], parts),
+    ])
 
 
 if __name__ == "__main__":

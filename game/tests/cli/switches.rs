@@ -187,7 +187,10 @@ fn speed_is_measured_of_the_case_and_for_the_time_that_bench_is_told() {
     for case in &cases {
         assert_eq!((&case["arenas"], &case["threads"]), (&json!(4), &json!(2)), "{case}");
         assert!(case["steps_per_s"].as_f64().is_some_and(|speed| speed > 0.0), "{case}");
+        assert_eq!((&case["device"], &case["seconds"], &case["set"]), (&json!("flex"), &json!(0.01), &json!([])));
     }
+    let (listed, _) = done(temporary.path(), &["bench", "--case", "sim/maze2d", "--list"]);
+    assert_eq!(listed.lines().collect::<Vec<_>>(), names, "--list");
     let (_, took) = bench(&["--seconds", "0.5"]);
     assert!(took >= 0.5 * cases.len() as f64, "--seconds: {took} for {names:?}");
 }

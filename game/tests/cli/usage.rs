@@ -22,6 +22,8 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["eval"], "nobody to measure"),
         (&["eval", "--bot", "random", "--levels", "hard"], "mode:first..last"),
         (&["bench", "--case", "nonsense"], "sim/coinrun/vector"),
+        (&["bench", "--threads", "3"], "try `--arenas 66`"),
+        (&["bench", "--threads", "0"], "--threads must be at least 1"),
         (&["train", "--run", "r", "--algorithm", "pp"], "did you mean `ppo`?"),
         (&["trace", "maze2d", "--map", "medum", "--actions-file", "f"], "did you mean `medium`?"),
         (&["trace", "maze2d", "--map", "medium+limt=3", "--actions-file", "f"], "did you mean `limit=1000`?"),

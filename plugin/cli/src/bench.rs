@@ -26,12 +26,15 @@ use super::{
 
 /// Measure speed.
 ///
-/// Numbers are for this machine and this moment; nothing is tested.
+/// Numbers are for this machine and this moment; nothing is tested. The parts of a step are measured by the clock, for all
+/// threads together. What is called idle is the share of the threads' time in which this program did not compute: it waited, or
+/// other programs had the cores.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
+  playbot bench --list
   playbot bench --json
   playbot bench --case sim/GAME --threads 1
-  playbot bench --case train/GAME --set 'ppo.cnn=Impala()' --set ppo.num_steps=256")]
+  playbot bench --case train/GAME/raster --seconds 20 --set 'ppo.cnn=Impala()' --set ppo.num_steps=256")]
 pub struct Args {
     /// Only cases whose name contains this.
     #[arg(long, default_value = "")]
@@ -53,6 +56,9 @@ pub struct Args {
     /// One line of JSON per case.
     #[arg(long)]
     json: bool,
+    /// Only list the cases.
+    #[arg(long)]
+    list: bool,
 }
 
 /// The largest power of two that the cores and the usual 64 arenas allow.
@@ -64,16 +70,29 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.seconds <= 0.0 {
         return Err(CliError::Usage("--seconds must be more than 0".to_owned()));
     }
-    if args.arenas == 0 || args.threads == 0 || !args.arenas.is_multiple_of(args.threads as u32) {
-        return Err(CliError::Usage("--threads must divide --arenas, and neither may be 0".to_owned()));
+    let (arenas, threads) = (args.arenas, args.threads);
+    if arenas == 0 || threads == 0 {
+        let which = if arenas == 0 { "--arenas" } else { "--threads" };
+        return Err(CliError::Usage(format!("{which} must be at least 1")));
+    }
+    if !(arenas as usize).is_multiple_of(threads) {
+        return Err(CliError::Usage(format!(
+            "each thread has a World with as many arenas: {arenas} arenas cannot be shared by {threads} threads; try \
+             `--arenas {}`",
+            (arenas as usize).next_multiple_of(threads)
+        )));
     }
     let all: Vec<_> = games.iter().flat_map(cases).collect();
     let wanted: Vec<_> = all.iter().filter(|case| case.name.contains(&args.case)).collect();
     if wanted.is_empty() {
         let names: Vec<_> = all.iter().map(|case| case.name.as_str()).collect();
-        return Err(CliError::Usage(format!("no case is called `{}`; cases: {}", args.case, names.join(", "))));
+        return Err(CliError::Usage(format!("no case has `{}` in its name; cases: {}", args.case, names.join(", "))));
     }
-    for Case { name, game, benchmark } in wanted {
+    if args.list {
+        return wanted.iter().try_for_each(|case| print_line(&case.name)).map(|()| Outcome::Pass);
+    }
+    for (number, Case { name, game, benchmark }) in wanted.iter().enumerate() {
+        tell!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
         let measure = if benchmark.train { train } else { simulate };
         let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
             Err(CliError::Vision(error)) if args.case.is_empty() => {
@@ -130,8 +149,9 @@ impl Measure {
     fn to_json(&self, case: &str, args: &Args) -> Value {
         json!({
             "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
-            "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts,
-            "idle_share": self.idle,
+            "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts, "idle_share": self.idle,
+            "seconds": args.seconds, "device": args.device.device.to_string(), "set": args.set,
+            "version": env!("CARGO_PKG_VERSION"),
         })
     }
 

@@ -164,6 +164,10 @@ fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         run.write_experiment(&experiment)?;
     }
     tell!("going on at step {} of {}", trainer.steps(), experiment.whole_steps());
+    let device = args.compute.device();
+    if device != info.device {
+        tell!("it was begun on {} and goes on on {device}: what it learns is alike, but not the same", info.device);
+    }
     Ok((run, trainer))
 }
 

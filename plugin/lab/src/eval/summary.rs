@@ -32,6 +32,10 @@ pub struct EvalSummary {
     pub length_mean: f64,
     /// Share of all ticks whose action was clipped to the game's range.
     pub clipped: f64,
+    /// Mean return on each level, in ascending order of levels; for [`PairedDifference`](super::PairedDifference), and no part
+    /// of a table's JSON.
+    #[serde(skip)]
+    pub level_returns: Vec<f64>,
 }
 
 /// Sums up the episodes of one player on one split.
@@ -43,10 +47,11 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
     let successes = by_level(|result| f64::from(u8::from(result.success)));
     let lengths = by_level(|result| f64::from(result.ticks));
     let clipped = by_level(|result| f64::from(result.clipped));
+    let level_returns = means_of_levels(&returns);
     EvalSummary {
         method: method.to_owned(),
         split: split.to_string(),
-        levels: means_of_levels(&returns).len() as u64,
+        levels: level_returns.len() as u64,
         episodes: results.len() as u64,
         return_mean: mean(&returns),
         return_se: error_over_levels(&returns),
@@ -54,6 +59,7 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
         success_se: error_over_levels(&successes),
         length_mean: mean(&lengths),
         clipped: mean(&clipped) / mean(&lengths).max(1.0),
+        level_returns,
     }
 }
 

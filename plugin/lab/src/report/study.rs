@@ -7,7 +7,7 @@ use super::{
     statistics::mean_curve,
 };
 use crate::{
-    eval::EvalSummary,
+    eval::{EvalSummary, PairedDifference},
     train::{
         Algorithm, Experiment,
         metrics_log::{SUCCESS_RATE, range_of},
@@ -46,7 +46,7 @@ pub struct TrainingResult {
 }
 
 /// A measurement on held-out levels, each played equally often. Standard errors are over levels, as in [`EvalSummary`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TestResult {
     /// Episodes.
     pub episodes: u64,
@@ -60,6 +60,9 @@ pub struct TestResult {
     pub return_se: f64,
     /// Mean length, ticks.
     pub length_mean: f64,
+    /// Mean return on each level, in ascending order of levels; empty in results from before they were kept.
+    #[serde(default)]
+    pub level_returns: Vec<f64>,
 }
 
 impl From<&EvalSummary> for TestResult {
@@ -71,6 +74,7 @@ impl From<&EvalSummary> for TestResult {
             return_mean: summary.return_mean,
             return_se: summary.return_se,
             length_mean: summary.length_mean,
+            level_returns: summary.level_returns.clone(),
         }
     }
 }
@@ -100,6 +104,18 @@ impl StudyReport {
     /// The results of one variant.
     pub(super) fn of(&self, variant: &str) -> Vec<&StudyResult> {
         self.results.iter().filter(|result| result.variant == variant).collect()
+    }
+
+    /// The held-out return of a variant less that of another; `None` unless both have the same seeds and levels.
+    pub fn difference(&self, variant: &str, other: &str) -> Option<PairedDifference> {
+        let (one, other) = (self.of(variant), self.of(other));
+        let seeds = |runs: &[&StudyResult]| runs.iter().map(|run| run.seed).collect::<Vec<_>>();
+        if seeds(&one) != seeds(&other) {
+            return None;
+        }
+        let [one, other] = [one, other]
+            .map(|runs| -> Vec<&[f64]> { runs.into_iter().map(|run| run.test.level_returns.as_slice()).collect() });
+        PairedDifference::of(&one, &other)
     }
 
     /// Success over steps: the mean of each variant that was trained, with the spread over its seeds.

@@ -18,6 +18,7 @@ impl StudyReport {
         let experiment = &self.experiment;
         let mut page = format!("# {}: {}\n\n", experiment.game, self.variants().join(", "));
         let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
+        page += &self.differences();
         page += "![Success over environment steps](curves.svg)\n\n## Each seed\n\n";
         let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
         page += "## The experiment\n\n";
@@ -77,6 +78,33 @@ impl StudyReport {
         markdown(&headings, rows)
     }
 
+    /// How far the first variant is above each other one, where they can be paired.
+    fn differences(&self) -> String {
+        let variants = self.variants();
+        let Some((first, others)) = variants.split_first() else { return String::new() };
+        let paired = others.iter().filter_map(|other| Some((*other, self.difference(first, other)?)));
+        let rows: Vec<Vec<String>> = paired
+            .map(|(other, found)| {
+                let words = match (found.is_clear(), found.mean > 0.0) {
+                    (false, _) => "no difference that is clear",
+                    (true, true) => "clearly above",
+                    (true, false) => "clearly below",
+                };
+                let [levels, seeds] = [found.levels, found.seeds].map(|count| count.to_string());
+                vec![other.to_owned(), mean_and_error(found.mean, found.se, 2), levels, seeds, words.to_owned()]
+            })
+            .collect();
+        if rows.is_empty() {
+            return String::new();
+        }
+        let headings = ["other", "difference", "levels", "seeds", &format!("{first} is")];
+        format!(
+            "The held-out return of **{first}** less that of each other variant, on the same levels and with the same seeds. ± is \
+             the standard error over levels and seeds; what is further from 0 than two of them is called clear.\n\n{}\n",
+            markdown(&headings, rows.into_iter())
+        )
+    }
+
     fn every_seed(&self) -> String {
         let headings = [
             "variant",
@@ -90,7 +118,7 @@ impl StudyReport {
         ];
         let rows = self.results.iter().map(|run| {
             let training = |value: fn(&TrainingResult) -> Option<f64>| run.training.as_ref().and_then(value);
-            let test = run.test;
+            let test = &run.test;
             vec![
                 run.variant.clone(),
                 run.seed.to_string(),
@@ -190,6 +218,7 @@ mod tests {
                 return_mean,
                 return_se: 0.25,
                 length_mean: 12.0,
+                level_returns: vec![return_mean - 1.0, return_mean + 1.0],
             },
         };
         StudyReport {
@@ -222,6 +251,9 @@ mod tests {
         assert!(page.contains("```sh\nplaybot study --out x\n```"), "{page}");
         let seed = page.lines().find(|line| line.contains("| full ") && line.contains("not reached"));
         assert!(seed.is_some_and(|line| line.contains("60.0 ± 4.9%") && line.contains("6.00 ± 0.25")), "{page}");
+        // The seeds differ by 3 and 1, the levels by nothing: a mean square of 2 · 2, over four cells.
+        let difference = page.lines().find(|line| line.starts_with("| cloned ") && line.contains("2.00 ± 1.00"));
+        assert!(difference.is_some_and(|line| line.contains("no difference that is clear")), "{page}");
         assert!(page.contains("- **cloned**: `algorithm=bc`") && page.contains("variants: []"), "{page}");
     }
 

@@ -1,0 +1,26 @@
+"""Tables in Markdown, and the places in a document that they belong in."""
+
+import re
+from pathlib import Path
+
+
+def number(x):
+    """Three digits."""
+    return f"{x:.2f}" if x < 10 else f"{x:.1f}" if x < 100 else f"{x:,.0f}"
+
+
+def table(header, rows):
+    """Lines of a table whose first column is words."""
+    line = lambda cells: "| " + " | ".join(cells) + " |"
+    rule = "|---|" + "---:|" * (len(header) - 1)
+    return "\n".join([line(header), rule, *map(line, rows)])
+
+
+def put(document, name, text):
+    """Replaces what is between `<!-- name -->` and `<!-- /name -->` in the document."""
+    path, begin, end = Path(document), f"<!-- {name} -->", f"<!-- /{name} -->"
+    old = path.read_text()
+    if begin not in old or end not in old:
+        raise SystemExit(f"{path} has no place for this table: it needs the lines `{begin}` and `{end}`")
+    new = re.sub(f"{re.escape(begin)}.*?{re.escape(end)}", lambda _: f"{begin}\n{text}\n{end}", old, flags=re.S)
+    path.write_text(new)
