@@ -105,7 +105,7 @@ mod tests {
     /// Waits for the updates of other tests in this process.
     fn nobody_is_awake_in_the_end() -> bool {
         (0..2000).any(|_| {
-            std::thread::sleep(Duration::from_millis(5));
+            std::thread::park_timeout(Duration::from_millis(5));
             !are_awake()
         })
     }
@@ -115,7 +115,7 @@ mod tests {
         let before = waited();
         let sum = among_awake_workers(|| {
             assert!(are_awake());
-            std::thread::sleep(Duration::from_millis(50));
+            std::thread::park_timeout(Duration::from_millis(50));
             (0..1000u64).into_par_iter().sum::<u64>()
         });
         assert_eq!(sum, 499_500);
