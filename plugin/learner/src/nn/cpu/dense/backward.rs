@@ -33,8 +33,8 @@ pub(super) fn backward(
     if !wanted.params {
         return (of_x, Vec::new());
     }
-    let befores = std::iter::once(x).chain(outputs.iter().copied());
-    let of_layers = befores.zip(layers).zip(&sums);
+    let given = std::iter::once(x).chain(outputs.iter().copied());
+    let of_layers = given.zip(layers).zip(&sums);
     let of_layers = of_layers.map(|((x, layer), sums)| LayerSums { x, inputs: layer.inputs(), sums });
     (of_x, param_grads(&of_layers.collect::<Vec<_>>()))
 }
