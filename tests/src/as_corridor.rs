@@ -1,10 +1,17 @@
 //! Games that play like the corridor, but for what their tests are about.
 
 /// What [`Game`](playbot_lab::prelude::Game) asks of every game, answered as the [`Corridor`](crate::Corridor) does: for
-/// the `impl Game` of a game that adds something to it.
+/// the `impl Game` of a game that adds something to it. `but build` leaves out [`Game::build`](playbot_lab::prelude::Game::build),
+/// and a list has those alone that it names.
 #[macro_export]
 macro_rules! as_corridor {
     () => {
+        $crate::as_corridor! { but build }
+        $crate::as_corridor! {
+            fn build(app: &mut ::bevy::prelude::App, mode: &str);
+        }
+    };
+    (but build) => {
         $crate::as_corridor! {
             fn name() -> &'static str;
             fn version() -> u32;
@@ -12,7 +19,6 @@ macro_rules! as_corridor {
             fn tick_hz() -> f64;
             fn actions() -> ::playbot_lab::prelude::ActionSpace;
             fn observation() -> ::playbot_lab::prelude::ObservationSpace;
-            fn build(app: &mut ::bevy::prelude::App, mode: &str);
             fn spawn_agent(world: &mut ::bevy::prelude::World, index: u32) -> ::bevy::prelude::Entity;
         }
     };

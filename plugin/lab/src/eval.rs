@@ -7,12 +7,10 @@ use playbot_learner::{Policy, PolicyFile};
 use thiserror::Error;
 
 mod blind;
-mod paired;
 mod summary;
 
 pub use bevy_playbot::episode::EpisodeResult;
 pub use blind::{CHAOS, blind_bots};
-pub use paired::PairedDifference;
 pub use summary::{EvalSummary, error_over_levels, summarize};
 
 use crate::{

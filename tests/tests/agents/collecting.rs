@@ -10,15 +10,7 @@ use playbot_tests::{as_corridor, corridor_plugin, training::untrained};
 struct Meddling;
 
 impl Game for Meddling {
-    as_corridor! {
-        fn name() -> &'static str;
-        fn version() -> u32;
-        fn modes() -> &'static [&'static str];
-        fn tick_hz() -> f64;
-        fn actions() -> ActionSpace;
-        fn observation() -> ObservationSpace;
-        fn spawn_agent(world: &mut World, index: u32) -> Entity;
-    }
+    as_corridor!(but build);
 
     fn build(&self, app: &mut App, _mode: &str) {
         corridor_plugin(app);

@@ -14,15 +14,7 @@ use playbot_tests::{Cell, as_corridor, corridor_plugin};
 struct Leaps;
 
 impl Game for Leaps {
-    as_corridor! {
-        fn name() -> &'static str;
-        fn version() -> u32;
-        fn modes() -> &'static [&'static str];
-        fn tick_hz() -> f64;
-        fn actions() -> ActionSpace;
-        fn observation() -> ObservationSpace;
-        fn spawn_agent(world: &mut World, index: u32) -> Entity;
-    }
+    as_corridor!(but build);
 
     fn build(&self, app: &mut App, _mode: &str) {
         corridor_plugin(app);

@@ -32,8 +32,8 @@ pub struct EvalSummary {
     pub length_mean: f64,
     /// Share of all ticks whose action was clipped to the game's range.
     pub clipped: f64,
-    /// Mean return on each level, in ascending order of levels; for [`PairedDifference`](super::PairedDifference), and no part
-    /// of a table's JSON.
+    /// Mean return on each level, in ascending order of levels; for [`PairedDifference`](crate::report::PairedDifference), and no
+    /// part of a table's JSON.
     #[serde(skip)]
     pub level_returns: Vec<f64>,
 }

@@ -6,6 +6,7 @@
 //! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
 //! - [`CellChart`] draws which cells of a level an explorer has reached.
 //! - [`TrailChart`] draws where agents went on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a [`Drawing`](crate::drawing::Drawing).
+//! - [`PairedDifference`] compares two methods on the same levels and with the same seeds.
 //! - [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
 //!   no network. It follows the reader's light or dark setting and prints.
@@ -19,6 +20,7 @@ mod line;
 mod mark;
 mod markdown;
 mod number;
+mod paired;
 mod plain_text;
 mod result;
 mod scatter;
@@ -38,6 +40,7 @@ pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
 pub(crate) use markdown::{markdown_cell, markdown_row};
 pub use number::{percent, readable, readable_with_spread, whole};
+pub use paired::PairedDifference;
 pub use result::{ResultRow, ResultTable};
 pub use scatter::draw_scatters;
 pub use sparkline::sparkline;

@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     chart::{Chart, Curve},
+    paired::PairedDifference,
     statistics::mean_curve,
 };
 use crate::{
-    eval::{EvalSummary, PairedDifference},
+    eval::EvalSummary,
     train::{
         Algorithm, Experiment,
         metrics_log::{SUCCESS_RATE, range_of},

@@ -31,6 +31,7 @@ mod unsquash;
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
 pub use conv::{Conv2d, max_pool, window_places};
+pub(crate) use cpu::share::{OF_A_MOVE, share};
 pub use dist::{ActionBatch, Dist, HostDist};
 pub use grads::NamedGrads;
 pub use gru::{Gru, GruLayer};

@@ -1,13 +1,10 @@
 //! Joining skills and observations into what networks read.
 
-use crate::nn::{ObsBatch, matrix};
+use crate::nn::{OF_A_MOVE, ObsBatch, matrix, share};
 use crate::norm::ObsStats;
 use crate::{ObsKind, ObsSlice};
 use burn::tensor::{Device, Tensor};
-use rayon::prelude::*;
 
-/// Numbers up to which a second thread costs more than it saves.
-const FEW: usize = 1 << 17;
 /// Rows that a thread joins at a time.
 const ROWS: usize = 64;
 
@@ -89,8 +86,9 @@ pub(crate) fn joined_rows(
 ) -> Vec<f32> {
     let width = latent + obs_dim;
     let mut out = vec![0.0; rows.len() * width];
-    let join = |(joined, rows): (&mut [f32], &[usize])| {
-        for (joined, &row) in joined.chunks_exact_mut(width.max(1)).zip(rows) {
+    let numbers = out.len();
+    share(&mut out, (ROWS * width).max(1), numbers * OF_A_MOVE, |piece, joined| {
+        for (joined, &row) in joined.chunks_exact_mut(width.max(1)).zip(&rows[piece * ROWS..]) {
             let (skill, to) = joined.split_at_mut(latent);
             skill.copy_from_slice(&z[row * latent..(row + 1) * latent]);
             let observation = &obs[row * obs_dim..(row + 1) * obs_dim];
@@ -99,11 +97,6 @@ pub(crate) fn joined_rows(
                 Some(stats) => stats.normalize_into(observation, to),
             }
         }
-    };
-    if out.len() <= FEW {
-        join((&mut out, rows));
-    } else {
-        out.par_chunks_mut(ROWS * width).zip(rows.par_chunks(ROWS)).for_each(join);
-    }
+    });
     out
 }

@@ -47,6 +47,11 @@ impl Batch<'_> {
         InputBuilder { z, latent: self.latent, obs: obs.as_slice(), kind, stats: self.stats.as_deref() }
     }
 
+    /// Counts the time since `start` as spent putting minibatches together.
+    pub(super) fn gathered(&self, start: Instant) {
+        self.gathering.set(self.gathering.get() + start.elapsed());
+    }
+
     /// A minibatch in parts, each with its share of the rows: what networks keep of images until they know the gradient
     /// takes more memory than the rollout.
     pub(super) fn parts<'b>(
@@ -63,14 +68,14 @@ impl Batch<'_> {
         }
         // The other forms of the penalty are no means over rows.
         let is_mean = score.is_none_or(|score| score.penalty == PenaltyForm::Mean);
-        self.gathering.set(self.gathering.get() + start.elapsed());
+        self.gathered(start);
         let most = cnn.filter(|_| is_mean).map_or(rows.len(), ImageNet::images_at_a_time);
         (0..rows.len()).step_by(most.max(1)).map(move |first| {
             let start = Instant::now();
             let part = first..(first + most).min(rows.len());
             let share = part.len() as f64 / rows.len() as f64;
             let minibatch = self.minibatch(&rows[part.clone()], advantages[part].to_vec(), device);
-            self.gathering.set(self.gathering.get() + start.elapsed());
+            self.gathered(start);
             (minibatch, share)
         })
     }

@@ -6,7 +6,7 @@ use super::step::{Losses, Minibatch, Moment};
 use super::{PpoConfig, PpoNets, StepMetrics};
 use crate::nn::{ActionBatch, Adam, Dist, PackedPixels, check_loss, host, matrix, vector};
 use crate::policy::NetInput;
-use crate::score::{ScoreConfig, TeacherBatch};
+use crate::score::TeacherBatch;
 use crate::{LearnError, ObsKind, ObsSlice};
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
@@ -127,10 +127,9 @@ impl Reports {
         adam: &mut Adam,
         batch: &Minibatch,
         config: &PpoConfig,
-        score: Option<&ScoreConfig>,
-        moment: &Moment,
+        moment: &Moment<'_>,
     ) -> Result<(), LearnError> {
-        let Losses { ppo, penalty, total } = Losses::of(nets, batch, config, score, moment.is_warming_up)?;
+        let Losses { ppo, penalty, total } = Losses::of(nets, batch, config, moment)?;
         let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
         let zero = || Tensor::zeros([1], &log_ratio.device().inner());
         let (kl, term) = match penalty {

@@ -38,8 +38,7 @@ impl Losses {
         nets: &PpoNets,
         batch: &Minibatch,
         config: &PpoConfig,
-        score: Option<&ScoreConfig>,
-        is_warming_up: bool,
+        &Moment { score, is_warming_up, .. }: &Moment<'_>,
     ) -> Result<Self, LearnError> {
         let inputs = nets.actor.join(&batch.inputs)?;
         let dist = nets.actor.forward(inputs.clone());
@@ -99,14 +98,16 @@ pub fn gradient_step(
     lr: f64,
 ) -> Result<StepMetrics, LearnError> {
     let part = std::iter::once((batch.clone(), 1.0));
-    step_in_parts(nets, adam, part, config, score, &Moment { lr, is_warming_up: false })
+    step_in_parts(nets, adam, part, config, &Moment { lr, score, is_warming_up: false })
 }
 
 /// What changes from update to update.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Moment {
+pub(super) struct Moment<'a> {
     /// Learning rate.
     pub(super) lr: f64,
+    /// Settings of SCORE, with the weight that the penalty has come to.
+    pub(super) score: Option<&'a ScoreConfig>,
     /// Whether only the critic learns.
     pub(super) is_warming_up: bool,
 }
@@ -117,13 +118,12 @@ pub(super) fn step_in_parts(
     adam: &mut Adam,
     parts: impl Iterator<Item = (Minibatch, f64)>,
     config: &PpoConfig,
-    score: Option<&ScoreConfig>,
-    moment: &Moment,
+    moment: &Moment<'_>,
 ) -> Result<StepMetrics, LearnError> {
     let (mut metrics, mut sum) = (StepMetrics::default(), NamedGrads::default());
     let steps = adam.steps();
     for (part, share) in parts {
-        let losses = Losses::of(nets, &part, config, score, moment.is_warming_up)?;
+        let losses = Losses::of(nets, &part, config, moment)?;
         metrics.add(&losses.metrics(&part, config, steps)?, share);
         // A whole minibatch is not multiplied by 1.
         let total = if share < 1.0 { losses.total * share } else { losses.total };

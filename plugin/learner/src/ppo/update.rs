@@ -9,7 +9,7 @@ use super::{PpoLearner, StepMetrics, UpdateMetrics, explained_variance};
 use crate::device::{is_host, update_on};
 use crate::policy::StateBatch;
 use crate::rng::ChaCha8Rng;
-use crate::score::{ScoreConfig, TeacherOutput};
+use crate::score::TeacherOutput;
 use crate::{LearnError, Observations, Rollout};
 use std::cell::Cell;
 use std::time::Instant;
@@ -46,13 +46,14 @@ impl PpoLearner {
             gathering: Cell::default(),
         };
         let lr = config.lr_at(self.base.updates);
-        let moment = Moment { lr, is_warming_up: self.base.updates < config.critic_warmup };
         let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
+        let is_warming_up = self.base.updates < config.critic_warmup;
+        let moment = Moment { lr, score: score.as_ref(), is_warming_up };
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
         let sum = if is_host(&self.base.device.plain()) {
-            self.steps(&batch, &mut rng, score.as_ref(), &moment)?
+            self.steps(&batch, &mut rng, &moment)?
         } else {
-            self.steps_on_device(&batch, &mut rng, score.as_ref(), &moment)?
+            self.steps_on_device(&batch, &mut rng, &moment)?
         };
         self.base.updates += 1;
         self.base.gathering += batch.gathering.get();
@@ -67,14 +68,13 @@ impl PpoLearner {
         &mut self,
         batch: &Batch<'_>,
         rng: &mut ChaCha8Rng,
-        score: Option<&ScoreConfig>,
-        moment: &Moment,
+        moment: &Moment<'_>,
     ) -> Result<StepMetrics, LearnError> {
         let device = self.base.device.plain();
         let mut sum = StepMetrics::default();
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
-            let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), score, &device);
-            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, score, moment)?;
+            let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), moment.score, &device);
+            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, moment)?;
             sum.add(&step, 1.0);
         }
         Ok(sum)
@@ -84,16 +84,15 @@ impl PpoLearner {
         &mut self,
         batch: &Batch<'_>,
         rng: &mut ChaCha8Rng,
-        score: Option<&ScoreConfig>,
-        moment: &Moment,
+        moment: &Moment<'_>,
     ) -> Result<StepMetrics, LearnError> {
         let start = Instant::now();
         let sent = SentRollout::send(batch, &self.base.device.plain());
-        batch.gathering.set(batch.gathering.get() + start.elapsed());
+        batch.gathered(start);
         let (mut reports, before) = (Reports::default(), self.adam.steps());
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
             let minibatch = sent.minibatch(&rows);
-            reports.step(&mut self.nets, &mut self.adam, &minibatch, &self.config, score, moment)?;
+            reports.step(&mut self.nets, &mut self.adam, &minibatch, &self.config, moment)?;
         }
         reports.sum(before)
     }

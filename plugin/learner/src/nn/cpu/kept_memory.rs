@@ -29,6 +29,13 @@ impl KeptMemory {
         Self(numbers)
     }
 
+    /// So many zeros.
+    pub(super) fn zeros(len: usize) -> Self {
+        let mut memory = Self::take(len);
+        memory.fill(0.0);
+        memory
+    }
+
     /// The numbers, for a tensor. [`Self::leave`] brings them back.
     pub(super) fn into_vec(mut self) -> Vec<f32> {
         std::mem::take(&mut self.0)

@@ -9,6 +9,7 @@ mod kept_memory;
 pub(in crate::nn) mod kernels;
 mod outer;
 mod relu;
+pub(in crate::nn) mod share;
 mod store;
 mod tile;
 pub(in crate::nn) mod trunk;

@@ -3,8 +3,8 @@
 use super::forward::{Layer, MOST_LAYERS, ROWS, pieces, products, rows_product};
 use super::packed::Packed;
 use super::params::{LayerSums, ParamGrads, param_grads};
-use super::share::share_each;
 use super::sum_grads::{SumGrads, through_activation};
+use crate::nn::cpu::share::share_each;
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -25,8 +25,7 @@ pub(super) fn backward(
     outputs: &[&[f32]],
     wanted: Wanted,
 ) -> (Vec<f32>, Vec<ParamGrads>) {
-    let inputs = layers.first().map_or(0, Layer::inputs);
-    let n = x.len() / inputs.max(1);
+    let n = x.len() / layers[0].inputs();
     let mut sums: Vec<SumGrads> = layers.iter().map(|layer| SumGrads::unwritten(n, layer.outputs())).collect();
     let mut of_x = if wanted.x { vec![0.0; x.len()] } else { Vec::new() };
     to_sums(grad, layers, outputs, &mut sums, &mut of_x);
@@ -45,19 +44,17 @@ fn to_sums(grad: &[f32], layers: &[Layer<'_>], outputs: &[&[f32]], sums: &mut [S
     let first = usize::from(of_x.is_empty());
     let turned = Packed::all(&layers.iter().skip(first).map(Layer::turned).collect::<Vec<_>>());
     let strides: Vec<usize> = sums.iter().map(SumGrads::stride).collect();
-    let inputs = layers.first().map_or(0, Layer::inputs);
-    let width = layers.last().map_or(1, Layer::outputs);
+    let last = layers.len() - 1;
+    let (inputs, width) = (layers[0].inputs(), layers[last].outputs());
     let n = grad.len() / width;
     let numbers = sums.iter_mut().map(SumGrads::values_mut).zip(strides.iter().copied());
     let mut x_rows = of_x.chunks_mut(ROWS * inputs);
     let rows = pieces(numbers, n).into_iter().map(|sums| (sums, x_rows.next().unwrap_or_default()));
     let mut rows: Vec<([&mut [f32]; MOST_LAYERS], &mut [f32])> = rows.collect();
     share_each(&mut rows, n * products(layers), |piece, (sums, of_x)| {
-        let last = layers.len() - 1;
         let given = grad[piece * ROWS * width..].chunks_exact(width);
         for (to, grad) in sums[last].chunks_exact_mut(strides[last]).zip(given) {
             to[..width].copy_from_slice(grad);
-            to[width..].fill(0.0);
         }
         for (place, layer) in layers.iter().enumerate().rev() {
             let (before, here) = sums.split_at_mut(place);

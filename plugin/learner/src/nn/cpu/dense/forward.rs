@@ -1,13 +1,13 @@
 //! Rows through layers.
 
-use super::packed::{Matrix, Packed};
-use super::share::{share, share_each};
+use super::packed::{Matrix, Packed, block_of};
 use crate::nn::Activation;
 use crate::nn::cpu::fast_math::{tanh, vectorized};
 use crate::nn::cpu::kept_memory::KeptMemory;
 use crate::nn::cpu::relu::relu;
+use crate::nn::cpu::share::{share, share_each};
 use crate::nn::cpu::store::{Store, Write};
-use crate::nn::cpu::tile::{LANES, Lanes, Window, correlate};
+use crate::nn::cpu::tile::{LANES, Window, correlate};
 
 /// Rows that a thread takes at a time.
 pub(super) const ROWS: usize = 32;
@@ -43,10 +43,9 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// The outputs of all layers but the last, and those of the last, for rows `[n, inputs]`.
+/// The outputs of all layers but the last, and those of the last, for rows `[n, inputs]`; there is one layer at least.
 pub(super) fn forward(x: &[f32], layers: &[Layer<'_>]) -> (Vec<KeptMemory>, Vec<f32>) {
-    let [.., last] = layers else { return (Vec::new(), x.to_vec()) };
-    let inputs = layers[0].inputs();
+    let (inputs, last) = (layers[0].inputs(), &layers[layers.len() - 1]);
     let n = x.len() / inputs;
     let packed = Packed::all(&layers.iter().map(Layer::matrix).collect::<Vec<_>>());
     let hidden = layers[..layers.len() - 1].iter().map(|layer| KeptMemory::take(n * layer.outputs()));
@@ -118,12 +117,4 @@ pub(super) fn rows_product(
             Write(&mut *out).store(row * out_stride + first, out_stride - first, sums);
         },
     );
-}
-
-/// The numbers of a block of 16; zeros beyond the last one.
-fn block_of(numbers: &[f32], block: usize) -> Lanes {
-    let mut lanes = [0.0; LANES];
-    let rest = numbers.get(block * LANES..).unwrap_or(&[]);
-    lanes.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
-    lanes
 }

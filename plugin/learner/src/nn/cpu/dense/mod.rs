@@ -13,7 +13,6 @@ mod forward;
 mod op;
 mod packed;
 mod params;
-mod share;
 mod sum_grads;
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Weights in the orders in which products read them.
 
-use super::share::{OF_A_MOVE, share_each};
 use crate::nn::cpu::kept_memory::KeptMemory;
+use crate::nn::cpu::share::{OF_A_MOVE, share_each};
 use crate::nn::cpu::tile::{LANES, Lanes};
 
 /// A matrix to multiply with.
@@ -32,13 +32,7 @@ impl Matrix<'_> {
             return;
         }
         for (lanes, row) in lanes.iter_mut().zip(self.numbers.chunks_exact(self.columns)) {
-            match row[first..].first_chunk() {
-                Some(row) => *lanes = *row,
-                None => {
-                    *lanes = [0.0; LANES];
-                    lanes[..count].copy_from_slice(&row[first..]);
-                }
-            }
+            *lanes = block_of(row, block);
         }
     }
 }
@@ -83,5 +77,19 @@ impl Packed {
         });
         let mut blocks: Vec<_> = blocks.collect();
         share_each(&mut blocks, numbers * OF_A_MOVE, |_, (matrix, block, lanes)| matrix.write(*block, lanes));
+    }
+}
+
+/// The numbers of a block of 16; zeros beyond the last one.
+#[inline(always)]
+pub(super) fn block_of(numbers: &[f32], block: usize) -> Lanes {
+    let rest = numbers.get(block * LANES..).unwrap_or(&[]);
+    match rest.first_chunk() {
+        Some(lanes) => *lanes,
+        None => {
+            let mut lanes = [0.0; LANES];
+            lanes[..rest.len()].copy_from_slice(rest);
+            lanes
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! Gradients of weights and biases: sums over all rows.
 
-use super::share::share_each;
 use super::sum_grads::SumGrads;
 use crate::nn::cpu::kept_memory::KeptMemory;
 use crate::nn::cpu::outer::{column_sums, outer};
+use crate::nn::cpu::share::share_each;
+use crate::nn::cpu::store::{Store, Write};
 use crate::nn::cpu::tile::{LANES, Lanes, WIDE_ROWS, Window};
 
 /// Rows of weights that a thread takes at a time.
@@ -72,17 +73,13 @@ impl Part<'_> {
     fn sum(&mut self) {
         let (columns, y) = (self.layer.sums.columns, self.layer.sums.values());
         let rows = self.weights.len() / columns;
-        let mut memory = KeptMemory::take(columns.div_ceil(LANES) * rows * LANES);
-        memory.fill(0.0);
+        let mut memory = KeptMemory::zeros(columns.div_ceil(LANES) * rows * LANES);
         let sums: &mut [Lanes] = memory.as_chunks_mut().0;
         self.add_products(y, rows, sums);
         for (block, sums) in sums.chunks_exact(rows).enumerate() {
             let first = block * LANES;
-            for (sums, row) in sums.iter().zip(self.weights.chunks_exact_mut(columns)) {
-                match row[first..].first_chunk_mut() {
-                    Some(to) => *to = *sums,
-                    None => row[first..].iter_mut().zip(sums).for_each(|(to, sum)| *to = *sum),
-                }
+            for (row, sums) in sums.iter().enumerate() {
+                Write(&mut *self.weights).store(row * columns + first, columns - first, sums);
             }
         }
         if let Some(bias) = &mut self.bias {

@@ -10,20 +10,18 @@ use crate::nn::cpu::tile::LANES;
 #[derive(Debug)]
 pub(in crate::nn::cpu) struct SumGrads {
     pub(super) columns: usize,
-    stride: usize,
     values: KeptMemory,
 }
 
 impl SumGrads {
     /// Numbers that are yet to be written.
     pub(in crate::nn::cpu) fn unwritten(n: usize, columns: usize) -> Self {
-        let stride = columns.next_multiple_of(LANES);
-        Self { columns, stride, values: KeptMemory::take(n * stride) }
+        Self { columns, values: KeptMemory::take(n * stride(columns)) }
     }
 
     /// From one row to the next.
     pub(in crate::nn::cpu) fn stride(&self) -> usize {
-        self.stride
+        stride(self.columns)
     }
 
     /// All rows.
@@ -37,10 +35,15 @@ impl SumGrads {
     }
 }
 
+/// From one row to the next, for so many columns.
+fn stride(columns: usize) -> usize {
+    columns.next_multiple_of(LANES)
+}
+
 /// Takes rows of a gradient of outputs, in the layout of [`SumGrads`], to that of the sums; `y` is what the activation gave,
 /// `[n, columns]`.
 pub(super) fn through_activation(sums: &mut [f32], y: &[f32], columns: usize, activation: Option<Activation>) {
-    let rows = sums.chunks_exact_mut(columns.next_multiple_of(LANES)).zip(y.chunks_exact(columns));
+    let rows = sums.chunks_exact_mut(stride(columns)).zip(y.chunks_exact(columns));
     match activation {
         None => {}
         Some(Activation::Relu) => vectorized(|| {

@@ -27,9 +27,9 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivatio
     let group = Group::new(plan);
     let at_once = if group.is_some() { group::IMAGES } else { 1 };
     let (kept_len, lean_len) = (plan.kept.len, plan.lean.len);
-    let memory = || (Workspace::new(plan), zeros(at_once * lean_len));
+    let memory = || (Workspace::new(plan), KeptMemory::zeros(at_once * lean_len));
     let parts = (0..n.div_ceil(part)).into_par_iter().map_init(memory, |(work, grads), i| {
-        let mut memory = zeros(plan.layers.iter().map(Layer::sums).sum::<usize>() * LANES);
+        let mut memory = KeptMemory::zeros(plan.layers.iter().map(Layer::sums).sum::<usize>() * LANES);
         let mut sums: Vec<&mut [Lanes]> = by_layer(plan, memory.as_chunks_mut().0, Layer::sums);
         let end = n.min((i + 1) * part);
         for first in (i * part..end).step_by(at_once) {
@@ -74,12 +74,6 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivatio
 fn by_layer<'a, T>(plan: &Plan, mut all: &'a mut [T], count: fn(&Layer) -> usize) -> Vec<&'a mut [T]> {
     let of_layer = |layer| all.split_off_mut(..count(layer)).expect("there is some for each layer");
     plan.layers.iter().map(of_layer).collect()
-}
-
-fn zeros(len: usize) -> KeptMemory {
-    let mut memory = KeptMemory::take(len);
-    memory.fill(0.0);
-    memory
 }
 
 /// From the gradients of what a ReLU gave to those of what it got.

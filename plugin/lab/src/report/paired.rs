@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::statistics::mean_and_sd;
+
 /// By how much one method's return is above another's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairedDifference {
@@ -31,18 +33,17 @@ impl PairedDifference {
         }
         let by_seed: Vec<Vec<f64>> =
             one.iter().zip(other).map(|(a, b)| a.iter().zip(*b).map(|(a, b)| a - b).collect()).collect();
-        let of_seeds: Vec<f64> = by_seed.iter().map(|row| mean(row)).collect();
+        let of_seeds: Vec<f64> = by_seed.iter().map(|row| mean_and_sd(row).0).collect();
         let of_levels: Vec<f64> =
             (0..levels).map(|level| by_seed.iter().map(|row| row[level]).sum::<f64>() / seeds as f64).collect();
-        let all = mean(&of_seeds);
+        let ((all, sd_of_seeds), (_, sd_of_levels)) = (mean_and_sd(&of_seeds), mean_and_sd(&of_levels));
         let rest = by_seed
             .iter()
             .zip(&of_seeds)
             .flat_map(|(row, seed)| row.iter().zip(&of_levels).map(move |(d, level)| (d - seed - level + all).powi(2)));
-        let per = |sum: f64, freedom: usize| if freedom == 0 { 0.0 } else { sum / freedom as f64 };
-        let spread = |means: &[f64]| per(means.iter().map(|x| (x - all).powi(2)).sum(), means.len() - 1);
-        let (q_seeds, q_levels) = (levels as f64 * spread(&of_seeds), seeds as f64 * spread(&of_levels));
-        let q_rest = per(rest.sum(), (seeds - 1) * (levels - 1));
+        let (q_seeds, q_levels) = (levels as f64 * sd_of_seeds.powi(2), seeds as f64 * sd_of_levels.powi(2));
+        // With a single seed or level there is no rest.
+        let q_rest = rest.sum::<f64>() / ((seeds - 1) * (levels - 1)).max(1) as f64;
         let squares = (q_seeds + q_levels - q_rest).max(q_seeds).max(q_levels);
         Some(Self { mean: all, se: (squares / (seeds * levels) as f64).sqrt(), levels, seeds })
     }
@@ -51,10 +52,6 @@ impl PairedDifference {
     pub fn is_clear(&self) -> bool {
         self.mean.abs() > 2.0 * self.se
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

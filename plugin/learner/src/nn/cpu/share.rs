@@ -8,10 +8,10 @@ const FEW: usize = 1 << 22;
 /// The same where other threads are awake.
 const FEW_AWAKE: usize = 1 << 18;
 /// Products that take as long as a number that is put elsewhere.
-pub(super) const OF_A_MOVE: usize = 8;
+pub(crate) const OF_A_MOVE: usize = 8;
 
 /// Calls `work` with each piece of `len` items and its number, on all threads if there are many products in all.
-pub(super) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+pub(crate) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work: impl Fn(usize, &mut [T]) + Sync) {
     if products < if are_awake() { FEW_AWAKE } else { FEW } {
         items.chunks_mut(len).enumerate().for_each(|(piece, items)| work(piece, items));
     } else {
