@@ -110,12 +110,18 @@ pub mod placement;
 pub mod plugin;
 pub mod plugins;
 pub mod policy;
+// For rollouts of playbot_lab.
+#[doc(hidden)]
+pub mod policy_batch;
 pub mod policy_file;
+mod policy_rows;
 pub mod prelude;
 pub mod raster;
 #[doc(hidden)]
 pub mod renewal;
 pub mod reward;
+#[doc(hidden)]
+pub mod shared_batch;
 pub mod skill_prior;
 pub mod state_hash;
 pub mod streams;

@@ -25,7 +25,7 @@
 //! ```
 
 use bevy::prelude::*;
-use playbot_learner::{ObsKind, Observations, Policy};
+use playbot_learner::{ObsKind, Policy};
 
 use crate::{
     action::Action,
@@ -33,7 +33,9 @@ use crate::{
     control::Control,
     episode::Episode,
     fault::Faults,
-    observation::{Observation, start_batch},
+    observation::Observation,
+    policy_batch::PolicyBatch,
+    shared_batch::SharedBatch,
     skill_prior::{ActiveSkill, SkillPrior},
     streams::AgentStreams,
     vision::{ImageSensor, seen_as},
@@ -83,25 +85,13 @@ pub struct Decision {
 
 /// What a policy adds to every agent.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, Decision>();
-}
-
-/// Reused memory of [`run_policy`]: the rows of one batch.
-pub(crate) struct Batch {
-    entities: Vec<Entity>,
-    observations: Observations,
-    skills: Vec<f32>,
-}
-
-impl Default for Batch {
-    fn default() -> Self {
-        Self { entities: Vec::new(), observations: Observations::Vector(Vec::new()), skills: Vec::new() }
-    }
+    app.init_resource::<PolicyBatch>().register_required_components::<Agent, Decision>();
 }
 
 /// Decides for all agents under [`Control::Policy`] in one batched forward pass.
 pub(crate) fn run_policy(
     active: Res<ActivePolicy>,
+    shared: Option<Res<SharedBatch>>,
     order: Res<AgentOrder>,
     mut agents: Query<(
         &Agent,
@@ -114,13 +104,9 @@ pub(crate) fn run_policy(
         &mut Decision,
     )>,
     mut faults: ResMut<Faults>,
-    mut batch: Local<Batch>,
+    mut batch: ResMut<PolicyBatch>,
 ) {
-    let Batch { entities, observations, skills } = &mut *batch;
-    let kind = active.policy.observation();
-    entities.clear();
-    start_batch(observations, &kind);
-    skills.clear();
+    batch.start(&active.policy.observation());
     for &entity in order.entities() {
         let Ok((agent, control, episode, (observation, sensor), skill, ..)) = agents.get(entity) else { continue };
         if *control != Control::Policy || !episode.is_running() {
@@ -130,18 +116,16 @@ pub(crate) fn run_policy(
             faults.report(why);
             return;
         }
-        entities.push(entity);
-        observation.push_to(observations);
-        skills.extend_from_slice(&skill.z);
+        batch.push(entity, observation, skill);
     }
-    if entities.is_empty() {
+    if batch.agents().is_empty() {
         return;
     }
-    let output = match active.policy.forward(skills, &*observations, entities.len()) {
+    let output = match batch.decide(&active.policy, shared.as_deref()) {
         Ok(output) => output,
         Err(error) => return faults.report(format!("the policy cannot decide: {error}")),
     };
-    for (row, &entity) in entities.iter().enumerate() {
+    for (row, &entity) in batch.agents().iter().enumerate() {
         let Ok((.., mut streams, mut action, mut decision)) = agents.get_mut(entity) else { continue };
         let (chosen, log_prob) = match active.draw {
             ActionDraw::Sample => output.sample(row, &mut streams.action),

@@ -1,9 +1,14 @@
 //! What becomes of a rollout when a game breaks its contract in the middle of it.
 
+use std::path::Path;
+
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{prelude::*, train::collect::Collector};
-use playbot_learner::PpoConfig;
+use playbot_lab::{
+    prelude::*,
+    train::{collect::Collector, config_file::parse_experiment, trainer::Trainer},
+};
+use playbot_learner::{DeviceKind, PpoConfig};
 use playbot_tests::{as_corridor, corridor_plugin, training::untrained};
 
 /// A corridor that once puts an action of another kind in the place of the one that was decided.
@@ -35,4 +40,17 @@ fn a_collector_that_met_a_fault_goes_on() {
     assert!(fault.contains("action"), "{fault}");
     let (rollout, _) = collector.collect(&policy, 0, 10).expect("the game meddles no more");
     assert_eq!((rollout.steps, rollout.rewards.len()), (10, 20));
+}
+
+#[test]
+fn worlds_that_decide_together_do_not_wait_for_one_that_met_a_fault() {
+    let experiment = r#"(
+        game: "corridor", train: "plain:0..7", test: "plain:8..15",
+        steps: 2048, arenas: 8, worlds: 8, algorithm: "ppo", ppo: (num_steps: 16, hidden: [8]),
+    )"#;
+    let experiment = parse_experiment(experiment, Path::new("test.ron")).expect("valid");
+    let mut trainer = Trainer::new(&Meddling, &experiment, None, DeviceKind::Flex, 2).expect("fits");
+    let fault = trainer.update().expect_err("the action is of another kind").to_string();
+    assert!(fault.contains("action"), "{fault}");
+    trainer.update().expect("the game meddles no more");
 }

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_playbot::renewal::Renewal;
 
 /// Copies with other numbers of archetypes. Of several, one shows a difference that another may hide by chance.
-pub(super) const VARIANTS: u32 = 4;
+pub(super) const VARIANTS: u32 = 7;
 
 #[derive(Component, Reflect)]
 #[reflect(Component)]

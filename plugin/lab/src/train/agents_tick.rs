@@ -2,9 +2,9 @@
 
 use playbot_learner::{Actions, ObsKind, Observations, Policy, RolloutStep};
 
-/// What each agent saw, did and got in a tick; for the shapes see [`RolloutStep`].
+/// What each agent did and got in a tick; for the shapes see [`RolloutStep`]. What they saw is kept elsewhere.
 pub(super) struct AgentsTick {
-    pub(super) obs: Observations,
+    no_obs: Observations,
     pub(super) z: Vec<f32>,
     pub(super) actions: Actions,
     pub(super) log_probs: Vec<f32>,
@@ -15,10 +15,10 @@ pub(super) struct AgentsTick {
 }
 
 impl AgentsTick {
-    pub(super) fn new(policy: &Policy, kind: &ObsKind, agents: usize) -> Self {
+    pub(super) fn new(policy: &Policy, kind: &ObsKind) -> Self {
         let empty = Vec::new;
         Self {
-            obs: Observations::with_capacity(kind, agents),
+            no_obs: Observations::empty(kind),
             z: empty(),
             actions: Actions::empty(&policy.action_space()),
             log_probs: empty(),
@@ -31,7 +31,7 @@ impl AgentsTick {
 
     pub(super) fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
         RolloutStep {
-            obs: self.obs.as_slice(),
+            obs: self.no_obs.as_slice(),
             z: &self.z,
             actions: &self.actions,
             log_probs: &self.log_probs,

@@ -18,11 +18,12 @@ use bevy_playbot::{
     fault::{Fault, Faults},
     headless::tick_world,
     level::LevelQueue,
-    observation::Observation,
     placement::TickSchedules,
     policy::{ActionDraw, ActivePolicy, Decision},
+    policy_batch::PolicyBatch,
     renewal::Renewal,
     reward::Reward,
+    shared_batch::SharedBatch,
     skill_prior::{ActiveSkill, SkillPrior, draw_skills},
     streams::AgentStreams,
     systems::{ObserveSchedule, PlaybotSystems},
@@ -82,6 +83,7 @@ impl Collector {
         });
         Renewal::carry_resource::<Finished>(&mut world);
         Renewal::carry_resource::<Collecting>(&mut world);
+        Renewal::carry_resource::<SharedBatch>(&mut world);
         Renewal::carry_component::<ActionLog>(&mut world);
         world.insert_resource(Collecting { rollout: Rollout::new(0, kind, 0, &game.actions()), kind });
         if let Some(prior) = prior {
@@ -119,7 +121,29 @@ impl Collector {
         Ok((Rollout { obs, ..rollout }, ended))
     }
 
-    /// [`collect`](Self::collect) with the observations in these columns and not in the rollout.
+    /// [`collect_into`](Self::collect_into), deciding together with the Worlds on the other seats, each of which does this
+    /// on a thread of its own.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn collect_at(
+        &mut self,
+        seat: &SharedBatch,
+        columns: &mut ObsColumns<'_>,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let _playing = seat.play();
+        self.world.insert_resource(seat.clone());
+        let collected = self.collect_into(columns, policy, latent, steps);
+        self.world.remove_resource::<SharedBatch>();
+        collected
+    }
+
+    /// [`collect`](Self::collect) with the observations in these columns and not in the rollout: those for which the policy
+    /// decides.
     ///
     /// # Errors
     ///
@@ -138,9 +162,8 @@ impl Collector {
         world.resource_mut::<Collecting>().rollout = empty.clone();
         for _ in 0..steps {
             tick_world(world)?;
-            let obs = &mut world.resource_mut::<Collecting>().rollout.obs;
-            columns.fill_next(obs.as_slice()).map_err(|error| Fault(error.to_string()))?;
-            obs.clear();
+            let seen = world.resource::<PolicyBatch>().observations();
+            columns.fill_next(seen.as_slice()).map_err(|error| Fault(error.to_string()))?;
         }
         let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
         bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
@@ -205,7 +228,7 @@ fn collect_tick(world: &mut World) {
         for (&row, &value) in cut.agents.iter().zip(&cut.values) {
             final_values[row] = value;
         }
-        let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind, entities.len()))?;
+        let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind))?;
         push_tick(&mut collecting.rollout, &tick, &final_values, &cut)
     });
     if let Some(Err(error)) = pushed {
@@ -213,22 +236,14 @@ fn collect_tick(world: &mut World) {
     }
 }
 
-/// What each agent has seen, done and got, added to `tick`.
+/// What each agent has done and got, added to `tick`.
 fn tick_of(world: &mut World, entities: &[Entity], mut tick: AgentsTick) -> Result<AgentsTick, LearnError> {
-    let mut query = world.query_filtered::<(
-        &Observation,
-        &ActiveSkill,
-        &Action,
-        &Decision,
-        &Reward,
-        &Episode,
-        &mut ActionLog,
-    ), With<Agent>>();
+    let mut query =
+        world.query_filtered::<(&ActiveSkill, &Action, &Decision, &Reward, &Episode, &mut ActionLog), With<Agent>>();
     for &entity in entities {
-        let Ok((observation, skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
+        let Ok((skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
             continue;
         };
-        observation.push_to(&mut tick.obs);
         tick.z.extend_from_slice(&skill.z);
         tick.actions.push(&action.0)?;
         tick.log_probs.push(decision.log_prob);

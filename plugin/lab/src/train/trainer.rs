@@ -6,9 +6,9 @@ use std::{
 };
 
 use bevy::prelude::World;
-use bevy_playbot::{episode::EpisodeEnded, fault::Fault, skill_prior::SkillPrior};
+use bevy_playbot::{episode::EpisodeEnded, fault::Fault, shared_batch::SharedBatch, skill_prior::SkillPrior};
 use playbot_learner::{
-    ActionSpace, DeviceKind, LearnError, ObsKind, Observations, Policy, Rollout, SkillModel, SkillSource,
+    ActionSpace, DeviceKind, LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout, SkillModel, SkillSource,
 };
 
 use super::{
@@ -111,10 +111,14 @@ impl Trainer {
         let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
         let columns = obs.columns(&self.obs_kind, steps, &shares);
         let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
-        let collected = on_threads(&mut work, self.threads, |(collector, columns)| {
-            collector.collect_into(columns, policy, latent, steps)
-        });
-        drop(work);
+        let collected = if work.len() > self.threads || !policy.is_on_host() {
+            collect_together(work, self.threads, policy, latent, steps)
+        } else {
+            // With a core of its own a World gains nothing from waiting for others.
+            on_threads(&mut work, self.threads, |(collector, columns)| {
+                collector.collect_into(columns, policy, latent, steps)
+            })
+        };
         let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
         for part in collected {
             let (rollout, ended) = part?;
@@ -188,6 +192,26 @@ impl Trainer {
     pub fn skill_prior(&self) -> Option<SkillPrior> {
         self.skill_source().as_ref().map(SkillPrior::from)
     }
+}
+
+/// What a World has played.
+type Collected = Result<(Rollout, Vec<EpisodeEnded>), Fault>;
+
+/// Lets Worlds play that share their forward passes: what they play is the same.
+fn collect_together(
+    worlds: Vec<(&mut Collector, ObsColumns<'_>)>,
+    threads: usize,
+    policy: &Policy,
+    latent: usize,
+    steps: usize,
+) -> Vec<Collected> {
+    let seats = SharedBatch::seats(policy, worlds.len(), threads);
+    let mut work: Vec<_> = worlds.into_iter().zip(seats).collect();
+    // Most of them wait, for the others or for their turn.
+    let waiting_threads = work.len();
+    on_threads(&mut work, waiting_threads, |((collector, columns), seat)| {
+        collector.collect_at(seat, columns, policy, latent, steps)
+    })
 }
 
 /// Whether the experiment can be run on this game.

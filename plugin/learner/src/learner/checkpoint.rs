@@ -1,6 +1,7 @@
 //! A learner's complete state in one file: the frame that all learners share.
 
 use super::LearnerBase;
+use crate::device::guarded;
 use crate::file::{FileKind, TensorFile};
 use crate::norm::{put_normalizers, take_normalizers};
 use crate::score::{ScoreConfig, Teacher};
@@ -52,7 +53,8 @@ impl LearnerBase {
             counters,
         };
         let mut file = TensorFile::new(path, kind, &header)?;
-        put(&mut file)?;
+        let put = guarded(&self.device.plain(), || Ok(put(&mut file)));
+        put.map_err(|error| FileError::Learner { path: path.to_owned(), source: error })??;
         if let Some(teacher) = teacher {
             teacher.put(&mut file)?;
         }

@@ -1,9 +1,14 @@
 //! Distributions over actions (and over latents), as pure functions of tensors.
 
+use super::cpu::kernels;
+use super::cpu::share::{OF_A_MOVE, share};
 use super::tensors::{host, matrix};
+use crate::device::is_host;
 use crate::{Actions, LearnError};
 use burn::tensor::{Device, Int, Tensor, TensorData, activation::log_softmax};
 
+/// Rows that a thread gathers at a time.
+const ROWS: usize = 256;
 /// ln(2π)/2.
 const HALF_LN_TAU: f32 = 0.918_938_5;
 
@@ -46,12 +51,27 @@ impl ActionBatch {
             Actions::Continuous { dim, values } => Self::Continuous(matrix(values.clone(), n, *dim, device)),
         }
     }
+
+    /// Reads the actions of all rows to the host.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if a tensor cannot be read.
+    pub(crate) fn to_host(&self) -> Result<Actions, LearnError> {
+        Ok(match self {
+            Self::Discrete(index) => {
+                let read = index.clone().try_into_vec_as::<u32>();
+                Actions::Discrete(read.map_err(|error| LearnError::Device(error.to_string()))?)
+            }
+            Self::Continuous(action) => Actions::Continuous { dim: action.dims()[1], values: host(action.clone())? },
+        })
+    }
 }
 
 impl Dist {
     /// The categorical distributions of `logits` `[n, choices]`.
     pub fn categorical(logits: Tensor<2>) -> Self {
-        Self::Categorical { log_probs: log_softmax(logits, 1) }
+        let on_host = is_host(&logits.device()) && !logits.dims().contains(&0);
+        Self::Categorical { log_probs: if on_host { kernels::log_softmax(logits) } else { log_softmax(logits, 1) } }
     }
 
     /// Log-probability (or log-density, summed over dimensions) of one action per row, `[n]`.
@@ -153,10 +173,13 @@ impl HostDist {
     /// The distributions of `rows` as constants on `device`.
     pub fn rows(&self, rows: &[usize], device: &Device) -> Dist {
         let gather = |values: &[f32]| {
-            let mut out = Vec::with_capacity(rows.len() * self.dim);
-            for &r in rows {
-                out.extend_from_slice(&values[r * self.dim..(r + 1) * self.dim]);
-            }
+            let mut out = vec![0.0; rows.len() * self.dim];
+            let products = out.len() * OF_A_MOVE;
+            share(&mut out, ROWS * self.dim, products, |piece, to| {
+                for (to, &row) in to.chunks_exact_mut(self.dim).zip(&rows[piece * ROWS..]) {
+                    to.copy_from_slice(&values[row * self.dim..(row + 1) * self.dim]);
+                }
+            });
             matrix(out, rows.len(), self.dim, device)
         };
         match &self.log_std {

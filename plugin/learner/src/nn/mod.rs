@@ -9,6 +9,7 @@ mod adam;
 mod conv;
 mod cpu;
 mod dist;
+mod dist_rows;
 mod flat_adam;
 mod grads;
 mod gru;
@@ -31,8 +32,10 @@ mod unsquash;
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
 pub use conv::{Conv2d, max_pool, window_places};
-pub(crate) use cpu::share::{OF_A_MOVE, share};
+pub(crate) use cpu::known_gradient;
+pub(crate) use cpu::share::{OF_A_MOVE, share, share_each};
 pub use dist::{ActionBatch, Dist, HostDist};
+pub(crate) use dist_rows::{CategoricalRows, DistRows, GaussianRows, RowTerms};
 pub use grads::NamedGrads;
 pub use gru::{Gru, GruLayer};
 pub use image_net::{CnnKind, ImageNet};
@@ -45,6 +48,7 @@ pub use obs_batch::ObsBatch;
 pub(crate) use packed_pixels::PackedPixels;
 pub use params::{ParamVisitor, Parameters, frozen, parameter_count, tracked};
 pub(crate) use params::{moved, path};
+pub(crate) use sample::categorical_at;
 pub use sample::{
     argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
 };

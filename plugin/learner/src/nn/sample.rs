@@ -7,10 +7,15 @@ use rand::Rng;
 ///
 /// The logits need not be normalised. An empty slice gives 0.
 pub fn sample_categorical<R: Rng + ?Sized>(logits: &[f32], rng: &mut R) -> u32 {
+    categorical_at(logits, unit(rng))
+}
+
+/// The index at which the cumulative distribution of softmax(`logits`) exceeds `draw` in 0..1.
+pub(crate) fn categorical_at(logits: &[f32], draw: f64) -> u32 {
     let top = max(logits);
     let weight = |x: f32| (f64::from(x) - top).exp();
     let total: f64 = logits.iter().map(|&x| weight(x)).sum();
-    let target = unit(rng) * total;
+    let target = draw * total;
     let mut sum = 0.0;
     for (i, &x) in logits.iter().enumerate() {
         sum += weight(x);

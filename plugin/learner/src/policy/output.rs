@@ -96,6 +96,22 @@ impl PolicyOutput {
         }
     }
 
+    /// The outputs of so many rows each, in their order.
+    ///
+    /// # Panics
+    /// If there are more rows in `sizes` than [`Self::len`].
+    pub fn split(mut self, sizes: &[usize]) -> Vec<Self> {
+        let (dim, stds) = (self.space.dim(), self.log_std.len().checked_div(self.len()).unwrap_or_default());
+        let parts = sizes.iter().map(|&rows| Self {
+            space: self.space,
+            squashed: self.squashed,
+            head: self.head.drain(..rows * dim).collect(),
+            log_std: self.log_std.drain(..rows * stds).collect(),
+            values: self.values.drain(..rows).collect(),
+        });
+        parts.collect()
+    }
+
     /// The distributions alone.
     pub(crate) fn into_dist(self) -> HostDist {
         let log_std = (!self.log_std.is_empty()).then_some(self.log_std);
@@ -183,6 +199,26 @@ mod tests {
         }
         // P(z > 0.2) = 0.42.
         assert!((370..470).contains(&beyond), "{beyond} of 1000 lie beyond 1");
+    }
+
+    #[test]
+    fn parts_are_rows_of_the_whole() {
+        let whole = |rows: std::ops::Range<usize>| PolicyOutput {
+            head: rows.clone().map(|row| row as f32).collect(),
+            log_std: rows.clone().map(|row| -(row as f32)).collect(),
+            values: rows.map(|row| 10.0 * row as f32).collect(),
+            ..output(0.0, 1.0)
+        };
+        assert_eq!(whole(0..6).split(&[1, 0, 3, 2]), [whole(0..1), whole(1..1), whole(1..4), whole(4..6)]);
+        let discrete = PolicyOutput {
+            space: ActionSpace::Discrete(2),
+            head: vec![1.0, 2.0, 3.0, 4.0],
+            log_std: Vec::new(),
+            values: vec![5.0, 6.0],
+            squashed: false,
+        };
+        let parts = discrete.split(&[1, 1]);
+        assert_eq!((&parts[1].head[..], &parts[1].values[..]), (&[3.0, 4.0][..], &[6.0][..]));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A frozen policy that plays.
 
 use super::{Actor, Critic, InputBuilder, PolicyOutput, StateBatch};
-use crate::device::guarded;
+use crate::device::{guarded, is_host};
 use crate::nn::{CnnKind, ImageNet, frozen, host};
 use crate::norm::ObsStats;
 use crate::{ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec};
@@ -66,6 +66,11 @@ impl Policy {
     /// Whether its networks see normalised observations. It takes raw ones all the same.
     pub fn normalises(&self) -> bool {
         self.stats.is_some()
+    }
+
+    /// Whether it computes on the CPU.
+    pub fn is_on_host(&self) -> bool {
+        is_host(&self.device)
     }
 
     /// The convolutions that read its images; `None` for vectors.

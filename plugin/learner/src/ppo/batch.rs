@@ -3,15 +3,14 @@
 use super::PpoConfig;
 use super::objective::{PpoBatch, normalize_advantages};
 use super::step::Minibatch;
-use crate::Rollout;
 use crate::nn::{ActionBatch, ImageNet, vector};
 use crate::norm::ObsStats;
-use crate::policy::InputBuilder;
+use crate::policy::{InputBuilder, joined_rows};
 use crate::rng::{ChaCha8Rng, shuffle};
 use crate::score::{PenaltyForm, ScoreConfig, TeacherOutput};
+use crate::{ObsKind, ObsSlice, Observations, Rollout};
 use burn::tensor::Device;
 use std::cell::Cell;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A rollout with everything that an update reads beside it, one entry per row.
@@ -23,10 +22,32 @@ pub(super) struct Batch<'a> {
     pub(super) teacher: Option<TeacherOutput>,
     /// How many of the rollout's skill numbers the networks read: all or none.
     pub(super) latent: usize,
-    pub(super) stats: Option<Arc<ObsStats>>,
+    /// What the networks read of vectors, joined and normalised once for all epochs.
+    pub(super) joined: Option<JoinedRows>,
     pub(super) norm_adv: bool,
     /// Time spent putting minibatches together.
     pub(super) gathering: Cell<Duration>,
+}
+
+/// Skills and normalised vectors of all rows of a rollout, side by side.
+#[derive(Debug)]
+pub(super) struct JoinedRows {
+    rows: Vec<f32>,
+    kind: ObsKind,
+}
+
+impl JoinedRows {
+    /// Those of a rollout of vectors.
+    pub(super) fn of(rollout: &Rollout, latent: usize, stats: Option<&ObsStats>) -> Option<Self> {
+        let Observations::Vector(values) = &rollout.obs else { return None };
+        let (width, all) = (rollout.obs_kind.numbers(), (0..rollout.rows()).collect::<Vec<_>>());
+        let rows = joined_rows(&rollout.z, latent, values, width, stats, &all);
+        Some(Self { rows, kind: ObsKind::Vector(latent + width) })
+    }
+
+    fn inputs(&self) -> InputBuilder<'_> {
+        InputBuilder { z: &[], latent: 0, obs: ObsSlice::Vector(&self.rows), kind: &self.kind, stats: None }
+    }
 }
 
 /// The rows of each minibatch of an update: those of the rollout in an order that each epoch draws anew, in equal parts.
@@ -44,7 +65,10 @@ pub(super) fn minibatches(config: &PpoConfig, n: usize, rng: &mut ChaCha8Rng) ->
 impl Batch<'_> {
     pub(super) fn inputs(&self) -> InputBuilder<'_> {
         let Rollout { z, obs, obs_kind: kind, .. } = self.rollout;
-        InputBuilder { z, latent: self.latent, obs: obs.as_slice(), kind, stats: self.stats.as_deref() }
+        match &self.joined {
+            Some(joined) => joined.inputs(),
+            None => InputBuilder { z, latent: self.latent, obs: obs.as_slice(), kind, stats: None },
+        }
     }
 
     /// Counts the time since `start` as spent putting minibatches together.

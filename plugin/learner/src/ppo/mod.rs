@@ -2,6 +2,7 @@
 
 mod batch;
 mod config;
+mod host_loss;
 mod learner;
 mod metrics;
 mod nets;

@@ -2,7 +2,7 @@
 
 use super::batch::Batch;
 use super::objective::{PpoBatch, PpoLoss};
-use super::step::{Losses, Minibatch, Moment};
+use super::step::{Losses, Minibatch, Moment, outputs};
 use super::{PpoConfig, PpoNets, StepMetrics};
 use crate::nn::{ActionBatch, Adam, Dist, PackedPixels, check_loss, host, matrix, vector};
 use crate::policy::NetInput;
@@ -129,7 +129,8 @@ impl Reports {
         config: &PpoConfig,
         moment: &Moment<'_>,
     ) -> Result<(), LearnError> {
-        let Losses { ppo, penalty, total } = Losses::of(nets, batch, config, moment)?;
+        let (dist, values) = outputs(nets, batch, config, moment)?;
+        let Losses { ppo, penalty, total } = Losses::of(&dist, values, batch, config, moment)?;
         let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
         let zero = || Tensor::zeros([1], &log_ratio.device().inner());
         let (kl, term) = match penalty {

@@ -1,9 +1,11 @@
 //! One gradient step: minibatch → loss → gradient → Adam.
 
+use super::host_loss::HostLoss;
 use super::objective::{PpoBatch, PpoLoss, ppo_loss};
 use super::{PpoConfig, PpoNets, StepMetrics, ratio_stats};
 use crate::LearnError;
-use crate::nn::{Adam, NamedGrads, finite, host};
+use crate::device::is_host;
+use crate::nn::{Adam, Dist, NamedGrads, finite, host};
 use crate::policy::NetInput;
 use crate::score::{Penalty, ScoreConfig, TeacherBatch, penalty};
 use burn::tensor::Tensor;
@@ -29,22 +31,19 @@ pub(super) struct Losses {
 }
 
 impl Losses {
-    /// Of `nets` for `batch`. With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added. While the
+    /// Of what actor and critic gave for `batch`. With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added. While the
     /// critic warms up its loss is all that is minimised.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if the networks do not read such observations.
+    /// [`LearnError::Action`] if policy, decoder and actions differ in kind.
     pub(super) fn of(
-        nets: &PpoNets,
+        dist: &Dist,
+        values: Tensor<1>,
         batch: &Minibatch,
         config: &PpoConfig,
         &Moment { score, is_warming_up, .. }: &Moment<'_>,
     ) -> Result<Self, LearnError> {
-        let inputs = nets.actor.join(&batch.inputs)?;
-        let dist = nets.actor.forward(inputs.clone());
-        let is_apart = is_warming_up || !config.critic_trains_cnn;
-        let values = nets.critic.forward(if is_apart { inputs.detach() } else { inputs });
-        let ppo = ppo_loss(&dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
+        let ppo = ppo_loss(dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
         let of_critic = ppo.value_loss.clone() * config.vf_coef;
         let mut total = match is_warming_up {
             true => of_critic,
@@ -52,7 +51,7 @@ impl Losses {
         };
         let mut penalised = None;
         if let (Some(teacher), Some(score)) = (&batch.teacher, score) {
-            let found = penalty(score, &teacher.dist, &dist, teacher.confidence.clone())?;
+            let found = penalty(score, &teacher.dist, dist, teacher.confidence.clone())?;
             if !is_warming_up {
                 total = total + found.term.clone() * score.kl_coef;
             }
@@ -62,7 +61,7 @@ impl Losses {
     }
 
     /// In plain numbers, but for the norm of the gradient; all are checked.
-    fn metrics(&self, batch: &Minibatch, config: &PpoConfig, steps: u64) -> Result<StepMetrics, LearnError> {
+    pub(super) fn metrics(&self, batch: &Minibatch, config: &PpoConfig, steps: u64) -> Result<StepMetrics, LearnError> {
         let mut metrics = StepMetrics {
             policy_loss: finite("policy_loss", &self.ppo.policy_loss, steps)?,
             value_loss: finite("value_loss", &self.ppo.value_loss, steps)?,
@@ -112,6 +111,38 @@ pub(super) struct Moment<'a> {
     pub(super) is_warming_up: bool,
 }
 
+/// What is minimised, with what a step reports of it.
+fn loss(
+    nets: &PpoNets,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    moment: &Moment<'_>,
+    steps: u64,
+) -> Result<(Tensor<1>, StepMetrics), LearnError> {
+    let (dist, values) = outputs(nets, batch, config, moment)?;
+    if is_host(&values.device()) && HostLoss::is_for(moment) {
+        let loss = HostLoss::of(&dist, &values, batch, config, moment, steps)?;
+        let metrics = loss.metrics;
+        return Ok((loss.tensor(&dist, values), metrics));
+    }
+    let losses = Losses::of(&dist, values, batch, config, moment)?;
+    let metrics = losses.metrics(batch, config, steps)?;
+    Ok((losses.total, metrics))
+}
+
+/// What actor and critic say to a minibatch.
+pub(super) fn outputs(
+    nets: &PpoNets,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    moment: &Moment<'_>,
+) -> Result<(Dist, Tensor<1>), LearnError> {
+    let inputs = nets.actor.join(&batch.inputs)?;
+    let dist = nets.actor.forward(inputs.clone());
+    let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
+    Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs })))
+}
+
 /// [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.
 pub(super) fn step_in_parts(
     nets: &mut PpoNets,
@@ -123,10 +154,10 @@ pub(super) fn step_in_parts(
     let (mut metrics, mut sum) = (StepMetrics::default(), NamedGrads::default());
     let steps = adam.steps();
     for (part, share) in parts {
-        let losses = Losses::of(nets, &part, config, moment)?;
-        metrics.add(&losses.metrics(&part, config, steps)?, share);
+        let (total, of_part) = loss(nets, &part, config, moment, steps)?;
+        metrics.add(&of_part, share);
         // A whole minibatch is not multiplied by 1.
-        let total = if share < 1.0 { losses.total * share } else { losses.total };
+        let total = if share < 1.0 { total * share } else { total };
         sum.add(NamedGrads::take(nets, "", total.backward())?);
     }
     let (norm, scale) = sum.clip_factor(config.max_grad_norm, steps)?;

@@ -1,7 +1,7 @@
 //! One update from top to bottom: rollout → advantages → minibatches → loss → step. Its formulas are in
 //! `objective.rs`.
 
-use super::batch::{Batch, minibatches};
+use super::batch::{Batch, JoinedRows, minibatches};
 use super::objective::gae;
 use super::on_device::{Reports, SentRollout};
 use super::step::{Moment, step_in_parts};
@@ -35,15 +35,19 @@ impl PpoLearner {
         let config = &self.config;
         let estimate = gae(rollout, &rewards, config.gamma, config.lambda, config.time_limit);
         let explained_variance = explained_variance(&rollout.values, &estimate.returns);
+        let latent = self.base.spec.latent;
+        let teacher = self.teacher_output(rollout)?;
+        let start = Instant::now();
+        let joined = JoinedRows::of(rollout, latent, self.base.obs_stats().as_deref());
         let batch = Batch {
             rollout,
             advantages: estimate.advantages,
             returns: estimate.returns,
-            teacher: self.teacher_output(rollout)?,
-            latent: self.base.spec.latent,
-            stats: self.base.obs_stats(),
+            teacher,
+            latent,
+            joined,
             norm_adv: config.norm_adv,
-            gathering: Cell::default(),
+            gathering: Cell::new(start.elapsed()),
         };
         let lr = config.lr_at(self.base.updates);
         let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));

@@ -1,15 +1,24 @@
 //! The decoder's confidence in each row, α in the paper: how much the divergence of the row counts.
 
 use super::{ConfidenceKind, PenaltyForm, ScoreConfig, marginal_densities};
-use crate::nn::{HostDist, argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian};
+use crate::nn::{HostDist, argmax, categorical_at, categorical_log_prob, gaussian_log_prob, sample_gaussian};
+use crate::rng::unit;
 use crate::{Actions, LearnError};
 use rand::Rng;
+use rayon::prelude::*;
+
+/// Rows that a thread takes at a time.
+const ROWS: usize = 1024;
 
 /// One action per row, drawn from the decoder.
 pub fn own_samples<R: Rng + ?Sized>(decoder: &HostDist, rng: &mut R) -> Actions {
     let rows = decoder.head.chunks_exact(decoder.dim);
     match &decoder.log_std {
-        None => Actions::Discrete(rows.map(|logits| sample_categorical(logits, rng)).collect()),
+        None => {
+            let draws: Vec<f64> = rows.map(|_| unit(rng)).collect();
+            let rows = decoder.head.par_chunks_exact(decoder.dim).zip(draws).with_min_len(ROWS);
+            Actions::Discrete(rows.map(|(logits, draw)| categorical_at(logits, draw)).collect())
+        }
         Some(stds) => {
             let stds = stds.chunks_exact(decoder.dim);
             let values = rows.zip(stds).flat_map(|(m, s)| sample_gaussian(m, s, rng)).collect();
@@ -50,7 +59,7 @@ pub fn penalty_weights<R: Rng + ?Sized>(
 /// [`LearnError::Action`] or [`LearnError::Shape`] if the actions do not fit the decoder.
 pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) -> Result<Vec<f32>, LearnError> {
     let (dim, kind) = (decoder.dim, kind.resolved(decoder.log_std.is_some()));
-    let rows = decoder.head.chunks_exact(dim);
+    let rows = decoder.head.par_chunks_exact(dim);
     if kind == ConfidenceKind::Off {
         return Ok(vec![1.0; rows.len()]);
     }
@@ -64,11 +73,12 @@ pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) 
                 ConfidenceKind::BoundedDensity => logits[a as usize] - logits[argmax(logits) as usize],
                 _ => categorical_log_prob(logits, a),
             };
-            Ok(rows.zip(actions).map(|row| log_prob(row).exp()).collect())
+            Ok(rows.zip(actions).with_min_len(ROWS).map(|row| log_prob(row).exp()).collect())
         }
         (Some(stds), Actions::Continuous { dim: width, values }) if *width == dim => {
-            let rows = rows.zip(stds.chunks_exact(dim)).zip(values.chunks_exact(dim));
+            let rows = rows.zip(stds.par_chunks_exact(dim)).zip(values.par_chunks_exact(dim));
             Ok(rows
+                .with_min_len(ROWS)
                 .map(|((mean, log_std), action)| match kind {
                     ConfidenceKind::Density => gaussian_log_prob(mean, log_std, action).exp(),
                     ConfidenceKind::BoundedDensity => (-0.5 * square_sum(mean, log_std, action)).exp() as f32,

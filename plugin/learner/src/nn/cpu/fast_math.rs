@@ -45,6 +45,20 @@ pub(super) fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + exp(y))
 }
 
+/// exp of each number up to 88; below -87 it stays e^-87. NaN stays NaN.
+#[inline(always)]
+pub(super) fn exp_into(values: &[f32], to: &mut [f32]) {
+    // The comparison is false for NaN, so that it is kept.
+    to.iter_mut().zip(values).for_each(|(to, &x)| *to = exp(if x < -87.0 { -87.0 } else { x }));
+}
+
+/// exp of each number, as [`exp_into`] gives it.
+pub(in crate::nn) fn exp_of(values: &[f32]) -> Vec<f32> {
+    let mut exps = vec![0.0; values.len()];
+    vectorized(|| exp_into(values, &mut exps));
+    exps
+}
+
 /// exp(x) for |x| ≤ 88.
 #[inline(always)]
 fn exp(x: f32) -> f32 {

@@ -8,6 +8,7 @@
 use super::fast_math;
 use super::gru_scan::{self, Scan, ScanGrads, ScanInput, Sizes, Wanted};
 use super::host_numbers::{HostNumbers, data, tensor};
+use super::log_softmax::{log_softmax_backward, log_softmax_in_place};
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind, unary};
@@ -19,6 +20,11 @@ use std::sync::Arc;
 /// tanh of every element, on a device with kernels.
 pub(in crate::nn) fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     Tensor::from_dispatch(Dispatch::kernel_tanh(x.into_dispatch()))
+}
+
+/// Logarithms of the probabilities whose logits are the rows of `x`, on a device with kernels.
+pub(in crate::nn) fn log_softmax(x: Tensor<2>) -> Tensor<2> {
+    Tensor::from_dispatch(Dispatch::kernel_log_softmax(x.into_dispatch()))
 }
 
 /// What a recurrent layer of T steps works on.
@@ -57,6 +63,9 @@ pub(super) trait Kernels: Backend {
     /// tanh of every element.
     fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self>;
 
+    /// ln softmax of each row.
+    fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self>;
+
     /// A recurrent layer, with the tensors of [`GruInput`]. Gives `[T * B, directions * hidden]`.
     fn kernel_gru(
         x: FloatTensor<Self>,
@@ -73,6 +82,11 @@ macro_rules! host_kernels {
         impl Kernels for $backend {
             fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
                 edited::<Self>(x, fast_math::tanh_in_place)
+            }
+
+            fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self> {
+                let choices = x.shape()[1];
+                edited::<Self>(x, |x| log_softmax_in_place(x, choices))
             }
 
             fn kernel_gru(
@@ -97,6 +111,15 @@ impl<B: Kernels + HostNumbers, C: CheckpointStrategy> Kernels for Autodiff<B, C>
         let (x, node) = x.into_parts();
         let y = B::kernel_tanh(x);
         match Tanh.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(y.clone(), y),
+            OpsKind::UnTracked(prep) => prep.finish(y),
+        }
+    }
+
+    fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        let (x, node) = x.into_parts();
+        let y = B::kernel_log_softmax(x);
+        match LogSoftmax.prepare::<C>([node]).compute_bound().stateful() {
             OpsKind::Tracked(prep) => prep.finish(y.clone(), y),
             OpsKind::UnTracked(prep) => prep.finish(y),
         }
@@ -147,6 +170,21 @@ impl<B: Kernels> Backward<B, 1> for Tanh {
         let y = data::<B>(ops.state);
         unary::<B, _>(ops.parents, ops.node, grads, |grad| {
             edited::<B>(grad, |grad| fast_math::tanh_backward(grad, y.as_slice().expect("tensors are made of f32")))
+        });
+    }
+}
+
+#[derive(Debug)]
+struct LogSoftmax;
+
+impl<B: Kernels + HostNumbers> Backward<B, 1> for LogSoftmax {
+    type State = FloatTensor<B>;
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let y = ops.state;
+        let choices = y.shape()[1];
+        unary::<B, _>(ops.parents, ops.node, grads, |grad| {
+            edited::<B>(grad, |grad| log_softmax_backward(grad, &B::numbers(&y), choices))
         });
     }
 }

@@ -20,6 +20,6 @@ pub(crate) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work:
 }
 
 /// [`share`] for items that are pieces already.
-pub(super) fn share_each<T: Send>(items: &mut [T], products: usize, work: impl Fn(usize, &mut T) + Sync) {
+pub(crate) fn share_each<T: Send>(items: &mut [T], products: usize, work: impl Fn(usize, &mut T) + Sync) {
     share(items, 1, products, |piece, items| items.iter_mut().for_each(|item| work(piece, item)));
 }

@@ -1,0 +1,86 @@
+//! A number that was computed elsewhere, together with its gradient, as a node of the gradient graph.
+
+#![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
+
+use super::host_numbers::{HostNumbers, tensor};
+use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension};
+use burn::tensor::Tensor;
+
+/// The number `value`, `[1]`, which changes by `gradient`, of the shape of `x`, where `x` does. On a device with kernels.
+pub(crate) fn known_gradient<const D: usize>(x: Tensor<D>, value: f32, gradient: Vec<f32>) -> Tensor<1> {
+    Tensor::from_dispatch(Dispatch::known_gradient(x.into_dispatch(), value, gradient))
+}
+
+/// What a backend with numbers in host memory can do.
+#[backend_extension(Flex, NdArray, Autodiff)]
+pub(super) trait KnownGradient: Backend {
+    /// As [`known_gradient`].
+    fn known_gradient(x: FloatTensor<Self>, value: f32, gradient: Vec<f32>) -> FloatTensor<Self>;
+}
+
+impl KnownGradient for Flex {
+    fn known_gradient(x: FloatTensor<Self>, value: f32, _: Vec<f32>) -> FloatTensor<Self> {
+        tensor::<Self>(vec![value], [1], &x.device())
+    }
+}
+
+impl KnownGradient for NdArray {
+    fn known_gradient(x: FloatTensor<Self>, value: f32, _: Vec<f32>) -> FloatTensor<Self> {
+        tensor::<Self>(vec![value], [1], &x.device())
+    }
+}
+
+impl<B: KnownGradient + HostNumbers, C: CheckpointStrategy> KnownGradient for Autodiff<B, C> {
+    fn known_gradient(x: FloatTensor<Self>, value: f32, gradient: Vec<f32>) -> FloatTensor<Self> {
+        let (x, node) = x.into_parts();
+        let value = tensor::<B>(vec![value], [1], &x.device());
+        match Known.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(tensor::<B>(gradient, x.shape(), &x.device()), value),
+            OpsKind::UnTracked(prep) => prep.finish(value),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Known;
+
+impl<B: KnownGradient + HostNumbers> Backward<B, 1> for Known {
+    /// The gradient by x.
+    type State = FloatTensor<B>;
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let times = B::numbers(&grads.consume::<B>(&ops.node))[0];
+        let [Some(node)] = ops.parents else { return };
+        let gradient = if times == 1.0 { ops.state } else { B::float_mul_scalar(ops.state, times.into()) };
+        grads.register::<B>(node.id, gradient);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{host, matrix, scalar};
+
+    #[test]
+    fn the_gradient_is_what_was_said() {
+        for device in [DeviceKind::Flex, DeviceKind::Ndarray] {
+            let x = matrix(vec![1.0, 2.0, 3.0, 4.0], 2, 2, &device.plain().autodiff()).require_grad();
+            let loss = known_gradient(x.clone() * 2.0, 7.0, vec![1.0, -1.0, 0.5, 0.0]) * 3.0;
+            assert_eq!(scalar(loss.clone().inner()).expect("readable"), 21.0);
+            let grads = loss.backward();
+            let of_x = host(x.grad(&grads).expect("tracked")).expect("readable");
+            assert_eq!(of_x, [6.0, -6.0, 3.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn without_a_graph_it_is_a_number() {
+        let x = matrix(vec![1.0], 1, 1, &DeviceKind::Flex.plain());
+        assert_eq!(scalar(known_gradient(x, 5.0, vec![1.0])).expect("readable"), 5.0);
+    }
+}

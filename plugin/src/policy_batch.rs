@@ -1,0 +1,55 @@
+//! What the policy decides in a tick, for all agents of a World in one pass.
+
+use bevy::prelude::*;
+use playbot_learner::{ObsKind, Observations, Policy, PolicyOutput};
+
+use crate::{
+    observation::{Observation, start_batch},
+    policy_rows::PolicyRows,
+    shared_batch::SharedBatch,
+    skill_prior::ActiveSkill,
+};
+
+/// The states for which the policy has decided in this tick, and the agents that were in them.
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, Default)]
+pub struct PolicyBatch {
+    agents: Vec<Entity>,
+    rows: PolicyRows,
+}
+
+impl PolicyBatch {
+    /// What the agents saw, in their order.
+    pub fn observations(&self) -> &Observations {
+        &self.rows.observations
+    }
+
+    /// Whose they are.
+    pub(crate) fn agents(&self) -> &[Entity] {
+        &self.agents
+    }
+
+    pub(crate) fn start(&mut self, kind: &ObsKind) {
+        let PolicyRows { observations, skills, count } = &mut self.rows;
+        start_batch(observations, kind);
+        skills.clear();
+        *count = 0;
+        self.agents.clear();
+    }
+
+    pub(crate) fn push(&mut self, agent: Entity, observation: &Observation, skill: &ActiveSkill) {
+        self.agents.push(agent);
+        observation.push_to(&mut self.rows.observations);
+        self.rows.skills.extend_from_slice(&skill.z);
+        self.rows.count += 1;
+    }
+
+    /// In one pass, together with other Worlds if there are any.
+    pub(crate) fn decide(&mut self, policy: &Policy, shared: Option<&SharedBatch>) -> Result<PolicyOutput, String> {
+        match shared {
+            Some(shared) => shared.decide(&mut self.rows),
+            None => self.rows.decide(policy).map_err(|error| error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! The states for which a policy decides in one pass.
+
+use playbot_learner::{LearnError, Observations, Policy, PolicyOutput};
+
+/// The states for which a policy decides at once.
+#[derive(Clone, Debug)]
+pub struct PolicyRows {
+    /// `count` observations.
+    pub observations: Observations,
+    /// `count` skills, one behind the other; empty without skills.
+    pub skills: Vec<f32>,
+    /// Number of states.
+    pub count: usize,
+}
+
+impl Default for PolicyRows {
+    fn default() -> Self {
+        Self { observations: Observations::Vector(Vec::new()), skills: Vec::new(), count: 0 }
+    }
+}
+
+impl PolicyRows {
+    /// What the policy thinks of them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Policy::forward`].
+    pub fn decide(&self, policy: &Policy) -> Result<PolicyOutput, LearnError> {
+        policy.forward(&self.skills, &self.observations, self.count)
+    }
+
+    pub(crate) fn append(&mut self, more: &Self) -> Result<(), LearnError> {
+        self.observations.push(&more.observations)?;
+        self.skills.extend_from_slice(&more.skills);
+        self.count += more.count;
+        Ok(())
+    }
+}

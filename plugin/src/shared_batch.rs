@@ -1,0 +1,168 @@
+//! Several Worlds that decide together: one forward pass for the agents of all of them.
+//!
+//! A pass over a few rows takes a graphics card as long as one over thousands, and Worlds of a single agent spend more on
+//! passing than on computing. So each World gets a thread and a seat. It lays its rows on the table and waits; whoever
+//! completes a group computes for all of it. There are two groups: one simulates while the other is decided for.
+//!
+//! What becomes of a row does not depend on the rows beside it, so the games take the course that they take alone.
+
+use std::sync::{
+    Arc, Condvar, Mutex, MutexGuard, PoisonError,
+    mpsc::{Receiver, Sender, channel},
+};
+
+use bevy::prelude::*;
+use playbot_learner::{LearnError, Observations, Policy, PolicyOutput};
+
+use crate::policy_rows::PolicyRows;
+
+/// A World's place among those that decide together.
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug)]
+pub struct SharedBatch {
+    table: Arc<Table>,
+    seat: usize,
+}
+
+/// Seats of even number make one group, those of odd number the other.
+const GROUPS: usize = 2;
+
+#[derive(Debug)]
+struct Table {
+    policy: Policy,
+    groups: [Mutex<Group>; GROUPS],
+    /// How many more Worlds may simulate: with too many they would take the cores from each other.
+    free: Mutex<usize>,
+    freed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Group {
+    /// Worlds that have not left.
+    worlds: usize,
+    waiting: Vec<Waiting>,
+}
+
+/// A World that has laid its rows on the table.
+#[derive(Debug)]
+struct Waiting {
+    seat: usize,
+    rows: PolicyRows,
+    answer: Sender<Answer>,
+}
+
+/// A World's own rows, and what the policy thinks of them.
+type Answer = (PolicyRows, Result<PolicyOutput, String>);
+
+impl SharedBatch {
+    /// Seats for as many Worlds, of which at most `threads` simulate at a time. Each plays on a thread of its own.
+    pub fn seats(policy: &Policy, worlds: usize, threads: usize) -> Vec<Self> {
+        let group = |first| Mutex::new(Group { worlds: (first..worlds).step_by(GROUPS).count(), waiting: Vec::new() });
+        let table = Arc::new(Table {
+            policy: policy.clone(),
+            groups: std::array::from_fn(group),
+            free: Mutex::new(threads.max(1)),
+            freed: Condvar::new(),
+        });
+        (0..worlds).map(|seat| Self { table: table.clone(), seat }).collect()
+    }
+
+    /// Waits until this World may simulate. It leaves the table when the guard goes, and nobody waits for it any more.
+    pub fn play(&self) -> Playing<'_> {
+        self.table.begin();
+        Playing(self)
+    }
+
+    /// What the policy thinks of the rows, which all Worlds of a group bring at the same time; on the thread that has
+    /// [begun to play](Self::play).
+    ///
+    /// # Errors
+    ///
+    /// Why nobody could compute it, in words.
+    pub(crate) fn decide(&self, rows: &mut PolicyRows) -> Result<PolicyOutput, String> {
+        let (answer, answered) = channel();
+        let mine = Waiting { seat: self.seat, rows: std::mem::take(rows), answer };
+        self.change(|group| group.waiting.push(mine));
+        self.table.end();
+        let output = self.receive(&answered, rows);
+        self.table.begin();
+        output
+    }
+
+    fn receive(&self, answered: &Receiver<Answer>, rows: &mut PolicyRows) -> Result<PolicyOutput, String> {
+        let (mine, output) = answered.recv().map_err(|_| "the World that computed for all has stopped".to_owned())?;
+        *rows = mine;
+        output
+    }
+
+    /// Changes the group; if everybody waits then, this thread computes for all of them.
+    fn change(&self, change: impl FnOnce(&mut Group)) {
+        let mut group = lock(&self.table.groups[self.seat % GROUPS]);
+        change(&mut group);
+        if group.waiting.len() == group.worlds && group.worlds > 0 {
+            let waiting = std::mem::take(&mut group.waiting);
+            drop(group);
+            compute(&self.table.policy, waiting);
+        }
+    }
+}
+
+/// A World that simulates, or waits for its turn.
+#[must_use]
+#[derive(Debug)]
+pub struct Playing<'a>(&'a SharedBatch);
+
+impl Drop for Playing<'_> {
+    fn drop(&mut self) {
+        self.0.change(|group| group.worlds -= 1);
+        self.0.table.end();
+    }
+}
+
+impl Table {
+    fn begin(&self) {
+        let free = lock(&self.free);
+        let mut free = self.freed.wait_while(free, |free| *free == 0).unwrap_or_else(PoisonError::into_inner);
+        *free -= 1;
+    }
+
+    fn end(&self) {
+        *lock(&self.free) += 1;
+        self.freed.notify_one();
+    }
+}
+
+/// A World that has panicked leaves what it has locked as it was.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Computes for all that wait, and wakes them.
+fn compute(policy: &Policy, mut waiting: Vec<Waiting>) {
+    // The order in which they came is nobody's business.
+    waiting.sort_by_key(|world| world.seat);
+    let outputs = outputs(policy, &waiting).map_err(|error| error.to_string());
+    let mut outputs = outputs.map(Vec::into_iter);
+    for Waiting { rows, answer, .. } in waiting {
+        let output = match &mut outputs {
+            Ok(outputs) => outputs.next().ok_or_else(|| "the policy has left out some".to_owned()),
+            Err(error) => Err(error.clone()),
+        };
+        // Nobody is there any more if that World has panicked.
+        drop(answer.send((rows, output)));
+    }
+}
+
+fn outputs(policy: &Policy, waiting: &[Waiting]) -> Result<Vec<PolicyOutput>, LearnError> {
+    if let [alone] = waiting {
+        return Ok(vec![alone.rows.decide(policy)?]);
+    }
+    let mut all = PolicyRows { observations: Observations::empty(&policy.observation()), ..PolicyRows::default() };
+    waiting.iter().try_for_each(|world| all.append(&world.rows))?;
+    let sizes: Vec<usize> = waiting.iter().map(|world| world.rows.count).collect();
+    Ok(all.decide(policy)?.split(&sizes))
+}
+
+#[cfg(test)]
+mod tests;
