@@ -59,7 +59,7 @@ pub use error::{FileError, LearnError};
 pub use file::{write_atomically, write_atomically_with};
 pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;
-pub use observation::{ImageShape, ObsKind, ObsSlice, Observations, PictureCard};
+pub use observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureCard};
 pub use policy::{Policy, PolicyOutput, StdKind};
 pub use policy_file::{PolicyCard, PolicyFile};
 pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};

@@ -61,6 +61,7 @@ pub fn ppo(criterion: &mut Criterion) {
     let mut column = || Tensor::<1>::from_data(TensorData::new(normals(rows, &mut rng), [rows]), &device);
     let batch = Minibatch {
         inputs: Tensor::<2>::from_data(inputs, &device).into(),
+        augmented: None,
         ppo: PpoBatch {
             actions: ActionBatch::new(&actions, &device),
             old_log_probs: column() * 0.01 - (CHOICES as f32).ln(),

@@ -127,6 +127,15 @@ impl Dist {
         }
     }
 
+    /// The same numbers, which no gradient goes through.
+    #[must_use]
+    pub(crate) fn detach(self) -> Self {
+        match self {
+            Self::Categorical { log_probs } => Self::Categorical { log_probs: log_probs.detach() },
+            Self::Gaussian { mean, log_std } => Self::Gaussian { mean: mean.detach(), log_std: log_std.detach() },
+        }
+    }
+
     /// Some of the rows, which may repeat.
     pub(crate) fn select(&self, rows: &Tensor<1, Int>) -> Self {
         let of = |values: &Tensor<2>| values.clone().select(0, rows.clone());

@@ -3,14 +3,15 @@
 use super::PpoConfig;
 use super::objective::{PpoBatch, normalize_advantages};
 use super::step::Minibatch;
-use crate::nn::{ActionBatch, ImageNet, vector};
+use crate::nn::{ActionBatch, ImageNet, ObsBatch, vector};
 use crate::norm::ObsStats;
-use crate::policy::{InputBuilder, joined_rows};
+use crate::observation::augmented;
+use crate::policy::{InputBuilder, NetInput, joined_rows};
 use crate::rng::{ChaCha8Rng, shuffle};
 use crate::score::{PenaltyForm, ScoreConfig, TeacherOutput};
-use crate::{ObsKind, ObsSlice, Observations, Rollout};
+use crate::{Augmentation, ObsKind, ObsSlice, Observations, Rollout};
 use burn::tensor::Device;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 /// A rollout with everything that an update reads beside it, one entry per row.
@@ -25,6 +26,8 @@ pub(super) struct Batch<'a> {
     /// What the networks read of vectors, joined and normalised once for all epochs.
     pub(super) joined: Option<JoinedRows>,
     pub(super) norm_adv: bool,
+    /// Changes of images that the networks shall not mind, and what draws them.
+    pub(super) augment: (Vec<Augmentation>, RefCell<ChaCha8Rng>),
     /// Time spent putting minibatches together.
     pub(super) gathering: Cell<Duration>,
 }
@@ -104,11 +107,30 @@ impl Batch<'_> {
         })
     }
 
+    /// The images of these `rows` after changes, with the skills that `inputs` has for them; `None` without changes.
+    pub(super) fn augmented(&self, inputs: &NetInput, rows: &[usize], device: &Device) -> Option<NetInput> {
+        let (augmentations, rng) = &self.augment;
+        let (NetInput::Images { z, .. }, ObsSlice::Image(pixels), ObsKind::Image(shape)) =
+            (inputs, self.rollout.obs.as_slice(), &self.rollout.obs_kind)
+        else {
+            return None;
+        };
+        if augmentations.is_empty() {
+            return None;
+        }
+        let changed = augmented(pixels, shape, rows, augmentations, &mut rng.borrow_mut());
+        let all: Vec<usize> = (0..rows.len()).collect();
+        let pixels = ObsBatch::gather(&changed, [shape.channels, shape.height, shape.width], &all, device);
+        Some(NetInput::Images { z: z.clone(), pixels })
+    }
+
     fn minibatch(&self, rows: &[usize], advantages: Vec<f32>, device: &Device) -> Minibatch {
         let rollout = self.rollout;
         let pick = |values: &[f32]| -> Vec<f32> { rows.iter().map(|&r| values[r]).collect() };
+        let inputs = self.inputs().input(rows, device);
         Minibatch {
-            inputs: self.inputs().input(rows, device),
+            augmented: self.augmented(&inputs, rows, device),
+            inputs,
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions.gather(rows), device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

@@ -2,7 +2,7 @@
 
 use crate::nn::{Activation, CnnKind};
 use crate::norm::{RewardNormalizer, RewardReset};
-use crate::{LearnError, TimeLimit};
+use crate::{Augmentation, LearnError, ObsKind, TimeLimit};
 use serde::{Deserialize, Serialize};
 
 /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
@@ -63,6 +63,11 @@ pub struct PpoConfig {
     /// Updates in which only the critic learns: a critic that knows nothing yet would drive a policy that starts as a copy of
     /// the decoder away from it.
     pub critic_warmup: u64,
+    /// Changes of images that actor and critic shall not mind (Raileanu et al. 2021, "Automatic data augmentation for
+    /// generalization in reinforcement learning", DrAC); all of them at once, and none if empty.
+    pub augment: Vec<Augmentation>,
+    /// Weight of what they mind, the divergence of the actor and the squared error of the critic.
+    pub augment_coef: f64,
     /// Whether the critic's loss trains the convolutions over images, too, or reads what they make for the policy. It never
     /// does while the critic warms up.
     pub critic_trains_cnn: bool,
@@ -96,6 +101,8 @@ impl Default for PpoConfig {
             adam_eps: 1e-5,
             weight_decay: 0.0,
             critic_warmup: 0,
+            augment: Vec::new(),
+            augment_coef: 0.1,
             critic_trains_cnn: true,
         }
     }
@@ -132,13 +139,22 @@ impl PpoConfig {
         if let Some((name, x)) = weights.iter().find(|(_, x)| !x.is_finite()) {
             return bad(format!("ppo {name} must be finite, not {x}"));
         }
-        if !(self.weight_decay >= 0.0 && self.weight_decay.is_finite()) {
-            return bad(format!("ppo weight_decay must not be negative, but is {}", self.weight_decay));
+        let at_least_0 = [("weight_decay", self.weight_decay), ("augment_coef", self.augment_coef)];
+        if let Some((name, x)) = at_least_0.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+            return bad(format!("ppo {name} must not be negative, but is {x}"));
         }
         if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
             return bad("ppo anneal_lr needs total_updates".into());
         }
         Ok(())
+    }
+
+    /// `Ok` if such observations can be changed as these settings say.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] names the first change that they cannot take.
+    pub fn check_observation(&self, observation: &ObsKind) -> Result<(), LearnError> {
+        self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo augment", observation))
     }
 
     /// The normaliser of rewards that these settings describe.

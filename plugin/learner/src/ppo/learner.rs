@@ -80,6 +80,7 @@ impl PpoLearner {
             let text = "ppo norm_obs is for vectors: the pixels of images are divided by 255 instead";
             return Err(LearnError::Config(text.to_owned()));
         }
+        config.check_observation(&spec.obs)?;
         let rewards = config.norm_reward.then(|| config.reward_normalizer());
         LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)
     }

@@ -23,15 +23,25 @@ pub struct UpdateMetrics {
     /// Mean of the decoder's confidence, α in the paper; `None` without a penalty.
     #[serde(rename = "alpha_mean")]
     pub confidence: Option<f32>,
+    /// How much actor and critic mind changed pictures, not weighted; `None` without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub augmentation_loss: Option<f32>,
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
     /// The learning rate used.
     pub lr: f32,
 }
 
+/// Which terms a loss has beside those of PPO.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Has {
+    pub(super) penalty: bool,
+    pub(super) augmentation: bool,
+}
+
 impl UpdateMetrics {
     /// The means over `steps` gradient steps whose metrics add up to `sum`.
-    pub(super) fn mean(sum: &StepMetrics, steps: usize, penalised: bool, explained_variance: f64, lr: f64) -> Self {
+    pub(super) fn mean(sum: &StepMetrics, steps: usize, has: Has, explained_variance: f64, lr: f64) -> Self {
         let mean = |total: f64| (total / steps as f64) as f32;
         Self {
             policy_loss: mean(sum.policy_loss),
@@ -40,8 +50,9 @@ impl UpdateMetrics {
             approx_kl: mean(sum.approx_kl),
             clip_fraction: mean(sum.clip_fraction),
             explained_variance: explained_variance as f32,
-            decoder_kl: penalised.then(|| mean(sum.decoder_kl)),
-            confidence: penalised.then(|| mean(sum.confidence)),
+            decoder_kl: has.penalty.then(|| mean(sum.decoder_kl)),
+            confidence: has.penalty.then(|| mean(sum.confidence)),
+            augmentation_loss: has.augmentation.then(|| mean(sum.augmentation_loss)),
             grad_norm: mean(sum.grad_norm),
             lr: lr as f32,
         }
@@ -57,6 +68,7 @@ impl UpdateMetrics {
             ("losses/approx_kl", Some(self.approx_kl)),
             ("losses/clip_fraction", Some(self.clip_fraction)),
             ("losses/explained_variance", Some(self.explained_variance)),
+            ("losses/augmentation_loss", self.augmentation_loss),
             ("losses/grad_norm", Some(self.grad_norm)),
             ("score/decoder_kl", self.decoder_kl),
             ("score/alpha_mean", self.confidence),
@@ -86,6 +98,8 @@ pub struct StepMetrics {
     pub kl_penalty: f64,
     /// Mean of the decoder's confidence.
     pub confidence: f64,
+    /// How much actor and critic mind changed pictures, not weighted.
+    pub augmentation_loss: f64,
     /// Norm of the gradient before clipping.
     pub grad_norm: f64,
 }
@@ -102,6 +116,7 @@ impl StepMetrics {
         self.decoder_kl += other.decoder_kl * share;
         self.kl_penalty += other.kl_penalty * share;
         self.confidence += other.confidence * share;
+        self.augmentation_loss += other.augmentation_loss * share;
         self.grad_norm += other.grad_norm * share;
     }
 }

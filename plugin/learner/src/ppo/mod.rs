@@ -1,5 +1,6 @@
 //! Proximal policy optimisation (Schulman et al. 2017), with or without a skill decoder.
 
+mod augmented;
 mod batch;
 mod config;
 mod host_loss;

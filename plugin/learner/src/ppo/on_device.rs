@@ -1,5 +1,6 @@
 //! An update on a graphics card: the rollout is sent once, and the numbers of all steps are read back together.
 
+use super::augmented::augmentation_loss;
 use super::batch::Batch;
 use super::objective::{PpoBatch, PpoLoss};
 use super::step::{Losses, Minibatch, Moment, outputs};
@@ -50,8 +51,10 @@ impl<'a> SentRollout<'a> {
         let at: Tensor<1, Int> = Tensor::from_data(TensorData::new(numbers, [rows.len()]), &self.device);
         let column = |values: &Tensor<1>| values.clone().select(0, at.clone());
         let advantages = column(&self.ppo.advantages);
+        let inputs = self.states.select(&at);
         Minibatch {
-            inputs: self.states.select(&at),
+            augmented: self.batch.augmented(&inputs, rows, &self.device),
+            inputs,
             ppo: PpoBatch {
                 actions: match &self.ppo.actions {
                     ActionBatch::Discrete(actions) => ActionBatch::Discrete(actions.clone().select(0, at.clone())),
@@ -117,7 +120,7 @@ pub(super) struct Reports {
 }
 
 /// Numbers of a step's report.
-const NUMBERS: usize = 9;
+const NUMBERS: usize = 10;
 
 impl Reports {
     /// As [`super::gradient_step`], with everything left on the device.
@@ -129,8 +132,9 @@ impl Reports {
         config: &PpoConfig,
         moment: &Moment<'_>,
     ) -> Result<(), LearnError> {
-        let (dist, values) = outputs(nets, batch, config, moment)?;
-        let Losses { ppo, penalty, total } = Losses::of(&dist, values, batch, config, moment)?;
+        let (dist, values) = outputs(nets, &batch.inputs, config, moment)?;
+        let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
+        let Losses { ppo, penalty, mut total } = Losses::of(&dist, values, batch, config, moment)?;
         let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
         let zero = || Tensor::zeros([1], &log_ratio.device().inner());
         let (kl, term) = match penalty {
@@ -142,10 +146,17 @@ impl Reports {
         let approx_kl = (moved.clone() - log_ratio).mean();
         let clipped = moved.abs().greater_elem(config.clip).float().mean();
         let losses = [policy_loss, value_loss, entropy].map(Tensor::inner);
+        let augmentation = match augmentation {
+            Some(loss) => {
+                total = total + loss.clone() * config.augment_coef;
+                loss.inner()
+            }
+            None => zero(),
+        };
         let whole = total.clone().inner();
         let norm = adam.step_on_device(nets, total.backward(), moment.lr, config.max_grad_norm);
         let [policy_loss, value_loss, entropy] = losses;
-        let all = vec![policy_loss, value_loss, entropy, kl, term, whole, approx_kl, clipped, norm];
+        let all = vec![policy_loss, value_loss, entropy, kl, term, whole, approx_kl, clipped, norm, augmentation];
         self.numbers.push(Tensor::cat(all, 0));
         self.confidences.push(batch.teacher.as_ref().map_or(0.0, |teacher| teacher.mean_confidence));
         Ok(())
@@ -179,6 +190,7 @@ impl Reports {
                 approx_kl: number(6),
                 clip_fraction: number(7),
                 grad_norm: number(8),
+                augmentation_loss: number(9),
                 confidence,
             };
             sum.add(&step, 1.0);

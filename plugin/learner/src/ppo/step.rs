@@ -1,5 +1,6 @@
 //! One gradient step: minibatch → loss → gradient → Adam.
 
+use super::augmented::augmentation_loss;
 use super::host_loss::HostLoss;
 use super::objective::{PpoBatch, PpoLoss, ppo_loss};
 use super::{PpoConfig, PpoNets, StepMetrics, ratio_stats};
@@ -15,6 +16,8 @@ use burn::tensor::Tensor;
 pub struct Minibatch {
     /// What actor and critic read.
     pub inputs: NetInput,
+    /// The same after the changes that they shall not mind; `None` without any.
+    pub augmented: Option<NetInput>,
     /// Constants of the PPO loss.
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
@@ -119,25 +122,31 @@ fn loss(
     moment: &Moment<'_>,
     steps: u64,
 ) -> Result<(Tensor<1>, StepMetrics), LearnError> {
-    let (dist, values) = outputs(nets, batch, config, moment)?;
-    if is_host(&values.device()) && HostLoss::is_for(moment) {
+    let (dist, values) = outputs(nets, &batch.inputs, config, moment)?;
+    let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
+    let (total, metrics) = if is_host(&values.device()) && HostLoss::is_for(moment) {
         let loss = HostLoss::of(&dist, &values, batch, config, moment, steps)?;
         let metrics = loss.metrics;
-        return Ok((loss.tensor(&dist, values), metrics));
-    }
-    let losses = Losses::of(&dist, values, batch, config, moment)?;
-    let metrics = losses.metrics(batch, config, steps)?;
-    Ok((losses.total, metrics))
+        (loss.tensor(&dist, values), metrics)
+    } else {
+        let losses = Losses::of(&dist, values, batch, config, moment)?;
+        let metrics = losses.metrics(batch, config, steps)?;
+        (losses.total, metrics)
+    };
+    let Some(augmentation) = augmentation else { return Ok((total, metrics)) };
+    let augmentation_loss = finite("augmentation_loss", &augmentation, steps)?;
+    let total_loss = metrics.total_loss + config.augment_coef * augmentation_loss;
+    Ok((total + augmentation * config.augment_coef, StepMetrics { augmentation_loss, total_loss, ..metrics }))
 }
 
-/// What actor and critic say to a minibatch.
+/// What actor and critic say to what they read.
 pub(super) fn outputs(
     nets: &PpoNets,
-    batch: &Minibatch,
+    inputs: &NetInput,
     config: &PpoConfig,
     moment: &Moment<'_>,
 ) -> Result<(Dist, Tensor<1>), LearnError> {
-    let inputs = nets.actor.join(&batch.inputs)?;
+    let inputs = nets.actor.join(inputs)?;
     let dist = nets.actor.forward(inputs.clone());
     let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
     Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs })))

@@ -2,6 +2,7 @@
 //! `objective.rs`.
 
 use super::batch::{Batch, JoinedRows, minibatches};
+use super::metrics::Has;
 use super::objective::gae;
 use super::on_device::{Reports, SentRollout};
 use super::step::{Moment, step_in_parts};
@@ -47,6 +48,7 @@ impl PpoLearner {
             latent,
             joined,
             norm_adv: config.norm_adv,
+            augment: (config.augment.clone(), self.base.streams.stream("ppo.augment", self.base.updates).into()),
             gathering: Cell::new(start.elapsed()),
         };
         let lr = config.lr_at(self.base.updates);
@@ -65,7 +67,8 @@ impl PpoLearner {
             normalizer.update(values);
         }
         let steps = self.config.epochs * self.config.minibatches.min(rollout.rows());
-        Ok(UpdateMetrics::mean(&sum, steps, batch.teacher.is_some(), explained_variance, lr))
+        let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
+        Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
     }
 
     fn steps(

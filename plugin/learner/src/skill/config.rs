@@ -3,7 +3,7 @@
 use super::{ActionInput, WindowRule};
 use crate::nn::CnnKind;
 use crate::policy::StdKind;
-use crate::{ActionSpace, LearnError, ObsKind};
+use crate::{ActionSpace, Augmentation, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
 /// How the terms of the loss are summed.
@@ -79,6 +79,10 @@ pub struct SkillConfig {
     /// demonstrations, which are computed once and never change. Values that do not vary are centred only. A policy that
     /// is tied to the skill model sees the same numbers, its critic too. Vectors only.
     pub norm_obs: bool,
+    /// Changes that are made to images before they are learned from, all of them to each; none if empty.
+    pub augment: Vec<Augmentation>,
+    /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
+    pub weight_decay: f64,
 }
 
 impl Default for SkillConfig {
@@ -105,6 +109,8 @@ impl Default for SkillConfig {
             action_noise: 0.0,
             reduction: Reduction::Standard,
             norm_obs: false,
+            augment: Vec::new(),
+            weight_decay: 0.0,
         }
     }
 }
@@ -137,7 +143,7 @@ impl SkillConfig {
             let found = self.action_noise;
             return Err(LearnError::Config(format!("skill action_noise must be at least 0 and below 1, not {found}")));
         }
-        let weights = [("beta", self.beta), ("latent_reg", self.latent_reg)];
+        let weights = [("beta", self.beta), ("latent_reg", self.latent_reg), ("weight_decay", self.weight_decay)];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
             return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
         }
@@ -162,8 +168,9 @@ impl SkillConfig {
     /// `Ok` if a model of these settings can see `observation`s.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if images shall be normalised.
+    /// [`LearnError::Config`] if images shall be normalised, or what is no image changed as one.
     pub fn check_observation(&self, observation: ObsKind) -> Result<(), LearnError> {
+        self.augment.iter().try_for_each(|augmentation| augmentation.check("skill augment", &observation))?;
         match observation {
             ObsKind::Image(_) if self.norm_obs => {
                 let text = "skill norm_obs is for vectors: the pixels of images are divided by 255 instead";

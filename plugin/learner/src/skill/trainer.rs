@@ -6,8 +6,9 @@ use crate::nn::{
     ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, host, matrix, scalar, tracked,
 };
 use crate::norm::ObsStats;
+use crate::observation::augmented;
 use crate::rng::{Streams, normal};
-use crate::{Actions, DeviceKind, LearnError, Observations};
+use crate::{Actions, DeviceKind, LearnError, ObsKind, Observations};
 use burn::tensor::Tensor;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -104,7 +105,7 @@ impl SkillTrainer {
         Ok(Self {
             stats: if config.norm_obs { dataset.stats().map(Arc::new) } else { None },
             nets: tracked(nets),
-            adam: Adam::new(AdamConfig { eps: 1e-8, ..AdamConfig::default() }),
+            adam: Adam::new(AdamConfig { eps: 1e-8, weight_decay: config.weight_decay, ..AdamConfig::default() }),
             epoch: 0,
             next: 0,
             sums: MetricSums::default(),
@@ -247,6 +248,13 @@ impl SkillTrainer {
         let (mut observations, actions) = self.dataset.gather(windows, steps)?;
         if let (Some(stats), Observations::Vector(values)) = (&self.stats, &mut observations) {
             *values = stats.normalize(values);
+        }
+        if let (Observations::Image(pixels), ObsKind::Image(shape)) = (&mut observations, &self.dataset.observation)
+            && !self.config.augment.is_empty()
+        {
+            let mut rng = self.streams.stream("skill.augment", self.adam.steps());
+            let all: Vec<usize> = (0..steps * batch).collect();
+            *pixels = augmented(pixels, shape, &all, &self.config.augment, &mut rng);
         }
         let states = ObsBatch::new(observations, &self.dataset.observation, &device);
         let encoded = matrix(input.encode(&actions, space)?, steps * batch, input.width(space), &device);

@@ -45,8 +45,8 @@ pub fn image(quarter: u32, rng: &mut ChaCha8Rng) -> Vec<u8> {
     pixels
 }
 
-/// A skill model of players who look at the picture six times in ten, and guess otherwise. Not trained at all for 0 epochs.
-pub fn model(epochs: usize, seed: u64) -> SkillModel {
+/// Players who look at the picture six times in ten, and guess otherwise; with settings to learn from them.
+pub fn demonstrations(seed: u64) -> (SkillConfig, Dataset) {
     let config = SkillConfig {
         latent: 2,
         beta: 0.5,
@@ -66,7 +66,12 @@ pub fn model(epochs: usize, seed: u64) -> SkillModel {
         let named = quarters.iter().map(|&quarter| name(quarter)).collect();
         DemoEpisode { observations: pixels.into(), actions: Actions::Discrete(named) }
     });
-    let dataset = Dataset::new(SHAPE, SPACE, episodes.collect()).expect("consistent");
+    (config, Dataset::new(SHAPE, SPACE, episodes.collect()).expect("consistent"))
+}
+
+/// A skill model of these [`demonstrations`]. Not trained at all for 0 epochs.
+pub fn model(epochs: usize, seed: u64) -> SkillModel {
+    let (config, dataset) = demonstrations(seed);
     let mut trainer = SkillTrainer::new(config, dataset, seed, DeviceKind::Flex).expect("windows fit");
     for _ in 0..epochs {
         trainer.train_epoch(&mut |_| ControlFlow::Continue(())).expect("finite");

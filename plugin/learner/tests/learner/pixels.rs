@@ -205,6 +205,7 @@ fn minibatch(rows: usize) -> Minibatch {
         Tensor::<1>::from_data(TensorData::new(values, [rows]), &device)
     };
     Minibatch {
+        augmented: None,
         inputs: NetInput::Images {
             z: None,
             pixels: Tensor::from_data(TensorData::new(pixels, [rows, 1, SHAPE.height, SHAPE.width]), &device),
