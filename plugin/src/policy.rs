@@ -91,7 +91,7 @@ pub(crate) fn plugin(app: &mut App) {
 /// Decides for all agents under [`Control::Policy`] in one batched forward pass.
 pub(crate) fn run_policy(
     active: Res<ActivePolicy>,
-    shared: Option<Res<SharedBatch>>,
+    (shared, prior): (Option<Res<SharedBatch>>, Option<Res<SkillPrior>>),
     order: Res<AgentOrder>,
     mut agents: Query<(
         &Agent,
@@ -106,6 +106,7 @@ pub(crate) fn run_policy(
     mut faults: ResMut<Faults>,
     mut batch: ResMut<PolicyBatch>,
 ) {
+    let horizon = prior.map(|prior| prior.horizon);
     batch.start(&active.policy.observation());
     for &entity in order.entities() {
         let Ok((agent, control, episode, (observation, sensor), skill, ..)) = agents.get(entity) else { continue };
@@ -116,7 +117,7 @@ pub(crate) fn run_policy(
             faults.report(why);
             return;
         }
-        batch.push(entity, observation, skill);
+        batch.push(entity, observation, skill, horizon);
     }
     if batch.agents().is_empty() {
         return;

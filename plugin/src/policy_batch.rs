@@ -25,23 +25,31 @@ impl PolicyBatch {
         &self.rows.observations
     }
 
+    /// What was left of their skills; empty without skills.
+    pub fn left(&self) -> &[f32] {
+        &self.rows.left
+    }
+
     /// Whose they are.
     pub(crate) fn agents(&self) -> &[Entity] {
         &self.agents
     }
 
     pub(crate) fn start(&mut self, kind: &ObsKind) {
-        let PolicyRows { observations, skills, count } = &mut self.rows;
+        let PolicyRows { observations, skills, left, count } = &mut self.rows;
         start_batch(observations, kind);
         skills.clear();
+        left.clear();
         *count = 0;
         self.agents.clear();
     }
 
-    pub(crate) fn push(&mut self, agent: Entity, observation: &Observation, skill: &ActiveSkill) {
+    /// An agent, what it sees, and its skill, of which there is a new one every `horizon` ticks.
+    pub(crate) fn push(&mut self, agent: Entity, observation: &Observation, skill: &ActiveSkill, horizon: Option<u32>) {
         self.agents.push(agent);
         observation.push_to(&mut self.rows.observations);
         self.rows.skills.extend_from_slice(&skill.z);
+        self.rows.left.extend(horizon.map(|horizon| skill.left(horizon)));
         self.rows.count += 1;
     }
 

@@ -9,13 +9,15 @@ pub struct PolicyRows {
     pub observations: Observations,
     /// `count` skills, one behind the other; empty without skills.
     pub skills: Vec<f32>,
+    /// The share of each skill's ticks that is left, this one included; empty without skills.
+    pub left: Vec<f32>,
     /// Number of states.
     pub count: usize,
 }
 
 impl Default for PolicyRows {
     fn default() -> Self {
-        Self { observations: Observations::Vector(Vec::new()), skills: Vec::new(), count: 0 }
+        Self { observations: Observations::Vector(Vec::new()), skills: Vec::new(), left: Vec::new(), count: 0 }
     }
 }
 
@@ -24,14 +26,15 @@ impl PolicyRows {
     ///
     /// # Errors
     ///
-    /// As [`Policy::forward`].
+    /// As [`Policy::forward_held`].
     pub fn decide(&self, policy: &Policy) -> Result<PolicyOutput, LearnError> {
-        policy.forward(&self.skills, &self.observations, self.count)
+        policy.forward_held(&self.skills, &self.left, &self.observations, self.count)
     }
 
     pub(crate) fn append(&mut self, more: &Self) -> Result<(), LearnError> {
         self.observations.push(&more.observations)?;
         self.skills.extend_from_slice(&more.skills);
+        self.left.extend_from_slice(&more.left);
         self.count += more.count;
         Ok(())
     }

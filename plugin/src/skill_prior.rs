@@ -62,6 +62,16 @@ pub struct ActiveSkill {
     pub ticks_left: u32,
 }
 
+impl ActiveSkill {
+    /// The share of its ticks that is left, this one included, where skills are held for `horizon` ticks. One that has run out
+    /// makes room for a whole one.
+    // Hidden: for rollouts.
+    #[doc(hidden)]
+    pub fn left(&self, horizon: u32) -> f32 {
+        if self.ticks_left == 0 { 1.0 } else { self.ticks_left as f32 / horizon.max(1) as f32 }
+    }
+}
+
 /// What skills add to every agent.
 pub(crate) fn plugin(app: &mut App) {
     app.register_required_components::<Agent, ActiveSkill>();

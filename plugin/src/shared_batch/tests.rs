@@ -11,7 +11,7 @@ fn policy() -> Policy {
 fn rows(world: usize, tick: usize) -> PolicyRows {
     let count = 1 + world % 3;
     let numbers = (0..2 * count).map(|i| (world * 100 + tick * 10 + i) as f32 * 0.01).collect();
-    PolicyRows { observations: Observations::Vector(numbers), skills: Vec::new(), count }
+    PolicyRows { observations: Observations::Vector(numbers), count, ..PolicyRows::default() }
 }
 
 /// Worlds that play `ticks(world)` ticks each.

@@ -68,19 +68,20 @@ fn rollouts_hold_the_skill_of_each_tick_however_they_are_cut() {
                 .expect("can be seen");
         let config = PpoConfig { hidden: vec![8], ..PpoConfig::default() };
         let policy = untrained(&Corridor, &observation_config, config);
-        let (mut z, mut ends) = (Vec::new(), Vec::new());
+        let (mut z, mut left, mut ends) = (Vec::new(), Vec::new(), Vec::new());
         for &steps in lengths {
             let (rollout, _) = collector.collect(&policy, 2, steps).expect("sound");
             let both = rollout.terminated.iter().zip(&rollout.truncated);
             ends.extend(both.map(|(terminated, truncated)| *terminated || *truncated));
             z.extend_from_slice(&rollout.z);
+            left.extend_from_slice(&rollout.left);
         }
-        (z, ends)
+        (z, left, ends)
     };
-    let (z, ends) = collect(&[60]);
+    let (z, shares, ends) = collect(&[60]);
     assert_eq!(
         collect(&[17, 3, 40]),
-        (z.clone(), ends.clone()),
+        (z.clone(), shares.clone(), ends.clone()),
         "the states at the ends of rollouts draw nothing twice"
     );
     assert!(ends.iter().filter(|end| **end).count() > AGENTS, "episodes follow each other");
@@ -93,6 +94,7 @@ fn rollouts_hold_the_skill_of_each_tick_however_they_are_cut() {
                 (draw, left) = (draw + 1, 5);
             }
             assert_eq!(z[row * 2..row * 2 + 2], drawn[draw - 1][..], "agent {agent}, tick {tick}");
+            assert_eq!(shares[row], left as f32 / 5.0, "agent {agent}, tick {tick}: it counts this tick, too");
             left = if ends[row] { 0 } else { left - 1 };
         }
     }

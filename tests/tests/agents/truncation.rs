@@ -79,6 +79,7 @@ fn the_state_is_valued_under_the_skill_that_is_held_or_one_that_is_drawn() {
     assert!(held.ends.cut_rows.len() > 3);
     for (i, &row) in held.ends.cut_rows.iter().enumerate() {
         assert_eq!(held.ends.cut_z[i * 2..i * 2 + 2], held.z[row * 2..row * 2 + 2], "row {row}");
+        assert_eq!((held.left[row], held.ends.cut_left[i]), (5.0 / 8.0, 4.0 / 8.0), "row {row}");
     }
     // Skills of 5 ticks are drawn in ticks 0, 5, 10 and 15: after tick 19 the fourth has run out, and another one is drawn from
     // a copy of the agent's stream. The next episode gets what the stream gives next, so that both rollouts see the same
@@ -88,6 +89,7 @@ fn the_state_is_valued_under_the_skill_that_is_held_or_one_that_is_drawn() {
     for (i, &row) in run_out.ends.cut_rows.iter().enumerate() {
         let cut = &run_out.ends.cut_z[i * 2..i * 2 + 2];
         assert_ne!(cut, &run_out.z[row * 2..row * 2 + 2], "row {row}: the old skill has run out");
+        assert_eq!((run_out.left[row], run_out.ends.cut_left[i]), (1.0 / 5.0, 1.0), "row {row}");
         if let Some(next) = run_out.z.get((row + AGENTS) * 2..(row + AGENTS) * 2 + 2) {
             assert_eq!(cut, next, "row {row}");
         }

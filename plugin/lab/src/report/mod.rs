@@ -7,13 +7,14 @@
 //! - [`CellChart`] draws which cells of a level an explorer has reached.
 //! - [`TrailChart`] draws where agents went on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a [`Drawing`](crate::drawing::Drawing).
 //! - [`PairedDifference`] compares two methods on the same levels and with the same seeds.
-//! - [`statistics`] compares runs that differ in their seed.
+//! - [`bootstrap`] gives intervals for few runs, [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
 //!   no network. It follows the reader's light or dark setting and prints.
 //!
 //! Everything here is a function of its input: the same data give the same bytes.
 
 mod axis;
+pub mod bootstrap;
 mod chart;
 mod document;
 mod line;
@@ -27,6 +28,7 @@ mod scatter;
 mod sparkline;
 pub mod statistics;
 mod study;
+mod study_comparison;
 mod study_table;
 mod svg;
 mod table;

@@ -1,5 +1,7 @@
 //! Statistics over runs that differ only in their seed.
 
+use super::bootstrap::{self, Estimate};
+
 /// Mean and sample standard deviation (with n - 1) of the values; the deviation of a single value is 0.
 ///
 /// Both are NaN without any value.
@@ -50,14 +52,13 @@ pub struct MeanPoint {
     pub step: u64,
     /// Mean of the curves.
     pub mean: f64,
-    /// Mean minus the standard deviation; the lowest of only two curves.
+    /// Where the 95 % interval of the mean begins.
     pub low: f64,
-    /// Mean plus the standard deviation; the highest of only two curves.
+    /// Where it ends.
     pub high: f64,
 }
 
-/// The mean of several learning curves and their spread: mean ± sample standard deviation, or from the lower to the
-/// higher one if there are two, for which a deviation says little.
+/// The mean of several learning curves with its 95 % interval over such curves: see [`bootstrap::mean`].
 ///
 /// The points are at every step that any of the curves has, from where the last one begins to where the first one ends,
 /// so that a mean is always that of all of them.
@@ -67,12 +68,8 @@ pub fn mean_curve(curves: &[Vec<(u64, f64)>]) -> Vec<MeanPoint> {
     steps.dedup();
     let point = |step| {
         let values = curves.iter().map(|curve| value_at(curve, step)).collect::<Option<Vec<f64>>>()?;
-        let (mean, sd) = mean_and_sd(&values);
-        let (low, high) = match values[..] {
-            [a, b] => (a.min(b), a.max(b)),
-            _ => (mean - sd, mean + sd),
-        };
-        Some(MeanPoint { step, mean, low, high })
+        let Estimate { value, low, high } = bootstrap::mean(&values)?;
+        Some(MeanPoint { step, mean: value, low, high })
     };
     steps.into_iter().filter_map(point).collect()
 }
@@ -116,8 +113,8 @@ mod tests {
 
         let third = vec![(10, 8.0), (30, 3.0)];
         let at_10 = mean_curve(&[short, long, third])[0];
-        // 1, 3 and 8: mean 4, squares 9 + 1 + 16 = 26.
-        assert_eq!((at_10.mean, at_10.low, at_10.high), (4.0, 4.0 - 13f64.sqrt(), 4.0 + 13f64.sqrt()));
+        // Of the 27 ways to draw three of 1, 3 and 8 one gives 1 and one gives 8, which is more than 2.5 % each.
+        assert_eq!((at_10.mean, at_10.low, at_10.high), (4.0, 1.0, 8.0));
         assert!(mean_curve(&[]).is_empty() && mean_curve(&[vec![]]).is_empty());
     }
 

@@ -107,19 +107,21 @@ impl StudyReport {
         self.results.iter().filter(|result| result.variant == variant).collect()
     }
 
-    /// The held-out return of a variant less that of another; `None` unless both have the same seeds and levels.
-    pub fn difference(&self, variant: &str, other: &str) -> Option<PairedDifference> {
-        let (one, other) = (self.of(variant), self.of(other));
-        let seeds = |runs: &[&StudyResult]| runs.iter().map(|run| run.seed).collect::<Vec<_>>();
-        if seeds(&one) != seeds(&other) {
-            return None;
-        }
-        let [one, other] = [one, other]
-            .map(|runs| -> Vec<&[f64]> { runs.into_iter().map(|run| run.test.level_returns.as_slice()).collect() });
-        PairedDifference::of(&one, &other)
+    /// The held-out returns of a variant: its seeds, each with the mean return on each level.
+    pub(super) fn level_returns(&self, variant: &str) -> Vec<&[f64]> {
+        self.of(variant).into_iter().map(|run| run.test.level_returns.as_slice()).collect()
     }
 
-    /// Success over steps: the mean of each variant that was trained, with the spread over its seeds.
+    /// The held-out return of a variant less that of another; `None` unless both have the same seeds and levels.
+    pub fn difference(&self, variant: &str, other: &str) -> Option<PairedDifference> {
+        let seeds = |variant| self.of(variant).iter().map(|run| run.seed).collect::<Vec<_>>();
+        if seeds(variant) != seeds(other) {
+            return None;
+        }
+        PairedDifference::of(&self.level_returns(variant), &self.level_returns(other))
+    }
+
+    /// Success over steps: the mean of each variant that was trained, with its interval over the seeds.
     pub fn chart(&self) -> Chart {
         let curves = self.variants().into_iter().filter_map(|variant| {
             let runs = self.results.iter().zip(&self.curves).filter(|(result, _)| result.variant == variant);
@@ -129,14 +131,13 @@ impl StudyReport {
             }
             let mean = mean_curve(&seeds);
             let line = Curve::new(variant, mean.iter().map(|point| (point.step as f64, point.mean)).collect());
-            // A rate lies in 0..1, whatever its deviation.
-            let band = mean.iter().map(|point| (point.low.max(0.0), point.high.min(1.0))).collect();
+            let band = mean.iter().map(|point| (point.low, point.high)).collect();
             Some(if seeds.len() > 1 { line.with_band(band) } else { line })
         });
         Chart {
             title: format!("{}: success in training on {}", self.experiment.game, self.experiment.train),
             x_label: "environment steps".to_owned(),
-            y_label: "success rate of the last 100 training episodes, mean and spread over the seeds".to_owned(),
+            y_label: "success rate of the last 100 training episodes, mean and 95 % interval over the seeds".to_owned(),
             curves: curves.collect(),
             y_range: range_of(SUCCESS_RATE),
             marks: Vec::new(),

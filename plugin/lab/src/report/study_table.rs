@@ -19,6 +19,7 @@ impl StudyReport {
         let mut page = format!("# {}: {}\n\n", experiment.game, self.variants().join(", "));
         let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
         page += &self.differences();
+        page += &self.intervals();
         page += "![Success over environment steps](curves.svg)\n\n## Each seed\n\n";
         let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
         page += "## The experiment\n\n";
@@ -76,33 +77,6 @@ impl StudyReport {
             ]
         });
         markdown(&headings, rows)
-    }
-
-    /// How far the first variant is above each other one, where they can be paired.
-    fn differences(&self) -> String {
-        let variants = self.variants();
-        let Some((first, others)) = variants.split_first() else { return String::new() };
-        let paired = others.iter().filter_map(|other| Some((*other, self.difference(first, other)?)));
-        let rows: Vec<Vec<String>> = paired
-            .map(|(other, found)| {
-                let words = match (found.is_clear(), found.mean > 0.0) {
-                    (false, _) => "no difference that is clear",
-                    (true, true) => "clearly above",
-                    (true, false) => "clearly below",
-                };
-                let [levels, seeds] = [found.levels, found.seeds].map(|count| count.to_string());
-                vec![other.to_owned(), mean_and_error(found.mean, found.se, 2), levels, seeds, words.to_owned()]
-            })
-            .collect();
-        if rows.is_empty() {
-            return String::new();
-        }
-        let headings = ["other", "difference", "levels", "seeds", &format!("{first} is")];
-        format!(
-            "The held-out return of **{first}** less that of each other variant, on the same levels and with the same seeds. ± is \
-             the standard error over levels and seeds; what is further from 0 than two of them is called clear.\n\n{}\n",
-            markdown(&headings, rows.into_iter())
-        )
     }
 
     fn every_seed(&self) -> String {
@@ -166,7 +140,7 @@ fn share_cell(values: &[f64]) -> String {
 }
 
 /// A table with its first column to the left and the others to the right, padded so that the text itself is readable.
-fn markdown(headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+pub(super) fn markdown(headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut lines = vec![headings.iter().map(|heading| (*heading).to_owned()).collect::<Vec<_>>()];
     lines.extend(rows);
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
@@ -254,6 +228,10 @@ mod tests {
         // The seeds differ by 3 and 1, the levels by nothing: a mean square of 2 · 2, over four cells.
         let difference = page.lines().find(|line| line.starts_with("| cloned ") && line.contains("2.00 ± 1.00"));
         assert!(difference.is_some_and(|line| line.contains("no difference that is clear")), "{page}");
+        // The middle half of 5, 7, 7 and 9; and each run of the first is above those of the other on both levels.
+        let middle = page.lines().find(|line| line.starts_with("| full ") && line.contains("| 7.00 ["));
+        assert!(middle.is_some(), "{page}");
+        assert!(page.lines().any(|line| line.starts_with("| cloned ") && line.contains("1.00 [1.00, 1.00]")), "{page}");
         assert!(page.contains("- **cloned**: `algorithm=bc`") && page.contains("variants: []"), "{page}");
     }
 

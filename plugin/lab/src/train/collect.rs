@@ -196,17 +196,23 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
         .filter(|&row| world.get::<Episode>(entities[row]).is_some_and(Episode::is_running))
         .collect();
     let kind = rollout.obs_kind;
-    let (mut skills, mut observations) = (Vec::new(), Observations::empty(&kind));
+    let (mut skills, mut left, mut observations) = (Vec::new(), Vec::new(), Observations::empty(&kind));
     for &row in &running {
-        push_state(world, entities[row], &mut skills, &mut observations);
+        push_state(world, entities[row], &mut skills, &mut left, &mut observations);
     }
-    let values = policy.values(&skills, &observations, running.len())?;
+    let values = policy.values_held(&skills, &left, &observations, running.len())?;
     let latent = rollout.latent;
     rollout.next_values = vec![0.0; entities.len()];
     rollout.ends.next_obs = Observations::zeros(&kind, entities.len());
     rollout.ends.next_z = vec![0.0; entities.len() * latent];
+    // There may be a prior and nobody who runs.
+    let counted = if world.contains_resource::<SkillPrior>() { entities.len() } else { 0 };
+    rollout.ends.next_left = vec![1.0; counted];
     for (i, (&row, value)) in running.iter().zip(values).enumerate() {
         rollout.next_values[row] = value;
+        if let Some(&left) = left.get(i) {
+            rollout.ends.next_left[row] = left;
+        }
         rollout.ends.next_obs.set_row(row, observations.row(i, kind.numbers()))?;
         rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
     }
@@ -229,6 +235,7 @@ fn collect_tick(world: &mut World) {
             final_values[row] = value;
         }
         let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind))?;
+        collecting.rollout.push_left(world.resource::<PolicyBatch>().left());
         push_tick(&mut collecting.rollout, &tick, &final_values, &cut)
     });
     if let Some(Err(error)) = pushed {
@@ -267,6 +274,7 @@ fn push_tick(
     for (i, &row) in cut.agents.iter().enumerate() {
         let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
         rollout.push_cut(row, cut.obs.row(i, width), z)?;
+        rollout.ends.cut_left.extend(cut.left.get(i));
     }
     Ok(())
 }

@@ -15,12 +15,14 @@ pub(super) struct CutEpisodes {
     pub(super) agents: Vec<usize>,
     pub(super) obs: Observations,
     pub(super) z: Vec<f32>,
+    /// What is left of these skills; empty without a prior.
+    pub(super) left: Vec<f32>,
     pub(super) values: Vec<f32>,
 }
 
 impl CutEpisodes {
     pub(super) fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
-        Self { agents, obs: Observations::empty(kind), z: Vec::new(), values: Vec::new() }
+        Self { agents, obs: Observations::empty(kind), z: Vec::new(), left: Vec::new(), values: Vec::new() }
     }
 }
 
@@ -47,7 +49,7 @@ pub(super) fn cut_episodes(
     world.run_schedule(ObserveSchedule);
     for (i, &row) in cut.agents.iter().enumerate() {
         let skill_from = cut.z.len();
-        push_state(world, entities[row], &mut cut.z, &mut cut.obs);
+        push_state(world, entities[row], &mut cut.z, &mut cut.left, &mut cut.obs);
         let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
         let streams = world.get::<AgentStreams>(entities[row]);
         if let (false, Some(prior), Some(streams)) = (held, world.get_resource::<SkillPrior>(), streams) {
@@ -57,7 +59,7 @@ pub(super) fn cut_episodes(
             cut.z.extend(drawn);
         }
     }
-    cut.values = policy.values(&cut.z, &cut.obs, cut.agents.len())?;
+    cut.values = policy.values_held(&cut.z, &cut.left, &cut.obs, cut.agents.len())?;
     // The row that is being written belongs to the state before the action.
     for (&entity, before) in entities.iter().zip(before) {
         if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
@@ -67,10 +69,17 @@ pub(super) fn cut_episodes(
     Ok(cut)
 }
 
-/// Adds what an agent sees now, and its skill.
-pub(super) fn push_state(world: &World, entity: Entity, skills: &mut Vec<f32>, observations: &mut Observations) {
+/// Adds what an agent sees now, its skill, and what is left of it.
+pub(super) fn push_state(
+    world: &World,
+    entity: Entity,
+    skills: &mut Vec<f32>,
+    left: &mut Vec<f32>,
+    observations: &mut Observations,
+) {
     if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
         skills.extend_from_slice(&skill.z);
+        left.extend(world.get_resource::<SkillPrior>().map(|prior| skill.left(prior.horizon)));
         observation.push_to(observations);
     }
 }

@@ -62,6 +62,7 @@ pub fn ppo(criterion: &mut Criterion) {
     let batch = Minibatch {
         inputs: Tensor::<2>::from_data(inputs, &device).into(),
         augmented: None,
+        left: None,
         ppo: PpoBatch {
             actions: ActionBatch::new(&actions, &device),
             old_log_probs: column() * 0.01 - (CHOICES as f32).ln(),

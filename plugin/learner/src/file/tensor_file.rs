@@ -161,6 +161,11 @@ impl TensorFile {
         }
     }
 
+    /// Whether this tensor has not been taken out yet.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.tensors.contains_key(name)
+    }
+
     /// The file's name.
     pub(crate) fn path(&self) -> &Path {
         &self.path

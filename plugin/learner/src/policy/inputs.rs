@@ -34,6 +34,8 @@ impl From<Tensor<2>> for NetInput {
 pub(crate) struct StateBatch<'a> {
     /// `n * latent`; not read by networks without skills.
     pub(crate) z: &'a [f32],
+    /// What is left of each skill, `n`, or empty, as in [`Rollout::left`](crate::Rollout::left).
+    pub(crate) left: &'a [f32],
     /// `n` observations.
     pub(crate) obs: ObsSlice<'a>,
     pub(crate) n: usize,

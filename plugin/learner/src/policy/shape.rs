@@ -1,5 +1,6 @@
 //! The sizes of actors and critics: from a shape a fresh network is made, or a stored one is taken out of a file.
 
+use super::critic::CLOCK;
 use super::{Actor, Critic, LogStd, StdKind};
 use crate::file::TensorFile;
 use crate::nn::{Activation, CnnKind, ImageNet, Mlp, RandomInit, path};
@@ -44,7 +45,10 @@ impl NetShape {
         name: &str,
         device: &Device,
     ) -> Result<Critic, FileError> {
-        Critic::build(&mut file.params(device), name, self)
+        let has_clock = file.has(&format!("{name}.{CLOCK}.weight"));
+        let source = &mut file.params(device);
+        let critic = Critic::build(source, name, self)?;
+        if has_clock { critic.with_clock(source, name) } else { Ok(critic) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Actor, Critic, InputBuilder, PolicyOutput, StateBatch};
 use crate::device::{guarded, is_host};
-use crate::nn::{CnnKind, ImageNet, frozen, host};
+use crate::nn::{CnnKind, ImageNet, frozen, host, vector};
 use crate::norm::ObsStats;
 use crate::{ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec};
 use burn::tensor::{Device, Tensor};
@@ -86,15 +86,30 @@ impl Policy {
     /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::Config`] for vectors where it observes images,
     /// or the other way round; [`LearnError::NotFinite`] if an output is NaN or infinite.
     pub fn forward<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<PolicyOutput, LearnError> {
+        self.forward_held(z, &[], obs, n)
+    }
+
+    /// [`Self::forward`] where of each skill the share `left` is left, `n` or empty, as in
+    /// [`Rollout::left`](crate::Rollout::left): the critic counts.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn forward_held<'a>(
+        &self,
+        z: &[f32],
+        left: &[f32],
+        obs: impl Into<ObsSlice<'a>>,
+        n: usize,
+    ) -> Result<PolicyOutput, LearnError> {
         let (mut head, mut log_std, mut values) = (Vec::new(), Vec::new(), Vec::new());
         let dim = self.spec.action_space.dim();
-        self.for_each_chunk(StateBatch { z, obs: obs.into(), n }, |x, rows| {
+        self.for_each_chunk(StateBatch { z, left, obs: obs.into(), n }, |x, left, rows| {
             let dist = self.actor.forward(x.clone()).to_host()?;
             head.extend_from_slice(&dist.head[..rows * dim]);
             if let Some(stds) = dist.log_std {
                 log_std.extend_from_slice(&stds[..rows * dim]);
             }
-            self.append_values(x, rows, &mut values)
+            self.append_values(x, left, rows, &mut values)
         })?;
         for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
             // A log-probability may be -infinity without harm.
@@ -110,33 +125,55 @@ impl Policy {
     /// # Errors
     /// As [`Self::forward`].
     pub fn values<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Vec<f32>, LearnError> {
+        self.values_held(z, &[], obs, n)
+    }
+
+    /// Only the values of [`Self::forward_held`]; zeros if there is no critic.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn values_held<'a>(
+        &self,
+        z: &[f32],
+        left: &[f32],
+        obs: impl Into<ObsSlice<'a>>,
+        n: usize,
+    ) -> Result<Vec<f32>, LearnError> {
         if self.critic.is_none() {
             return Ok(vec![0.0; n]);
         }
         let mut values = Vec::with_capacity(n);
-        self.for_each_chunk(StateBatch { z, obs: obs.into(), n }, |x, rows| self.append_values(x, rows, &mut values))?;
+        let states = StateBatch { z, left, obs: obs.into(), n };
+        self.for_each_chunk(states, |x, left, rows| self.append_values(x, left, rows, &mut values))?;
         Ok(values)
     }
 
     /// Adds the values of the first `rows` joined inputs.
-    fn append_values(&self, x: Tensor<2>, rows: usize, values: &mut Vec<f32>) -> Result<(), LearnError> {
+    fn append_values(
+        &self,
+        x: Tensor<2>,
+        left: Option<Tensor<1>>,
+        rows: usize,
+        values: &mut Vec<f32>,
+    ) -> Result<(), LearnError> {
         match &self.critic {
-            Some(critic) => values.extend_from_slice(&host(critic.forward(x))?[..rows]),
+            Some(critic) => values.extend_from_slice(&host(critic.forward(x, left))?[..rows]),
             None => values.resize(values.len() + rows, 0.0),
         }
         Ok(())
     }
 
-    /// Calls `read` with the joined inputs of some states at a time and their number, until all were read.
+    /// Calls `read` with the joined inputs of some states at a time, what is left of their skills, and their number, until all
+    /// were read.
     ///
     /// The inputs have at least two rows: matrix libraries sum a single row in another order than the rows of a matrix,
     /// and a lone agent shall act like one of many.
     fn for_each_chunk(
         &self,
         states: StateBatch<'_>,
-        mut read: impl FnMut(Tensor<2>, usize) -> Result<(), LearnError>,
+        mut read: impl FnMut(Tensor<2>, Option<Tensor<1>>, usize) -> Result<(), LearnError>,
     ) -> Result<(), LearnError> {
-        let StateBatch { z, obs, n } = states;
+        let StateBatch { z, left, obs, n } = states;
         if n == 0 {
             return Ok(());
         }
@@ -144,6 +181,9 @@ impl Policy {
         obs.check_size("observations", kind, n)?;
         if *latent > 0 {
             LearnError::check("skills", n * latent, z.len())?;
+        }
+        if !left.is_empty() {
+            LearnError::check("what is left of the skills", n, left.len())?;
         }
         let inputs = InputBuilder { z, latent: *latent, obs, kind, stats: self.stats.as_deref() };
         let chunk = match kind {
@@ -155,7 +195,11 @@ impl Policy {
                 let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
                 let len = rows.len();
                 let x = self.actor.join(&inputs.input(&rows, &self.device))?;
-                read(if len == 1 { x.repeat_dim(0, 2) } else { x }, len)?;
+                let left = left.get(rows[0]..rows[0] + len).map(|left| vector(left.to_vec(), &self.device));
+                match len {
+                    1 => read(x.repeat_dim(0, 2), left.map(|left| left.repeat_dim(0, 2)), len)?,
+                    _ => read(x, left, len)?,
+                }
             }
             Ok(())
         })

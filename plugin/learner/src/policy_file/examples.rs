@@ -28,7 +28,7 @@ pub(super) struct Examples {
 impl Examples {
     /// What `file`'s networks say of `states`.
     pub(super) fn of(file: &PolicyFile, states: StateBatch<'_>) -> Result<Self, LearnError> {
-        let StateBatch { z, obs, n } = states;
+        let StateBatch { z, obs, n, .. } = states;
         let output = file.policy.forward(z, obs, n)?;
         let dim = file.policy.action_space().dim();
         let std = |name, numbers: Vec<f32>| Output { name, width: if numbers.is_empty() { 0 } else { dim }, numbers };
@@ -50,7 +50,7 @@ impl Examples {
 
     /// Adds them to a file, with the `states` that they are of.
     pub(super) fn put(&self, file: &mut TensorFile, policy: &Policy, states: StateBatch<'_>) {
-        let StateBatch { z, obs, n } = states;
+        let StateBatch { z, obs, n, .. } = states;
         let shape = [n, policy.obs_dim()];
         match obs {
             ObsSlice::Vector(values) => file.put(OBSERVATIONS, &shape, values),
@@ -72,7 +72,7 @@ impl Examples {
             ObsKind::Image(_) => Observations::Image(file.take_bytes(OBSERVATIONS, &shape)?),
         };
         let z = file.take("examples.z", &[n, policy.latent()])?;
-        let states = StateBatch { z: &z, obs: obs.as_slice(), n };
+        let states = StateBatch { z: &z, left: &[], obs: obs.as_slice(), n };
         let examples = Self::of(read, states).map_err(|source| file.learner(source))?;
         for Output { name, width, numbers } in examples.outputs {
             let expected = file.take(&format!("examples.{name}"), &[n, width])?;

@@ -61,7 +61,7 @@ impl PolicyFile {
             skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
             examples: n,
         };
-        let states = StateBatch { z, obs, n };
+        let states = StateBatch { z, left: &[], obs, n };
         let examples = Examples::of(self, states).map_err(learner)?;
         let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("actor", &policy.actor)?;

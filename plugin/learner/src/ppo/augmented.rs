@@ -24,7 +24,7 @@ pub(super) fn augmentation_loss(
 ) -> Result<Option<Tensor<1>>, LearnError> {
     // While only the critic learns the actor stays as it is.
     let Some(changed) = batch.augmented.as_ref().filter(|_| !moment.is_warming_up) else { return Ok(None) };
-    let (dist_of_changed, values_of_changed) = outputs(nets, changed, config, moment)?;
+    let (dist_of_changed, values_of_changed) = outputs(nets, changed, batch, config, moment)?;
     let divergence = dist.clone().detach().kl(&dist_of_changed)?.mean();
     let difference = (values_of_changed - values.clone().detach()).square().mean();
     Ok(Some(divergence + difference))

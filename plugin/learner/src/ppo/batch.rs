@@ -131,6 +131,7 @@ impl Batch<'_> {
         Minibatch {
             augmented: self.augmented(&inputs, rows, device),
             inputs,
+            left: (!rollout.left.is_empty()).then(|| vector(pick(&rollout.left), device)),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions.gather(rows), device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

@@ -127,7 +127,7 @@ impl Learner for PpoLearner {
     }
 
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
-        self.base.initial_kl(&self.policy(), self.base.updates == 0, StateBatch { z, obs, n })
+        self.base.initial_kl(&self.policy(), self.base.updates == 0, StateBatch { z, left: &[], obs, n })
     }
 
     /// Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments `adam.m.actor.l0.weight`.

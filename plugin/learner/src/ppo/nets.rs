@@ -3,7 +3,7 @@
 use super::PpoConfig;
 use crate::file::TensorFile;
 use crate::learner::LearnerBase;
-use crate::nn::{ParamVisitor, Parameters, path};
+use crate::nn::{ParamVisitor, Parameters, RandomInit, path};
 use crate::policy::{Actor, ActorShape, Critic, NetShape, StdShape};
 use crate::{FileError, LearnError};
 
@@ -29,7 +29,11 @@ impl PpoNets {
             None => shape.fresh(&base.spec, &base.streams, "ppo.actor", &device)?,
         };
         let mut rng = base.streams.stream("ppo.critic", 0);
-        Ok(Self { actor, critic: Critic::new(&critic_shape(config, &shape), &mut rng, &device) })
+        let critic = Critic::new(&critic_shape(config, &shape), &mut rng, &device);
+        let counts = base.score_config().is_some_and(|score| score.critic_clock && score.condition);
+        let Ok(critic) =
+            if counts { critic.with_clock(&mut RandomInit { rng: &mut rng, device: &device }, "") } else { Ok(critic) };
+        Ok(Self { actor, critic })
     }
 
     /// Those of a checkpoint.

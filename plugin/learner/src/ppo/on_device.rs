@@ -15,6 +15,7 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 pub(super) struct SentRollout<'a> {
     batch: &'a Batch<'a>,
     states: States,
+    left: Option<Tensor<1>>,
     ppo: PpoBatch,
     teacher: Option<(Dist, Tensor<1>)>,
     device: Device,
@@ -33,6 +34,7 @@ impl<'a> SentRollout<'a> {
         let all: Vec<usize> = (0..rollout.rows()).collect();
         Self {
             states: States::send(batch, &all, device),
+            left: (!rollout.left.is_empty()).then(|| column(&rollout.left)),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions, device),
                 old_log_probs: column(&rollout.log_probs),
@@ -55,6 +57,7 @@ impl<'a> SentRollout<'a> {
         Minibatch {
             augmented: self.batch.augmented(&inputs, rows, &self.device),
             inputs,
+            left: self.left.as_ref().map(column),
             ppo: PpoBatch {
                 actions: match &self.ppo.actions {
                     ActionBatch::Discrete(actions) => ActionBatch::Discrete(actions.clone().select(0, at.clone())),
@@ -132,7 +135,7 @@ impl Reports {
         config: &PpoConfig,
         moment: &Moment<'_>,
     ) -> Result<(), LearnError> {
-        let (dist, values) = outputs(nets, &batch.inputs, config, moment)?;
+        let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
         let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
         let Losses { ppo, penalty, mut total } = Losses::of(&dist, values, batch, config, moment)?;
         let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;

@@ -18,6 +18,8 @@ pub struct Minibatch {
     pub inputs: NetInput,
     /// The same after the changes that they shall not mind; `None` without any.
     pub augmented: Option<NetInput>,
+    /// What is left of each skill, `[n]`, if somebody has counted.
+    pub left: Option<Tensor<1>>,
     /// Constants of the PPO loss.
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
@@ -122,7 +124,7 @@ fn loss(
     moment: &Moment<'_>,
     steps: u64,
 ) -> Result<(Tensor<1>, StepMetrics), LearnError> {
-    let (dist, values) = outputs(nets, &batch.inputs, config, moment)?;
+    let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
     let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
     let (total, metrics) = if is_host(&values.device()) && HostLoss::is_for(moment) {
         let loss = HostLoss::of(&dist, &values, batch, config, moment, steps)?;
@@ -139,17 +141,18 @@ fn loss(
     Ok((total + augmentation * config.augment_coef, StepMetrics { augmentation_loss, total_loss, ..metrics }))
 }
 
-/// What actor and critic say to what they read.
+/// What actor and critic say to `inputs`: those of `batch`, or changed ones.
 pub(super) fn outputs(
     nets: &PpoNets,
     inputs: &NetInput,
+    batch: &Minibatch,
     config: &PpoConfig,
     moment: &Moment<'_>,
 ) -> Result<(Dist, Tensor<1>), LearnError> {
     let inputs = nets.actor.join(inputs)?;
     let dist = nets.actor.forward(inputs.clone());
     let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
-    Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs })))
+    Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs }, batch.left.clone())))
 }
 
 /// [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.

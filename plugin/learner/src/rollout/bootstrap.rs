@@ -21,13 +21,14 @@ impl Rollout {
         let ends = &self.ends;
         ends.next_obs.as_slice().check_size("rollout ends next_obs", &self.obs_kind, self.envs)?;
         LearnError::check("rollout ends next_z", self.envs * latent, ends.next_z.len())?;
-        let (mut obs, mut z) = (ends.cut_obs.clone(), ends.cut_z.clone());
+        let (mut obs, mut z, mut left) = (ends.cut_obs.clone(), ends.cut_z.clone(), ends.cut_left.clone());
         for &env in &running {
             obs.push(ends.next_obs.row(env, width))?;
             z.extend_from_slice(&ends.next_z[env * latent..(env + 1) * latent]);
+            left.extend(ends.next_left.get(env));
         }
         let cuts = ends.cut_rows.len();
-        let values = policy.values(&z, &obs, cuts + running.len())?;
+        let values = policy.values_held(&z, &left, &obs, cuts + running.len())?;
         for (&row, &value) in ends.cut_rows.iter().zip(&values) {
             self.final_values[row] = value;
         }

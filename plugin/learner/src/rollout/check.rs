@@ -31,6 +31,15 @@ impl Rollout {
         ] {
             LearnError::check(name, expected, found)?;
         }
+        for (name, expected, left) in [
+            ("rollout left", rows, &self.left),
+            ("rollout ends cut_left", cuts, &self.ends.cut_left),
+            ("rollout ends next_left", self.envs, &self.ends.next_left),
+        ] {
+            if !left.is_empty() {
+                LearnError::check(name, expected, left.len())?;
+            }
+        }
         let cut_rows = &self.ends.cut_rows;
         if let Some(row) = cut_rows.iter().find(|row| **row >= rows) {
             return Err(LearnError::Config(format!("rollout ends: row {row} is listed, but there are {rows} rows")));
@@ -66,6 +75,7 @@ impl Rollout {
         }
         for (name, width, values) in [
             ("rollout z", self.latent, &self.z),
+            ("rollout left", 1, &self.left),
             ("rollout rewards", 1, &self.rewards),
             ("rollout ends cut_z", self.latent, &ends.cut_z),
             ("rollout ends next_z", self.latent, &ends.next_z),

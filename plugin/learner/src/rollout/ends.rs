@@ -11,17 +11,30 @@ pub struct EndStates {
     pub cut_obs: Observations,
     /// The skill under which that observation is valued, `cut_rows * latent`.
     pub cut_z: Vec<f32>,
+    /// What is left of it, as in [`Rollout::left`](crate::Rollout::left).
+    pub cut_left: Vec<f32>,
     /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
     pub next_obs: Observations,
     /// The skill active there, `B * latent`.
     pub next_z: Vec<f32>,
+    /// What is left of it, `B`, or empty.
+    pub next_left: Vec<f32>,
 }
 
 impl EndStates {
     /// No states yet.
     pub fn new(kind: &ObsKind) -> Self {
         let none = || Observations::empty(kind);
-        Self { cut_rows: Vec::new(), cut_obs: none(), cut_z: Vec::new(), next_obs: none(), next_z: Vec::new() }
+        let empty = Vec::new;
+        Self {
+            cut_rows: Vec::new(),
+            cut_obs: none(),
+            cut_z: empty(),
+            cut_left: empty(),
+            next_obs: none(),
+            next_z: empty(),
+            next_left: empty(),
+        }
     }
 
     /// Forgets all states and keeps the memory.
@@ -29,7 +42,9 @@ impl EndStates {
         self.cut_rows.clear();
         self.cut_obs.clear();
         self.cut_z.clear();
+        self.cut_left.clear();
         self.next_obs.clear();
         self.next_z.clear();
+        self.next_left.clear();
     }
 }

@@ -53,12 +53,14 @@ impl Rollout {
             all.next_values.extend_from_slice(&part.next_values);
             all.ends.next_obs.push(&part.ends.next_obs)?;
             all.ends.next_z.extend_from_slice(&part.ends.next_z);
+            all.ends.next_left.extend_from_slice(&part.ends.next_left);
         }
         for t in 0..first.steps {
             for part in parts {
                 let rows = t * part.envs..(t + 1) * part.envs;
                 all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
                 all.z.extend_from_slice(&part.z[rows.start * part.latent..rows.end * part.latent]);
+                all.left.extend_from_slice(part.left.get(rows.clone()).unwrap_or_default());
                 all.log_probs.extend_from_slice(&part.log_probs[rows.clone()]);
                 all.values.extend_from_slice(&part.values[rows.clone()]);
                 all.rewards.extend_from_slice(&part.rewards[rows.clone()]);
@@ -86,6 +88,7 @@ impl Rollout {
         for (row, part, i) in cuts {
             self.ends.cut_rows.push(row);
             self.ends.cut_obs.push(part.ends.cut_obs.row(i, self.obs_kind.numbers()))?;
+            self.ends.cut_left.extend(part.ends.cut_left.get(i));
             self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * self.latent..(i + 1) * self.latent]);
         }
         Ok(())

@@ -18,6 +18,9 @@ pub struct Rollout {
     pub obs: Observations,
     /// The skill active at each step, `T * B * latent`.
     pub z: Vec<f32>,
+    /// The share of that skill's ticks that was left, this one included, above 0 and up to 1, `T * B`; empty if nobody has
+    /// counted, and all count as drawn just then.
+    pub left: Vec<f32>,
     /// The actions taken, `T * B`.
     pub actions: Actions,
     /// Their log-probabilities when taken.
@@ -72,6 +75,7 @@ impl Rollout {
             latent,
             obs: Observations::empty(&obs_kind),
             z: Vec::new(),
+            left: Vec::new(),
             actions: Actions::empty(space),
             log_probs: Vec::new(),
             values: Vec::new(),
@@ -96,6 +100,7 @@ impl Rollout {
         self.actions.clear();
         for values in [
             &mut self.z,
+            &mut self.left,
             &mut self.log_probs,
             &mut self.values,
             &mut self.rewards,
@@ -122,6 +127,11 @@ impl Rollout {
         self.ends.cut_rows.push((self.steps - 1) * self.envs + env);
         self.ends.cut_z.extend_from_slice(z);
         Ok(())
+    }
+
+    /// What is left of the skills of the newest step, `B`.
+    pub fn push_left(&mut self, left: &[f32]) {
+        self.left.extend_from_slice(left);
     }
 
     /// Adds one tick.

@@ -51,7 +51,7 @@ impl SacLearner {
                 let (z, obs) = (gather(&buffer.z, buffer.latent), gather(&buffer.obs, buffer.obs_dim));
                 let squashed = self.nets.actor.is_squashed();
                 let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);
-                let states = StateBatch { z: &z, obs: (&obs).into(), n };
+                let states = StateBatch { z: &z, left: &[], obs: (&obs).into(), n };
                 teacher.output(states, &actions, squashed, &mut rng, base.device)?
             }
         };

@@ -100,6 +100,8 @@ pub(super) mod tests {
             final_values: vec![0.0; 6],
             next_values: vec![0.0; 2],
             ends: EndStates {
+                cut_left: Vec::new(),
+                next_left: Vec::new(),
                 cut_rows: vec![0],
                 cut_obs: vec![50.0].into(),
                 cut_z: vec![60.0],

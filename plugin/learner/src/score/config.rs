@@ -99,6 +99,9 @@ pub struct ScoreConfig {
     pub horizon: usize,
     /// Where skills come from.
     pub prior: PriorKind,
+    /// Whether PPO's critic counts the ticks that are left of a skill: what (s, z) is worth depends on them. Needs
+    /// `condition`. Off by default: on levels of CoinRun that were never seen its policies were no better.
+    pub critic_clock: bool,
 }
 
 impl Default for ScoreConfig {
@@ -115,6 +118,7 @@ impl Default for ScoreConfig {
             skill_draw: SkillDraw::Sample,
             horizon: 8,
             prior: PriorKind::Learned,
+            critic_clock: false,
         }
     }
 }

@@ -80,9 +80,17 @@ pub struct SkillConfig {
     /// is tied to the skill model sees the same numbers, its critic too. Vectors only.
     pub norm_obs: bool,
     /// Changes that are made to images before they are learned from, all of them to each; none if empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub augment: Vec<Augmentation>,
     /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
+    #[serde(skip_serializing_if = "is_zero")]
     pub weight_decay: f64,
+}
+
+/// Settings that do nothing are not written: files and studies find what was learned before there were any.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde wants it")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 impl Default for SkillConfig {

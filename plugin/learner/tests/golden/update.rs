@@ -152,6 +152,7 @@ impl<'a> Update<'a> {
         Minibatch {
             inputs: inputs.into(),
             augmented: None,
+            left: None,
             ppo: PpoBatch {
                 actions: ActionBatch::new(&actions("in.actions"), &device),
                 old_log_probs: vector(pick("in.old_log_probs")),

@@ -3,6 +3,7 @@
 mod allocations;
 mod augmentation;
 mod checkpoint;
+mod clock;
 mod corridor;
 mod determinism;
 mod errors;

@@ -11,7 +11,7 @@ use playbot_learner::{
 const CHOICES: u32 = 3;
 
 /// One gradient step over all rows in each update, and a long one: the policy leaves the decoder at once.
-fn ppo(score: ScoreConfig, model: &SkillModel) -> PpoLearner {
+pub fn ppo(score: ScoreConfig, model: &SkillModel) -> PpoLearner {
     let config = PpoConfig { epochs: 1, minibatches: 1, lr: 0.05, ..corridor::config() };
     PpoLearner::with_skill(config, score, model, 1, DeviceKind::Flex).expect("good settings")
 }
@@ -22,7 +22,7 @@ fn sac(score: ScoreConfig, model: &SkillModel) -> SacLearner {
 }
 
 /// What the decoder does, which is where each policy starts.
-fn rollout(model: &SkillModel) -> Rollout {
+pub fn rollout(model: &SkillModel) -> Rollout {
     Driver::new(4, 1).rollout(&ppo(ScoreConfig::default(), model), 16)
 }
 

@@ -72,6 +72,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
         let values = vector(column(0.3), &device.clone().autodiff()).require_grad();
         let batch = Minibatch {
             augmented: None,
+            left: None,
             inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
             ppo: PpoBatch { actions, old_log_probs: vector(old_log_probs, &device), advantages, old_values, returns },
             teacher: penalised.then(|| TeacherBatch {
@@ -121,6 +122,7 @@ fn actions_of_the_other_kind_are_refused() {
     let actions = ActionBatch::new(&Actions::Discrete(vec![0, 1]), &device);
     let batch = Minibatch {
         augmented: None,
+        left: None,
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
         ppo: PpoBatch {
             actions,

@@ -16,7 +16,7 @@ impl Teacher {
         states: StateBatch<'_>,
         device: DeviceKind,
     ) -> Result<f32, LearnError> {
-        let StateBatch { z, obs, n } = states;
+        let StateBatch { z, obs, n, .. } = states;
         if n == 0 {
             return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
         }

@@ -1,0 +1,161 @@
+//! Intervals and comparisons for few runs (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical
+//! precipice"). Scores are those of several seeds, each on the same levels.
+
+use playbot_learner::rng::{ChaCha8Rng, Streams, below};
+
+/// Draws of a bootstrap.
+const DRAWS: u64 = 1000;
+/// Share of the draws inside an interval.
+const INSIDE: f64 = 0.95;
+
+/// A number with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Of the scores themselves.
+    pub value: f64,
+    /// Where the interval begins.
+    pub low: f64,
+    /// Where it ends.
+    pub high: f64,
+}
+
+/// The interquartile mean of all scores, over seeds and levels: that of the middle half, to which the best and the worst
+/// quarter count nothing. The interval is that of other seeds and other levels. `None` without scores, or if seeds have
+/// other levels.
+pub fn interquartile_mean(scores: &[&[f64]]) -> Option<Estimate> {
+    estimate(&[scores], |[scores]| middle_mean(scores.concat()))
+}
+
+/// The probability that a run of one method scores higher than a run of another on the same level; ties count half.
+/// The interval is that of other seeds of both, and other levels. `None` without scores, or with other levels.
+pub fn probability_of_improvement(one: &[&[f64]], other: &[&[f64]]) -> Option<Estimate> {
+    estimate(&[one, other], |[one, other]| {
+        let wins = one.iter().flat_map(|one| other.iter().map(|other| wins(one, other)));
+        wins.sum::<f64>() / (one.len() * other.len()) as f64
+    })
+}
+
+/// The mean of several numbers with the interval of others of their kind; `None` without any.
+pub fn mean(values: &[f64]) -> Option<Estimate> {
+    let rows: Vec<&[f64]> = values.iter().map(std::slice::from_ref).collect();
+    estimate(&[&rows], |[rows]| rows.concat().iter().sum::<f64>() / rows.len() as f64)
+}
+
+/// Share of the levels on which the first is higher, and half of those on which the two are equal.
+fn wins(one: &[f64], other: &[f64]) -> f64 {
+    let points = one.iter().zip(other).map(|(one, other)| match one.total_cmp(other) {
+        std::cmp::Ordering::Greater => 1.0,
+        std::cmp::Ordering::Equal => 0.5,
+        std::cmp::Ordering::Less => 0.0,
+    });
+    points.sum::<f64>() / one.len() as f64
+}
+
+/// Mean of the middle half; numbers at its ends count in part where a quarter is no whole number of them.
+fn middle_mean(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let quarter = values.len() as f64 / 4.0;
+    let weight = |at: usize| {
+        let (from, to) = (at as f64, at as f64 + 1.0);
+        (to.min(3.0 * quarter) - from.max(quarter)).max(0.0)
+    };
+    let sum: f64 = values.iter().enumerate().map(|(at, value)| weight(at) * value).sum();
+    sum / (2.0 * quarter)
+}
+
+/// Seeds, each with its scores on all levels.
+type Scores = Vec<Vec<f64>>;
+
+/// A statistic of the scores of `N` methods, with its interval by drawing seeds of each and levels of all with replacement.
+fn estimate<const N: usize>(methods: &[&[&[f64]]; N], statistic: impl Fn(&[Scores; N]) -> f64) -> Option<Estimate> {
+    let levels = methods[0].first()?.len();
+    if levels == 0 || methods.iter().any(|seeds| seeds.is_empty() || seeds.iter().any(|row| row.len() != levels)) {
+        return None;
+    }
+    let whole = methods.map(|seeds| seeds.iter().map(|row| row.to_vec()).collect::<Scores>());
+    let drawn = |draw| {
+        let mut rng = Streams::new(0).stream("bootstrap", draw);
+        let columns = choices(levels, &mut rng);
+        statistic(&methods.map(|seeds| {
+            let rows = choices(seeds.len(), &mut rng);
+            rows.into_iter().map(|row| columns.iter().map(|&level| seeds[row][level]).collect()).collect::<Scores>()
+        }))
+    };
+    let mut draws: Vec<f64> = (0..DRAWS).map(drawn).collect();
+    draws.sort_by(f64::total_cmp);
+    let at = |share: f64| draws[(share * (DRAWS - 1) as f64).round() as usize];
+    let outside = (1.0 - INSIDE) / 2.0;
+    Some(Estimate { value: statistic(&whole), low: at(outside), high: at(1.0 - outside) })
+}
+
+/// As many numbers below `n`, drawn with replacement.
+fn choices(n: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    (0..n).map(|_| below(rng, n as u64) as usize).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use playbot_learner::rng::normal;
+
+    #[test]
+    fn the_middle_half_is_averaged() {
+        assert_eq!(middle_mean(vec![100.0, 1.0, 2.0, 3.0, -50.0, 4.0, 2.0, 2.0]), (2.0 + 2.0 + 2.0 + 3.0) / 4.0);
+        // Of five numbers the middle one counts whole, its neighbours three quarters each.
+        assert!((middle_mean(vec![9.0, 0.0, 4.0, 1.0, 2.0]) - (0.75 + 2.0 + 0.75 * 4.0) / 2.5).abs() < 1e-12);
+        assert_eq!(middle_mean(vec![7.0]), 7.0);
+    }
+
+    #[test]
+    fn improvement_by_hand() {
+        let (a, b, c) = ([1.0, 5.0], [0.0, 5.0], [2.0, 4.0]);
+        // a over b: a win and a tie; a over c: a loss and a win.
+        let got = probability_of_improvement(&[&a], &[&b, &c]).expect("scores");
+        assert_eq!(got.value, (0.75 + 0.5) / 2.0);
+        assert!(got.low <= got.value && got.value <= got.high);
+        let same = probability_of_improvement(&[&a, &b], &[&a, &b]).expect("scores");
+        assert_eq!(same.value, 0.5);
+    }
+
+    /// Scores of `seeds` by `levels`, of which both vary.
+    fn scores(draw: u64, seeds: usize, levels: usize) -> Scores {
+        let mut rng = Streams::new(8).stream("scores", draw);
+        let of_levels: Vec<f32> = (0..levels).map(|_| normal(&mut rng)).collect();
+        let row = |_| {
+            let of_seed = normal(&mut rng);
+            of_levels.iter().map(|of_level| f64::from(of_seed + of_level + normal(&mut rng))).collect()
+        };
+        (0..seeds).map(row).collect()
+    }
+
+    #[test]
+    fn intervals_hold_the_truth_nearly_as_often_as_they_say() {
+        let inside = (0..200).filter(|&draw| {
+            let scores = scores(draw, 8, 30);
+            let rows: Vec<&[f64]> = scores.iter().map(Vec::as_slice).collect();
+            let got = interquartile_mean(&rows).expect("scores");
+            got.low <= 0.0 && 0.0 <= got.high
+        });
+        // With eight seeds a percentile bootstrap holds a little less than 95 %.
+        let inside = inside.count();
+        assert!((170..=199).contains(&inside), "{inside} of 200");
+    }
+
+    #[test]
+    fn few_seeds_leave_much_open_and_the_same_scores_give_the_same_numbers() {
+        let (few, many) = ([8.0, 9.0, 9.5], [8.0, 9.0, 9.5, 8.5, 9.0, 8.8, 9.1, 8.9, 9.2, 8.7]);
+        let width = |values: &[f64]| mean(values).map(|found| found.high - found.low).expect("numbers");
+        assert!(width(&few) > 1.5 * width(&many));
+        assert_eq!(mean(&few), mean(&few));
+        assert_eq!(mean(&[4.0]), Some(Estimate { value: 4.0, low: 4.0, high: 4.0 }));
+    }
+
+    #[test]
+    fn scores_that_do_not_go_together_give_nothing() {
+        assert_eq!(interquartile_mean(&[]), None);
+        assert_eq!(interquartile_mean(&[&[]]), None);
+        assert_eq!(interquartile_mean(&[&[1.0], &[1.0, 2.0]]), None);
+        assert_eq!(probability_of_improvement(&[&[1.0]], &[&[1.0, 2.0]]), None);
+        assert_eq!(mean(&[]), None);
+    }
+}
