@@ -229,7 +229,7 @@ mod tests {
         let difference = page.lines().find(|line| line.starts_with("| cloned ") && line.contains("2.00 ± 1.00"));
         assert!(difference.is_some_and(|line| line.contains("no difference that is clear")), "{page}");
         // The middle half of 5, 7, 7 and 9; and each run of the first is above those of the other on both levels.
-        let middle = page.lines().find(|line| line.starts_with("| full ") && line.contains("| 7.00 ["));
+        let middle = page.lines().find(|line| line.starts_with("| full ") && line.contains(" 7.00 ["));
         assert!(middle.is_some(), "{page}");
         assert!(page.lines().any(|line| line.starts_with("| cloned ") && line.contains("1.00 [1.00, 1.00]")), "{page}");
         assert!(page.contains("- **cloned**: `algorithm=bc`") && page.contains("variants: []"), "{page}");
