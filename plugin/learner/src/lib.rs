@@ -11,7 +11,8 @@
 //!   the skill z, starts as a copy of the decoder, and pays for leaving it where the decoder is sure ([`ScoreConfig`]).
 //! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps what was
 //!   played and learns from it again and again.
-//! - Training code needs to know neither: both implement [`Learner`].
+//! - A [`SpirlLearner`] learns by either which skills the decoder plays, instead of drawing them from the prior.
+//! - Training code needs to know none of them: all implement [`Learner`].
 //!
 //! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Rows are flat `f32` slices in host
 //! memory (bytes for pixels), row-major ([`ObsSlice`]). All randomness comes from generators that the caller owns or
@@ -51,6 +52,7 @@ pub mod score;
 pub mod skill;
 mod space;
 mod spec;
+pub mod spirl;
 
 pub(crate) use among_workers::are_awake;
 pub use among_workers::{among_awake_workers, among_workers, waited};
@@ -65,7 +67,7 @@ pub use policy_file::{PolicyCard, PolicyFile};
 pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};
 pub use rng::{RngState, Streams};
 pub use rollout::{EndStates, ObsColumns, Rollout, RolloutStep};
-pub use sac::{EntropyCoef, SacConfig, SacLearner, SacMetrics};
+pub use sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics};
 pub use score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{
     ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
@@ -73,6 +75,7 @@ pub use skill::{
 };
 pub use space::{Action, ActionSpace, Actions};
 pub use spec::{PolicySpec, TimeLimit};
+pub use spirl::{SpirlConfig, SpirlLearner};
 
 /// What the README shows is compiled and run.
 #[cfg(doctest)]

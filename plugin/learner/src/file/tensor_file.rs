@@ -68,20 +68,24 @@ impl TensorFile {
 
     /// Writes everything under a temporary name, flushes it to the disk and renames it into place.
     pub(crate) fn write(&self) -> Result<(), FileError> {
+        let bytes = self.to_bytes()?;
+        write_atomically(&self.path, &bytes).map_err(|source| FileError::Io {
+            action: "write",
+            path: self.path.clone(),
+            source,
+        })
+    }
+
+    /// The file as it is written.
+    pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, FileError> {
         let views: Result<Vec<_>, _> = self
             .tensors
             .iter()
             .map(|(name, t)| TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|view| (name, view)))
             .collect();
         let header = HashMap::from([(DESCRIPTION.to_owned(), self.description.clone())]);
-        let bytes = views
-            .and_then(|views| safetensors::serialize(views, Some(header)))
-            .map_err(|e| self.format(e.to_string()))?;
-        write_atomically(&self.path, &bytes).map_err(|source| FileError::Io {
-            action: "write",
-            path: self.path.clone(),
-            source,
-        })
+        let bytes = views.and_then(|views| safetensors::serialize(views, Some(header)));
+        bytes.map_err(|e| self.format(e.to_string()))
     }
 
     /// Reads a whole file.

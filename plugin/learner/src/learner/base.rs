@@ -66,9 +66,14 @@ impl LearnerBase {
         self.teacher.as_ref().filter(|teacher| teacher.is_copied())
     }
 
+    /// The prior, for a policy over skills that starts as it.
+    pub(crate) fn prior_origin(&self) -> Option<&Actor> {
+        self.teacher.as_ref().filter(|teacher| !teacher.tied_to.is_decoder()).map(Teacher::origin)
+    }
+
     /// Width of the skills that a rollout must hold.
     pub(crate) fn rollout_latent(&self) -> usize {
-        self.teacher.as_ref().map_or(self.spec.latent, Teacher::latent)
+        self.teacher.as_ref().map_or(self.spec.latent, Teacher::rollout_latent)
     }
 
     /// How the networks see observations now: through the frozen normaliser of the skill model if that has one, else

@@ -4,7 +4,7 @@ use super::LearnerBase;
 use crate::device::guarded;
 use crate::file::{FileKind, TensorFile};
 use crate::norm::{put_normalizers, take_normalizers};
-use crate::score::{ScoreConfig, Teacher};
+use crate::score::{ScoreConfig, Teacher, TiedTo};
 use crate::skill::SkillDescription;
 use crate::{DeviceKind, FileError, PolicySpec};
 use serde::de::DeserializeOwned;
@@ -22,6 +22,8 @@ struct Header<C, K> {
     spec: PolicySpec,
     score: Option<ScoreConfig>,
     skill: Option<SkillDescription>,
+    #[serde(default, skip_serializing_if = "TiedTo::is_decoder")]
+    tied_to: TiedTo,
     seed: u64,
     updates: u64,
     #[serde(flatten)]
@@ -29,25 +31,26 @@ struct Header<C, K> {
 }
 
 impl LearnerBase {
-    /// Writes a checkpoint of this `kind`: settings, counters, what `put` adds of the algorithm's own (networks, moments,
+    /// A checkpoint of this `kind`: settings, counters, what `put` adds of the algorithm's own (networks, moments,
     /// ...), the frozen decoder and prior, and the normalisers.
     ///
     /// # Errors
-    /// [`FileError::Io`] if it cannot be written.
-    pub(crate) fn save(
+    /// [`FileError::Learner`] if a device does not give its numbers.
+    pub(crate) fn checkpoint(
         &self,
         path: &Path,
         kind: FileKind,
         config: &impl Serialize,
         counters: &impl Serialize,
         put: impl FnOnce(&mut TensorFile) -> Result<(), FileError>,
-    ) -> Result<(), FileError> {
+    ) -> Result<TensorFile, FileError> {
         let teacher = self.teacher.as_ref();
         let header = Header {
             config,
             spec: self.spec,
             score: teacher.map(|teacher| teacher.config.clone()),
             skill: teacher.map(|teacher| teacher.description.clone()),
+            tied_to: teacher.map(|teacher| teacher.tied_to).unwrap_or_default(),
             seed: self.streams.seed(),
             updates: self.updates,
             counters,
@@ -59,7 +62,7 @@ impl LearnerBase {
             teacher.put(&mut file)?;
         }
         put_normalizers(&mut file, self.observations.as_ref(), self.rewards.as_ref());
-        file.write()
+        Ok(file)
     }
 }
 
@@ -76,17 +79,17 @@ pub(crate) struct Checkpoint<C, K> {
 }
 
 impl<C: DeserializeOwned, K: DeserializeOwned> Checkpoint<C, K> {
-    /// Reads a checkpoint of this `kind` and takes the frozen decoder and prior out of it.
+    /// A checkpoint of this `kind` in `file`; takes the frozen decoder and prior out of it.
     ///
     /// # Errors
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing or misshapen.
-    pub(crate) fn read(path: &Path, kind: FileKind, device: DeviceKind) -> Result<Self, FileError> {
-        let mut file = TensorFile::read(path)?;
+    pub(crate) fn of(mut file: TensorFile, kind: FileKind, device: DeviceKind) -> Result<Self, FileError> {
         device.check().map_err(|e| file.learner(e))?;
-        let Header { config, spec, score, skill, seed, updates, counters }: Header<C, K> = file.header(kind)?;
+        let Header { config, spec, score, skill, tied_to, seed, updates, counters }: Header<C, K> =
+            file.header(kind)?;
         let teacher = match score.zip(skill) {
             None => None,
-            Some((score, skill)) => Some(Teacher::take(score, skill, spec, &mut file, device)?),
+            Some((score, skill)) => Some(Teacher::take((score, tied_to), skill, spec, &mut file, device)?),
         };
         Ok(Self { file, config, counters, spec, teacher, seed, updates })
     }

@@ -10,6 +10,8 @@ use std::convert::Infallible;
 pub(crate) enum Init {
     /// Zeros.
     Zeros,
+    /// Ones.
+    Ones,
     /// A matrix of `shape[0]` rows with orthonormal rows or columns, times this gain.
     Orthogonal(f64),
     /// Uniform in ± this bound.
@@ -47,6 +49,7 @@ impl<R: Rng + ?Sized> ParamSource for RandomInit<'_, R> {
         let numbers: usize = shape.iter().product();
         let values = match init {
             Init::Zeros => vec![0.0; numbers],
+            Init::Ones => vec![1.0; numbers],
             Init::Orthogonal(gain) => orthogonal(shape[0], shape[1..].iter().product(), gain, self.rng),
             Init::Uniform(bound) => uniform(numbers, bound, self.rng),
         };

@@ -28,6 +28,13 @@ pub fn unsquashed(decoder: &HostDist) -> HostDist {
     out
 }
 
+/// The normal number whose tanh `action` is. One beyond ±(1 - 1e-6), where single precision cannot tell it any more, counts as
+/// lying there.
+pub(crate) fn unsquashed_action(action: f32) -> f32 {
+    let edge = 1.0 - 1e-6;
+    f64::from(action).clamp(-edge, edge).atanh() as f32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

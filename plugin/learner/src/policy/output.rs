@@ -2,6 +2,7 @@
 
 use crate::nn::{
     HostDist, argmax, categorical_log_prob, gaussian_log_prob, sample_categorical, sample_gaussian, squashed_log_prob,
+    unsquashed_action,
 };
 use crate::{Action, ActionSpace, LearnError};
 use rand::Rng;
@@ -134,8 +135,7 @@ fn squash(numbers: &[f32]) -> Vec<f32> {
 }
 
 fn unsquash(action: &[f32]) -> Vec<f32> {
-    let edge = 1.0 - 1e-6;
-    action.iter().map(|&a| f64::from(a).clamp(-edge, edge).atanh() as f32).collect()
+    action.iter().map(|&a| unsquashed_action(a)).collect()
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use super::{PpoConfig, PpoNets};
 use crate::device::guarded;
-use crate::file::FileKind;
+use crate::file::{FileKind, TensorFile};
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
 use crate::nn::{Adam, AdamConfig, tracked};
 use crate::policy::{Policy, StateBatch};
-use crate::score::{ScoreConfig, Teacher};
+use crate::score::{ScoreConfig, Teacher, TiedTo};
 use crate::skill::SkillModel;
 use crate::{DeviceKind, FileError, LearnError, ObsKind, ObsSlice, PolicySpec, Rollout};
 use serde::{Deserialize, Serialize};
@@ -21,8 +21,8 @@ const FILE: FileKind = FileKind { name: "ppo checkpoint", version: 1 };
 #[derive(Debug)]
 pub struct PpoLearner {
     pub(super) config: PpoConfig,
-    pub(super) base: LearnerBase,
-    pub(super) nets: PpoNets,
+    pub(crate) base: LearnerBase,
+    pub(crate) nets: PpoNets,
     pub(super) adam: Adam,
 }
 
@@ -52,11 +52,12 @@ impl PpoLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
-        let teacher = Teacher::new(score, model, device)?;
+        let teacher = Teacher::new(score, TiedTo::Decoder, model, device)?;
         Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
-    fn fresh(
+    /// PPO with starting weights, tied to `teacher` if there is one.
+    pub(crate) fn fresh(
         config: PpoConfig,
         spec: PolicySpec,
         teacher: Option<Teacher>,
@@ -101,7 +102,12 @@ impl PpoLearner {
     /// # Errors
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
-        let mut saved = Checkpoint::<PpoConfig, Counters>::read(path, FILE, device)?;
+        Self::stored(TensorFile::read(path)?, device)
+    }
+
+    /// [`Self::load`] for a file in memory.
+    pub(crate) fn stored(file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
+        let mut saved = Checkpoint::<PpoConfig, Counters>::of(file, FILE, device)?;
         let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
         let base = base.map_err(|e| saved.file.learner(e))?;
         let nets = PpoNets::stored(&saved.config, &base, &mut saved.file)?;
@@ -109,6 +115,16 @@ impl PpoLearner {
         saved.file.take_adam(&mut learner.adam, "", &mut learner.nets, saved.counters.adam_steps)?;
         saved.finish(&mut learner.base)?;
         Ok(learner)
+    }
+
+    /// What [`Learner::save`] writes.
+    pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
+        let counters = Counters { adam_steps: self.adam.steps };
+        self.base.checkpoint(path, FILE, &self.config, &counters, |file| {
+            file.put_network("", &self.nets)?;
+            file.put_adam(&self.adam)?;
+            Ok(())
+        })
     }
 }
 
@@ -132,12 +148,7 @@ impl Learner for PpoLearner {
 
     /// Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments `adam.m.actor.l0.weight`.
     fn save(&self, path: &Path) -> Result<(), FileError> {
-        let counters = Counters { adam_steps: self.adam.steps };
-        self.base.save(path, FILE, &self.config, &counters, |file| {
-            file.put_network("", &self.nets)?;
-            file.put_adam(&self.adam)?;
-            Ok(())
-        })
+        self.checkpoint(path)?.write()
     }
 
     fn set_total_updates(&mut self, total: Option<u64>) {

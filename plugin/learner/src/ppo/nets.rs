@@ -25,7 +25,7 @@ impl PpoNets {
     pub(super) fn fresh(config: &PpoConfig, base: &LearnerBase) -> Result<Self, LearnError> {
         let (shape, device) = (actor_shape(config, base), base.device.plain());
         let actor = match base.copied_teacher() {
-            Some(teacher) => teacher.decoder().clone(),
+            Some(teacher) => teacher.origin().clone(),
             None => shape.fresh(&base.spec, &base.streams, "ppo.actor", &device)?,
         };
         let mut rng = base.streams.stream("ppo.critic", 0);
@@ -47,10 +47,10 @@ impl PpoNets {
     }
 }
 
-/// The decoder's layers for a copy of it, else those of the settings.
+/// The layers of what it is a copy of, if it is one, else those of the settings.
 fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
     match base.copied_teacher() {
-        Some(teacher) => teacher.description.decoder_shape(),
+        Some(teacher) => teacher.shape(),
         None => ActorShape::new(&base.spec, &config.cnn, &config.hidden, config.activation, StdShape::Vector),
     }
 }

@@ -1,8 +1,9 @@
 //! Transitions from the replay buffer, made ready for a gradient step.
 
 use super::SacLearner;
+use super::buffer::ReplayBuffer;
 use crate::LearnError;
-use crate::nn::{ActionBatch, matrix, vector};
+use crate::nn::{ActionBatch, Dist, matrix, vector};
 use crate::policy::{StateBatch, joined_rows};
 use crate::score::TeacherBatch;
 use burn::tensor::Tensor;
@@ -22,6 +23,21 @@ pub struct SacBatch {
     pub next_inputs: Tensor<2>,
     /// Constants of the penalty, if there is one.
     pub teacher: Option<TeacherBatch>,
+    /// Numbers of the critics that the target is the least of; none for all of them.
+    pub seen_by_target: Vec<usize>,
+    /// What the prior says of states and next states, for a policy over skills: leaving it costs what else the lack of
+    /// entropy would.
+    pub prior: Option<(Dist, Dist)>,
+}
+
+impl SacBatch {
+    pub(super) fn prior_of_states(&self) -> Option<&Dist> {
+        self.prior.as_ref().map(|(states, _)| states)
+    }
+
+    pub(super) fn prior_of_next(&self) -> Option<&Dist> {
+        self.prior.as_ref().map(|(_, next)| next)
+    }
 }
 
 impl SacLearner {
@@ -30,40 +46,47 @@ impl SacLearner {
         self.base.spec.latent + self.buffer.obs_dim
     }
 
-    /// The transitions in `slots` on the device, normalised; with the teacher's side of them if the actor needs it.
-    pub(super) fn batch(&self, slots: &[usize], with_actor: bool) -> Result<SacBatch, LearnError> {
-        let (base, buffer, n) = (&self.base, &self.buffer, slots.len());
+    /// `buffer`, which is a batch of transitions, on the device, normalised; with the teacher's side of them if the actor needs
+    /// it.
+    pub(super) fn batch(
+        &self,
+        buffer: &ReplayBuffer,
+        seen_by_target: Vec<usize>,
+        with_actor: bool,
+    ) -> Result<SacBatch, LearnError> {
+        let (base, n) = (&self.base, buffer.len());
+        let all: Vec<usize> = (0..n).collect();
         let (stats, device) = (base.obs_stats(), base.device.plain());
         let (latent, obs_dim) = (base.spec.latent, buffer.obs_dim);
         let inputs = |z: &[f32], obs: &[f32]| {
-            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), slots);
+            let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), &all);
             matrix(rows, n, self.inputs(), &device)
         };
         let reward = |&slot: &usize| match &base.rewards {
             Some(normalizer) => normalizer.scale(buffer.rewards[slot]),
             None => buffer.rewards[slot],
         };
-        let actions = buffer.actions.gather(slots);
         let teacher = match base.teacher.as_ref().filter(|_| with_actor) {
             None => None,
             Some(teacher) => {
-                let gather = |values: &[f32], width| joined_rows(&[], 0, values, width, None, slots);
-                let (z, obs) = (gather(&buffer.z, buffer.latent), gather(&buffer.obs, buffer.obs_dim));
                 let squashed = self.nets.actor.is_squashed();
                 let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);
-                let states = StateBatch { z: &z, left: &[], obs: (&obs).into(), n };
-                teacher.output(states, &actions, squashed, &mut rng, base.device)?
+                let states = StateBatch { z: &buffer.z, left: &[], obs: (&buffer.obs).into(), n };
+                teacher.output(states, &buffer.actions, squashed, &mut rng, base.device)?
             }
         };
-        let all: Vec<usize> = (0..n).collect();
-        let continues = slots.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
+        let (here, next) = (inputs(&buffer.z, &buffer.obs), inputs(&buffer.next_z, &buffer.next_obs));
+        let prior = base.prior_origin().map(|prior| (prior.forward(here.clone()), prior.forward(next.clone())));
+        let continues = all.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
         Ok(SacBatch {
-            inputs: inputs(&buffer.z, &buffer.obs),
-            actions: ActionBatch::new(&actions, &device),
-            rewards: vector(slots.iter().map(reward).collect(), &device),
+            inputs: here,
+            actions: ActionBatch::new(&buffer.actions, &device),
+            rewards: vector(all.iter().map(reward).collect(), &device),
             continues: vector(continues, &device),
-            next_inputs: inputs(&buffer.next_z, &buffer.next_obs),
+            next_inputs: next,
             teacher: teacher.map(|output| output.batch(&all, &device)),
+            prior,
+            seen_by_target,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use super::transitions::{slice, transitions};
 use crate::file::TensorFile;
+use crate::nn::path;
 use crate::rng::below;
 use crate::{ActionSpace, Actions, FileError, LearnError, Rollout, TimeLimit};
 use rand::Rng;
@@ -76,6 +77,49 @@ impl ReplayBuffer {
         (0..n).map(|_| below(rng, len) as usize).collect()
     }
 
+    /// Copies of the transitions in these slots, in their order, and behind them of those in some slots of `more`.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if the two act in different kinds of spaces.
+    pub(super) fn picked(&self, slots: &[usize], more: Option<(&Self, &[usize])>) -> Result<Self, LearnError> {
+        let n = slots.len() + more.map_or(0, |(_, slots)| slots.len());
+        let mut all = Self { capacity: n, seen: n as u64, actions: self.actions.gather(slots), ..self.emptied() };
+        let parts = [Some((self, slots)), more];
+        for (from, slots) in parts.iter().flatten() {
+            for &slot in *slots {
+                all.obs.extend_from_slice(slice(&from.obs, self.obs_dim, slot));
+                all.z.extend_from_slice(slice(&from.z, self.latent, slot));
+                all.next_obs.extend_from_slice(slice(&from.next_obs, self.obs_dim, slot));
+                all.next_z.extend_from_slice(slice(&from.next_z, self.latent, slot));
+                all.rewards.push(from.rewards[slot]);
+                all.terminated.push(from.terminated[slot]);
+                all.truncated.push(from.truncated[slot]);
+            }
+        }
+        if let Some((from, slots)) = more {
+            all.actions.extend_rows(&from.actions.gather(slots), 0, slots.len())?;
+        }
+        Ok(all)
+    }
+
+    /// A buffer without transitions, of the same widths.
+    fn emptied(&self) -> Self {
+        Self {
+            capacity: self.capacity,
+            obs_dim: self.obs_dim,
+            latent: self.latent,
+            seen: 0,
+            obs: Vec::new(),
+            z: Vec::new(),
+            next_obs: Vec::new(),
+            next_z: Vec::new(),
+            actions: self.actions.gather(&[]),
+            rewards: Vec::new(),
+            terminated: Vec::new(),
+            truncated: Vec::new(),
+        }
+    }
+
     /// 1 if the value of the slot's next state counts, 0 if the episode was over: after a termination, and by
     /// [`TimeLimit::Legacy`] after a truncation too.
     pub(super) fn continues(&self, slot: usize, limit: TimeLimit) -> f32 {
@@ -83,37 +127,37 @@ impl ReplayBuffer {
         if over { 0.0 } else { 1.0 }
     }
 
-    /// Adds all transitions to a file.
-    pub(super) fn put(&self, file: &mut TensorFile) {
+    /// Adds all transitions to a file, under names that begin with `prefix`.
+    pub(super) fn put(&self, file: &mut TensorFile, prefix: &str) {
         let n = self.len();
-        file.put("buffer.obs", &[n, self.obs_dim], &self.obs);
-        file.put("buffer.z", &[n, self.latent], &self.z);
-        file.put("buffer.next_obs", &[n, self.obs_dim], &self.next_obs);
-        file.put("buffer.next_z", &[n, self.latent], &self.next_z);
+        file.put(&path(prefix, "obs"), &[n, self.obs_dim], &self.obs);
+        file.put(&path(prefix, "z"), &[n, self.latent], &self.z);
+        file.put(&path(prefix, "next_obs"), &[n, self.obs_dim], &self.next_obs);
+        file.put(&path(prefix, "next_z"), &[n, self.latent], &self.next_z);
         match &self.actions {
-            Actions::Discrete(values) => file.put_u32("buffer.actions", values),
-            Actions::Continuous { dim, values } => file.put("buffer.actions", &[n, *dim], values),
+            Actions::Discrete(values) => file.put_u32(&path(prefix, "actions"), values),
+            Actions::Continuous { dim, values } => file.put(&path(prefix, "actions"), &[n, *dim], values),
         }
-        file.put("buffer.rewards", &[n], &self.rewards);
-        file.put_flags("buffer.terminated", &self.terminated);
-        file.put_flags("buffer.truncated", &self.truncated);
+        file.put(&path(prefix, "rewards"), &[n], &self.rewards);
+        file.put_flags(&path(prefix, "terminated"), &self.terminated);
+        file.put_flags(&path(prefix, "truncated"), &self.truncated);
     }
 
     /// Takes all transitions out of a file, of which `seen` were ever taken in.
-    pub(super) fn take(&mut self, file: &mut TensorFile, seen: u64) -> Result<(), FileError> {
+    pub(super) fn take(&mut self, file: &mut TensorFile, prefix: &str, seen: u64) -> Result<(), FileError> {
         self.seen = seen;
         let n = self.len();
-        self.obs = file.take("buffer.obs", &[n, self.obs_dim])?;
-        self.z = file.take("buffer.z", &[n, self.latent])?;
-        self.next_obs = file.take("buffer.next_obs", &[n, self.obs_dim])?;
-        self.next_z = file.take("buffer.next_z", &[n, self.latent])?;
+        self.obs = file.take(&path(prefix, "obs"), &[n, self.obs_dim])?;
+        self.z = file.take(&path(prefix, "z"), &[n, self.latent])?;
+        self.next_obs = file.take(&path(prefix, "next_obs"), &[n, self.obs_dim])?;
+        self.next_z = file.take(&path(prefix, "next_z"), &[n, self.latent])?;
         match &mut self.actions {
-            Actions::Discrete(values) => *values = file.take_u32("buffer.actions", n)?,
-            Actions::Continuous { dim, values } => *values = file.take("buffer.actions", &[n, *dim])?,
+            Actions::Discrete(values) => *values = file.take_u32(&path(prefix, "actions"), n)?,
+            Actions::Continuous { dim, values } => *values = file.take(&path(prefix, "actions"), &[n, *dim])?,
         }
-        self.rewards = file.take("buffer.rewards", &[n])?;
-        self.terminated = file.take_flags("buffer.terminated", n)?;
-        self.truncated = file.take_flags("buffer.truncated", n)?;
+        self.rewards = file.take(&path(prefix, "rewards"), &[n])?;
+        self.terminated = file.take_flags(&path(prefix, "terminated"), n)?;
+        self.truncated = file.take_flags(&path(prefix, "truncated"), n)?;
         Ok(())
     }
 }

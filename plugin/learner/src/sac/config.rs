@@ -58,6 +58,13 @@ pub struct SacConfig {
     pub tau: f64,
     /// Gradient steps for each such update of the targets.
     pub target_every: u64,
+    /// How many critics there are.
+    pub critics: usize,
+    /// How many of them, drawn for each gradient step, a target is the least of. Where that is not all of them, the actor
+    /// follows the mean of all (Chen et al. 2021, "Randomized ensembled double Q-learning").
+    pub target_critics: usize,
+    /// Whether the critics' hidden layers are normalised, which keeps their values near what was seen.
+    pub layer_norm: bool,
     /// Discount γ.
     pub gamma: f64,
     /// How much entropy is worth.
@@ -95,6 +102,9 @@ impl Default for SacConfig {
             actor_every: 2,
             tau: 0.005,
             target_every: 1,
+            critics: 2,
+            target_critics: 2,
+            layer_norm: false,
             gamma: 0.99,
             entropy: EntropyCoef::Auto { initial: 1.0, target_scale: None },
             log_std: (-5.0, 2.0),
@@ -121,10 +131,18 @@ impl SacConfig {
             ("num_steps", self.num_steps as u64),
             ("actor_every", self.actor_every),
             ("target_every", self.target_every),
+            ("critics", self.critics as u64),
+            ("target_critics", self.target_critics as u64),
             ("hidden", self.hidden.iter().copied().min().unwrap_or(1) as u64),
         ];
         if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
             return bad(format!("sac {name} must be at least 1"));
+        }
+        if self.target_critics > self.critics {
+            return bad(format!(
+                "sac target_critics must be at most critics = {}, not {}",
+                self.critics, self.target_critics
+            ));
         }
         let positive = [
             ("actor_lr", self.actor_lr),

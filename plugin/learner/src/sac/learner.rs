@@ -1,14 +1,15 @@
 //! The learner: SAC, and SCORE-SAC if it is given a skill model.
 
 use super::buffer::ReplayBuffer;
+use super::demos::Demos;
 use super::explore::explorer;
-use super::{SacConfig, SacNets};
+use super::{RlpdConfig, SacConfig, SacNets, check_ends};
 use crate::file::{FileKind, TensorFile};
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
 use crate::nn::{Adam, AdamConfig};
 use crate::norm::RewardNormalizer;
 use crate::policy::{Policy, StateBatch};
-use crate::score::{ScoreConfig, Teacher};
+use crate::score::{ScoreConfig, Teacher, TiedTo};
 use crate::skill::SkillModel;
 use crate::{ActionSpace, DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, Rollout};
 use serde::{Deserialize, Serialize};
@@ -24,10 +25,12 @@ const FILE: FileKind = FileKind { name: "sac checkpoint", version: 1 };
 #[derive(Debug)]
 pub struct SacLearner {
     pub(super) config: SacConfig,
-    pub(super) base: LearnerBase,
-    pub(super) nets: SacNets,
+    pub(crate) base: LearnerBase,
+    pub(crate) nets: SacNets,
     pub(super) optimizers: Optimizers,
     pub(super) buffer: ReplayBuffer,
+    /// Recordings that are learned from beside it (RLPD).
+    pub(super) demos: Option<Demos>,
     pub(super) gradient_steps: u64,
     /// The part of a gradient step that is still owed.
     pub(super) carry: f64,
@@ -65,6 +68,9 @@ struct Counters {
     actor_steps: u64,
     #[serde(rename = "alpha_steps")]
     temperature_steps: u64,
+    /// Recorded transitions and their share of each batch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    demos: Option<(u64, f64)>,
 }
 
 impl SacLearner {
@@ -74,6 +80,32 @@ impl SacLearner {
     /// [`LearnError::Config`] for settings that cannot work, or observations that are images.
     pub fn new(config: SacConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::fresh(config, spec, None, seed, device)
+    }
+
+    /// RLPD: SAC with recordings, each a rollout of one environment with its rewards and ends, in a share of each batch.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for settings that cannot work, or recordings that were never rewarded; else as
+    /// [`Rollout::check`].
+    pub fn with_demos(
+        config: SacConfig,
+        rlpd: &RlpdConfig,
+        demos: &[Rollout],
+        spec: PolicySpec,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        rlpd.validate()?;
+        let mut learner = Self::fresh(rlpd.over(config), spec, None, seed, device)?;
+        for episode in demos {
+            episode.check_for(&spec, 0)?;
+            check_ends(episode)?;
+            if let Some(normalizer) = &mut learner.base.observations {
+                normalizer.update(episode.obs.as_slice().vectors("RLPD")?);
+            }
+        }
+        learner.demos = Some(Demos::new(demos, rlpd.demo_share, spec.obs.numbers(), &spec.action_space)?);
+        Ok(learner)
     }
 
     /// SCORE-SAC: tied to `model`'s decoder as `score` says.
@@ -92,11 +124,12 @@ impl SacLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
-        let teacher = Teacher::new(score, model, device)?;
+        let teacher = Teacher::new(score, TiedTo::Decoder, model, device)?;
         Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
-    fn fresh(
+    /// SAC with starting weights, tied to `teacher` if there is one.
+    pub(crate) fn fresh(
         config: SacConfig,
         spec: PolicySpec,
         teacher: Option<Teacher>,
@@ -118,7 +151,8 @@ impl SacLearner {
         config.validate()?;
         let rewards = config.norm_reward.then(|| RewardNormalizer::new(config.gamma));
         let base = LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)?;
-        if base.copied_teacher().is_some() && matches!(spec.action_space, ActionSpace::Continuous(_)) {
+        let copies_decoder = base.copied_teacher().is_some_and(|teacher| teacher.tied_to.is_decoder());
+        if copies_decoder && matches!(spec.action_space, ActionSpace::Continuous(_)) {
             let text = "sac squashes continuous actions, so its policy cannot start as a copy of the decoder: set score \
                         init_from_decoder to false (the penalty still ties the two together)";
             return Err(LearnError::Config(text.to_owned()));
@@ -133,6 +167,7 @@ impl SacLearner {
             nets,
             optimizers: Optimizers::new(&config),
             buffer: ReplayBuffer::new(config.buffer, obs_dim, latent, &base.spec.action_space),
+            demos: None,
             gradient_steps: 0,
             carry: 0.0,
             config,
@@ -160,14 +195,23 @@ impl SacLearner {
     /// # Errors
     /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
-        let mut saved = Checkpoint::<SacConfig, Counters>::read(path, FILE, device)?;
+        Self::stored(TensorFile::read(path)?, device)
+    }
+
+    /// [`Self::load`] for a file in memory.
+    pub(crate) fn stored(file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
+        let mut saved = Checkpoint::<SacConfig, Counters>::of(file, FILE, device)?;
         let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
         let base = base.map_err(|e| saved.file.learner(e))?;
         let nets = SacNets::stored(&saved.config, &base, &mut saved.file)?;
         let mut learner = Self::with_nets(saved.config.clone(), base, nets);
         let counters = &saved.counters;
         learner.optimizers.take(&mut saved.file, &mut learner.nets, counters)?;
-        learner.buffer.take(&mut saved.file, counters.transitions)?;
+        learner.buffer.take(&mut saved.file, "buffer", counters.transitions)?;
+        learner.demos = match counters.demos {
+            Some((rows, share)) => Some(Demos::stored(&mut saved.file, rows, share, &learner.base.spec)?),
+            None => None,
+        };
         learner.base.spec.action_space.check(&learner.buffer.actions).map_err(|e| saved.file.learner(e))?;
         (learner.gradient_steps, learner.carry) = (counters.gradient_steps, counters.carry);
         saved.finish(&mut learner.base)?;
@@ -204,6 +248,13 @@ impl Learner for SacLearner {
     /// Weights are called `actor.l0.weight`, `q1.l0.weight`, `target.q1.l0.weight` and `log_alpha` (that of the
     /// temperature), moments `adam.m.actor.l0.weight`, the replay buffer `buffer.obs` and so on.
     fn save(&self, path: &Path) -> Result<(), FileError> {
+        self.checkpoint(path)?.write()
+    }
+}
+
+impl SacLearner {
+    /// What [`Learner::save`] writes.
+    pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
         let (nets, adams) = (&self.nets, &self.optimizers);
         let counters = Counters {
             gradient_steps: self.gradient_steps,
@@ -212,8 +263,9 @@ impl Learner for SacLearner {
             critic_steps: adams.critics.steps,
             actor_steps: adams.actor.steps,
             temperature_steps: adams.temperature.steps,
+            demos: self.demos.as_ref().map(|demos| (demos.buffer.seen, demos.share)),
         };
-        self.base.save(path, FILE, &self.config, &counters, |file| {
+        self.base.checkpoint(path, FILE, &self.config, &counters, |file| {
             file.put_network("actor", &nets.actor)?;
             file.put_network("", &nets.critics)?;
             file.put_network("target", &nets.targets)?;
@@ -221,7 +273,10 @@ impl Learner for SacLearner {
             for adam in [&adams.critics, &adams.actor, &adams.temperature] {
                 file.put_adam(adam)?;
             }
-            self.buffer.put(file);
+            self.buffer.put(file, "buffer");
+            if let Some(demos) = &self.demos {
+                demos.buffer.put(file, "demos");
+            }
             Ok(())
         })
     }

@@ -1,19 +1,19 @@
 //! The losses of SAC, as pure functions of tensors, `[n]` per row.
 //!
-//! Continuous and discrete actions share one form. With V = E\[min(Q₁, Q₂) - α ln π\], where α is the temperature, the
-//! actor maximises mean(V), and critics learn y = r + γ V'. For continuous actions the expectation is one draw; for
+//! Continuous and discrete actions share one form. With V = E\[Q - α ln π\], where Q is the least of the critics (or what else
+//! is made of many) and α the temperature, the actor maximises mean(V), and critics learn y = r + γ V'. For continuous actions the expectation is one draw; for
 //! discrete ones it is the sum over all choices (Christodoulou 2019, "Soft actor-critic for discrete action settings").
 
 use burn::tensor::Tensor;
 
-/// V of one draw per row: min(Q₁, Q₂) - α ln π(a).
-pub fn soft_value(log_prob: Tensor<1>, q1: Tensor<1>, q2: Tensor<1>, temperature: f64) -> Tensor<1> {
-    q1.min_pair(q2) - log_prob * temperature
+/// V of one draw per row: Q - α ln π(a).
+pub fn soft_value(log_prob: Tensor<1>, q: Tensor<1>, temperature: f64) -> Tensor<1> {
+    q - log_prob * temperature
 }
 
-/// V over all choices: Σ π (min(Q₁, Q₂) - α ln π), all inputs `[n, choices]`. The gradient flows through π and ln π.
-pub fn soft_value_of_choices(log_probs: Tensor<2>, q1: Tensor<2>, q2: Tensor<2>, temperature: f64) -> Tensor<1> {
-    let values = q1.min_pair(q2) - log_probs.clone() * temperature;
+/// V over all choices: Σ π (Q - α ln π), all inputs `[n, choices]`. The gradient flows through π and ln π.
+pub fn soft_value_of_choices(log_probs: Tensor<2>, q: Tensor<2>, temperature: f64) -> Tensor<1> {
+    let values = q - log_probs.clone() * temperature;
     (log_probs.exp() * values).sum_dim(1).squeeze_dim(1)
 }
 

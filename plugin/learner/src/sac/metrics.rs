@@ -10,7 +10,7 @@ pub struct SacMetrics {
     pub transitions: u64,
     /// Gradient steps of the critics so far.
     pub gradient_steps: u64,
-    /// Mean squared error of a critic, the mean of both.
+    /// Mean squared error of a critic, the mean of all.
     pub qf_loss: Option<f32>,
     /// Mean value of the transitions' actions by the critics.
     pub qf_values: Option<f32>,
@@ -67,8 +67,8 @@ pub(super) struct MetricSums {
 impl MetricSums {
     pub(super) fn add_critics(&mut self, step: &CriticStep) {
         let (sum, count) = &mut self.critics;
-        sum.q1_loss += step.q1_loss;
-        sum.q2_loss += step.q2_loss;
+        sum.losses.resize(step.losses.len(), 0.0);
+        sum.losses.iter_mut().zip(&step.losses).for_each(|(sum, loss)| *sum += loss);
         sum.q_values += step.q_values;
         sum.grad_norm += step.grad_norm;
         *count += 1;
@@ -97,7 +97,7 @@ impl MetricSums {
         let (actor, m) = &self.actor;
         let (temperature, k) = &self.temperature;
         SacMetrics {
-            qf_loss: mean(0.5 * (critics.q1_loss + critics.q2_loss), *n),
+            qf_loss: mean(critics.losses.iter().sum::<f64>() / critics.losses.len().max(1) as f64, *n),
             qf_values: mean(critics.q_values, *n),
             critic_grad_norm: mean(critics.grad_norm, *n),
             actor_loss: mean(actor.actor_loss, *m),

@@ -6,11 +6,14 @@
 mod batch;
 mod buffer;
 mod config;
+mod critics;
+mod demos;
 mod explore;
 mod learner;
 mod loss;
 mod metrics;
 mod nets;
+mod rlpd;
 mod soft_update;
 mod steps;
 mod transitions;
@@ -18,9 +21,12 @@ mod update;
 
 pub use batch::SacBatch;
 pub use config::{EntropyCoef, SacConfig};
+pub use critics::{Critics, QNet};
 pub use learner::SacLearner;
 pub use loss::{critic_loss, q_target, soft_value, soft_value_of_choices, temperature_loss};
 pub use metrics::SacMetrics;
-pub use nets::{Critics, LogTemperature, SacNets};
+pub use nets::{LogTemperature, SacNets};
+pub use rlpd::RlpdConfig;
 pub use soft_update::soft_update;
 pub use steps::{ActorStep, CriticStep, TemperatureStep, actor_step, critic_step, target_of, temperature_step};
+pub(crate) use transitions::check_ends;

@@ -1,79 +1,13 @@
-//! The networks of SAC: an actor, two critics and their targets, and the temperature.
+//! The networks of SAC: an actor, critics and their targets, and the temperature.
 
-use super::{EntropyCoef, SacConfig};
+use super::critics::EnsembleShape;
+use super::{Critics, EntropyCoef, SacConfig};
 use crate::file::TensorFile;
 use crate::learner::LearnerBase;
-use crate::nn::{
-    ActionBatch, Init, Mlp, ParamSource, ParamVisitor, Parameters, RandomInit, frozen, path, tracked, vector,
-};
+use crate::nn::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, frozen, path, tracked, vector};
 use crate::policy::{Actor, ActorShape, NetShape, StdShape};
-use crate::{ActionSpace, FileError, LearnError};
-use burn::tensor::{Device, Tensor};
-use rand::Rng;
-
-/// Twin Q-functions, `q1.*` and `q2.*`, each a network of its own.
-///
-/// Continuous: input `[z, s, a]`, one output. Discrete: input `[z, s]`, one output per choice.
-#[derive(Clone, Debug)]
-pub struct Critics {
-    /// Q₁.
-    pub q1: Mlp,
-    /// Q₂.
-    pub q2: Mlp,
-}
-
-impl Critics {
-    /// Orthogonal weights, gain √2 in the hidden layers and 1 in the heads.
-    pub fn new<R: Rng + ?Sized>(shape: &NetShape, space: ActionSpace, rng: &mut R, device: &Device) -> Self {
-        let Ok(critics) = Self::build(&mut RandomInit { rng, device }, "", shape, space);
-        critics
-    }
-
-    /// [`Self::new`] with parameters out of `source`.
-    fn build<S: ParamSource>(
-        source: &mut S,
-        prefix: &str,
-        shape: &NetShape,
-        space: ActionSpace,
-    ) -> Result<Self, S::Error> {
-        let (inputs, outputs) = match space {
-            ActionSpace::Discrete(choices) => (shape.inputs(), choices),
-            ActionSpace::Continuous(dim) => (shape.inputs().saturating_add(dim), 1),
-        };
-        let mut net =
-            |name: &str| Mlp::build(source, &path(prefix, name), inputs, &shape.hidden, outputs, shape.activation, 1.0);
-        Ok(Self { q1: net("q1")?, q2: net("q2")? })
-    }
-
-    /// Q₁ and Q₂ of all choices in each state `[z, s]`, `[n, choices]` each.
-    pub fn of_choices(&self, inputs: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
-        (self.q1.forward(inputs.clone()), self.q2.forward(inputs))
-    }
-
-    /// Q₁ and Q₂ of one vector `[n, dim]` in each state `[z, s]`, `[n]` each.
-    pub fn of_vectors(&self, inputs: Tensor<2>, actions: Tensor<2>) -> (Tensor<1>, Tensor<1>) {
-        let joined = Tensor::cat(vec![inputs, actions], 1);
-        (self.q1.forward(joined.clone()).squeeze_dim(1), self.q2.forward(joined).squeeze_dim(1))
-    }
-
-    /// Q₁ and Q₂ of the actions taken, `[n]` each.
-    pub fn of_actions(&self, inputs: Tensor<2>, actions: &ActionBatch) -> (Tensor<1>, Tensor<1>) {
-        match actions {
-            ActionBatch::Continuous(vectors) => self.of_vectors(inputs, vectors.clone()),
-            ActionBatch::Discrete(index) => {
-                let (q1, q2) = self.of_choices(inputs);
-                (q1.gather(1, index.clone()).squeeze_dim(1), q2.gather(1, index.clone()).squeeze_dim(1))
-            }
-        }
-    }
-}
-
-impl Parameters for Critics {
-    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
-        self.q1.visit(&path(prefix, "q1"), visitor);
-        self.q2.visit(&path(prefix, "q2"), visitor);
-    }
-}
+use crate::{FileError, LearnError};
+use burn::tensor::Tensor;
 
 /// The logarithm of the temperature, `[1]`; `log_alpha` in files.
 #[derive(Clone, Debug)]
@@ -106,11 +40,12 @@ impl SacNets {
     pub(super) fn fresh(config: &SacConfig, base: &LearnerBase) -> Result<Self, LearnError> {
         let (shape, device) = (actor_shape(config, base), base.device.plain());
         let actor = match base.copied_teacher() {
-            Some(teacher) => teacher.decoder().clone(),
+            Some(teacher) => teacher.origin().clone(),
             None => shape.fresh(&base.spec, &base.streams, "sac.actor", &device)?,
         };
         let mut rng = base.streams.stream("sac.critics", 0);
-        let critics = Critics::new(&critic_shape(config, base), base.spec.action_space, &mut rng, &device);
+        let source = &mut RandomInit { rng: &mut rng, device: &device };
+        let Ok(critics) = Critics::build(source, "", &ensemble(config, base));
         let initial = match config.entropy {
             EntropyCoef::Auto { initial, .. } => initial,
             EntropyCoef::Fixed(_) => 1.0,
@@ -124,11 +59,11 @@ impl SacNets {
     /// # Errors
     /// [`FileError`] names the first tensor that is missing or misshapen.
     pub(super) fn stored(config: &SacConfig, base: &LearnerBase, file: &mut TensorFile) -> Result<Self, FileError> {
-        let (device, space) = (base.device.plain(), base.spec.action_space);
+        let device = base.device.plain();
         let actor = actor_shape(config, base).stored(&base.spec, file, "actor", &device)?;
-        let (shape, source) = (critic_shape(config, base), &mut file.params(&device));
-        let critics = Critics::build(source, "", &shape, space)?;
-        let targets = Critics::build(source, "target", &shape, space)?;
+        let (shape, source) = (ensemble(config, base), &mut file.params(&device));
+        let critics = Critics::build(source, "", &shape)?;
+        let targets = Critics::build(source, "target", &shape)?;
         let log_temperature = LogTemperature(source.param("log_alpha", [1], Init::Zeros)?);
         Ok(Self::tracked(&actor, &critics, &targets, &log_temperature))
     }
@@ -151,13 +86,19 @@ impl SacNets {
     }
 }
 
-/// The decoder's layers for a copy of it, else those of the settings.
+/// The layers of what it is a copy of, if it is one, else those of the settings.
 fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
     let (low, high) = config.log_std;
     match base.copied_teacher() {
-        Some(teacher) => teacher.description.decoder_shape(),
+        Some(teacher) => teacher.shape(),
         None => ActorShape { net: critic_shape(config, base), std: StdShape::Squashed(low, high), cnn: None },
     }
+}
+
+/// The critics that the settings describe.
+fn ensemble(config: &SacConfig, base: &LearnerBase) -> EnsembleShape {
+    let (net, space) = (critic_shape(config, base), base.spec.action_space);
+    EnsembleShape { net, space, critics: config.critics, layer_norm: config.layer_norm }
 }
 
 /// What a critic reads beside a continuous action, and its hidden layers.

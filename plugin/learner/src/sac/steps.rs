@@ -1,5 +1,6 @@
 //! The gradient steps of SAC: critics, actor, temperature.
 
+use super::critics::Pool;
 use super::{Critics, SacBatch, SacNets, critic_loss, q_target, soft_value, soft_value_of_choices, temperature_loss};
 use crate::LearnError;
 use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
@@ -7,13 +8,11 @@ use crate::score::{Penalty, ScoreConfig, penalty};
 use burn::tensor::{Gradients, Tensor};
 
 /// What a step of the critics looked like, before it was taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CriticStep {
-    /// Mean squared error of Q₁.
-    pub q1_loss: f64,
-    /// Mean squared error of Q₂.
-    pub q2_loss: f64,
-    /// Mean of Q₁ and Q₂ over the batch.
+    /// Mean squared error of each critic.
+    pub losses: Vec<f64>,
+    /// Mean of all critics over the batch.
     pub q_values: f64,
     /// Norm of the gradient.
     pub grad_norm: f64,
@@ -26,7 +25,7 @@ pub struct ActorStep {
     pub actor_loss: f64,
     /// Estimate of the entropy in nats, -mean(ln π): exact for discrete actions.
     pub entropy: f64,
-    /// Mean divergence between decoder and policy, not weighted.
+    /// Mean divergence between decoder (or prior) and policy, not weighted.
     pub decoder_kl: f64,
     /// The penalty that is added to the loss, in the form of [`ScoreConfig::penalty`], without kl_coef.
     pub kl_penalty: f64,
@@ -50,33 +49,35 @@ pub struct TemperatureStep {
 enum PolicyActions {
     /// All choices, by their ln π, `[n, choices]`.
     All(Tensor<2>),
-    /// One draw.
-    Sample(SquashedDraw),
+    /// One draw, and what the temperature prices of its distribution: ln π of the draw, or the divergence from a prior.
+    Sample { draw: SquashedDraw, cost: Tensor<1> },
 }
 
 impl PolicyActions {
-    fn new(dist: Dist, noise: Option<&Tensor<2>>) -> Result<Self, LearnError> {
+    fn new(dist: Dist, prior: Option<&Dist>, noise: Option<&Tensor<2>>) -> Result<Self, LearnError> {
+        let divergence = prior.map(|prior| dist.kl(prior)).transpose()?;
         match (dist, noise) {
             (Dist::Categorical { log_probs }, _) => Ok(Self::All(log_probs)),
             (Dist::Gaussian { mean, log_std }, Some(noise)) => {
                 let device = noise.device();
                 let squashed = SquashedGaussian::unit(mean, log_std, &device);
-                Ok(Self::Sample(squashed.draw(noise.clone(), LogProbForm::Eps)))
+                let draw = squashed.draw(noise.clone(), LogProbForm::Eps);
+                let cost = divergence.unwrap_or_else(|| draw.log_prob.clone());
+                Ok(Self::Sample { draw, cost })
             }
             _ => Err(LearnError::Action("noise is needed to draw continuous actions".to_owned())),
         }
     }
 
     /// V under `critics`, `[n]`.
-    fn soft_value(&self, critics: &Critics, inputs: Tensor<2>, temperature: f64) -> Tensor<1> {
+    fn soft_value(&self, critics: &Critics, pool: Pool, inputs: Tensor<2>, temperature: f64) -> Tensor<1> {
         match self {
             Self::All(log_probs) => {
-                let (q1, q2) = critics.of_choices(inputs);
-                soft_value_of_choices(log_probs.clone(), q1, q2, temperature)
+                soft_value_of_choices(log_probs.clone(), pool.of(critics.of_choices(inputs)), temperature)
             }
-            Self::Sample(draw) => {
-                let (q1, q2) = critics.of_vectors(inputs, draw.action.clone());
-                soft_value(draw.log_prob.clone(), q1, q2, temperature)
+            Self::Sample { draw, cost } => {
+                let q = pool.of(critics.of_vectors(inputs, draw.action.clone()));
+                soft_value(cost.clone(), q, temperature)
             }
         }
     }
@@ -85,12 +86,20 @@ impl PolicyActions {
     fn log_prob(&self) -> Tensor<1> {
         match self {
             Self::All(log_probs) => (log_probs.clone().exp() * log_probs.clone()).sum_dim(1).squeeze_dim(1),
-            Self::Sample(draw) => draw.log_prob.clone(),
+            Self::Sample { draw, .. } => draw.log_prob.clone(),
+        }
+    }
+
+    /// What the temperature prices, `[n]`: [`Self::log_prob`], or the divergence from a prior.
+    fn cost(&self) -> Tensor<1> {
+        match self {
+            Self::All(_) => self.log_prob(),
+            Self::Sample { cost, .. } => cost.clone(),
         }
     }
 }
 
-/// y = r + γ V' of each row, V' being the target critics' soft value of the actor's actions in the next state.
+/// y = r + γ V' of each row, V' being the target critics' soft value (by those of [`SacBatch::seen_by_target`]) of the actor's actions in the next state.
 ///
 /// `noise` is standard normal, `[n, dim]`, and needed for continuous actions only (here and below).
 ///
@@ -103,12 +112,14 @@ pub fn target_of(
     temperature: f64,
     gamma: f64,
 ) -> Result<Tensor<1>, LearnError> {
-    let actions = PolicyActions::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), noise)?;
-    let next = actions.soft_value(&nets.targets, batch.next_inputs.clone(), temperature);
+    let actions =
+        PolicyActions::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), batch.prior_of_next(), noise)?;
+    let targets = nets.targets.some(&batch.seen_by_target);
+    let next = actions.soft_value(&targets, Pool::Least, batch.next_inputs.clone(), temperature);
     Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
 }
 
-/// One step of Adam on both critics.
+/// One step of Adam on all critics.
 ///
 /// # Errors
 /// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
@@ -123,14 +134,16 @@ pub fn critic_step(
     lr: f64,
 ) -> Result<CriticStep, LearnError> {
     let target = target_of(nets, batch, noise, temperature, gamma)?;
-    let (q1, q2) = nets.critics.of_actions(batch.inputs.clone(), &batch.actions);
-    let values = ((q1.clone() + q2.clone()) * 0.5).mean();
-    let (loss1, loss2) = (critic_loss(q1, target.clone()), critic_loss(q2, target));
+    let q = nets.critics.of_actions(batch.inputs.clone(), &batch.actions);
+    let values = Pool::Mean.of(q.clone()).mean();
+    let losses: Vec<_> = q.into_iter().map(|q| critic_loss(q, target.clone())).collect();
     let steps = adam.steps();
-    let (q1_loss, q2_loss) = (finite("q1_loss", &loss1, steps)?, finite("q2_loss", &loss2, steps)?);
+    let numbers = losses.iter().enumerate().map(|(i, loss)| finite(&format!("q{}_loss", i + 1), loss, steps));
+    let numbers = numbers.collect::<Result<_, _>>()?;
     let q_values = finite("q_values", &values, steps)?;
-    let grad_norm = descend(&mut nets.critics, "", adam, (loss1 + loss2).backward(), lr)?;
-    Ok(CriticStep { q1_loss, q2_loss, q_values, grad_norm })
+    let total = losses.into_iter().reduce(|a, b| a + b).expect("there is a critic");
+    let grad_norm = descend(&mut nets.critics, "", adam, total.backward(), lr)?;
+    Ok(CriticStep { losses: numbers, q_values, grad_norm })
 }
 
 /// One step of Adam on the actor, under the present critics.
@@ -149,14 +162,19 @@ pub fn actor_step(
     lr: f64,
 ) -> Result<ActorStep, LearnError> {
     let dist = nets.actor.forward(batch.inputs.clone());
-    let actions = PolicyActions::new(dist.clone(), noise)?;
-    let loss = actions.soft_value(&frozen(&nets.critics), batch.inputs.clone(), temperature).mean().neg();
+    let actions = PolicyActions::new(dist.clone(), batch.prior_of_states(), noise)?;
+    // Where a target sees only some critics, the mean of all is what the actor follows.
+    let pool = if batch.seen_by_target.is_empty() { Pool::Least } else { Pool::Mean };
+    let loss = actions.soft_value(&frozen(&nets.critics), pool, batch.inputs.clone(), temperature).mean().neg();
     let steps = adam.steps();
     let mut metrics = ActorStep {
         actor_loss: finite("actor_loss", &loss, steps)?,
         entropy: -finite("log_prob", &actions.log_prob().mean(), steps)?,
         ..ActorStep::default()
     };
+    if batch.prior.is_some() {
+        metrics.decoder_kl = finite("prior_kl", &actions.cost().mean(), steps)?;
+    }
     let mut total = loss;
     if let (Some(teacher), Some(score)) = (&batch.teacher, score) {
         let Penalty { kl, term } = penalty(score, &teacher.dist, &dist, teacher.confidence.clone())?;
@@ -169,7 +187,8 @@ pub fn actor_step(
     Ok(metrics)
 }
 
-/// One step of Adam on the logarithm of the temperature, under the present actor.
+/// One step of Adam on the logarithm of the temperature, under the present actor. Where the batch has a prior, the divergence
+/// from it takes the place of ln π, and -target_entropy is the divergence that is aimed at.
 ///
 /// # Errors
 /// As [`critic_step`].
@@ -181,9 +200,10 @@ pub fn temperature_step(
     target_entropy: f64,
     lr: f64,
 ) -> Result<TemperatureStep, LearnError> {
-    let actions = PolicyActions::new(frozen(&nets.actor).forward(batch.inputs.clone()), noise)?;
+    let dist = frozen(&nets.actor).forward(batch.inputs.clone());
+    let actions = PolicyActions::new(dist, batch.prior_of_states(), noise)?;
     let log_prob = actions.log_prob();
-    let loss = temperature_loss(nets.log_temperature.0.clone(), log_prob.clone(), target_entropy);
+    let loss = temperature_loss(nets.log_temperature.0.clone(), actions.cost(), target_entropy);
     let steps = adam.steps();
     let metrics = TemperatureStep {
         temperature_loss: finite("alpha_loss", &loss, steps)?,

@@ -17,7 +17,7 @@ pub(super) struct Transition<'a> {
 ///
 /// # Errors
 /// [`LearnError::Shape`] names the first length that does not fit; [`LearnError::Config`] names a row.
-pub(super) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
+pub(crate) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
     let ends = &rollout.ends;
     let mut listed = ends.cut_rows.iter().copied();
     for row in (0..rollout.rows()).filter(|&row| is_cut(rollout, row)) {

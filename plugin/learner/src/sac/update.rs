@@ -1,12 +1,15 @@
 //! One update from top to bottom: rollout → replay buffer → batches → steps of critics, actor and temperature → targets.
 //! The losses and their steps are in `loss.rs` and `steps.rs`.
 
+use super::buffer::ReplayBuffer;
 use super::metrics::MetricSums;
 use super::transitions::check_ends;
-use super::{EntropyCoef, SacBatch, SacLearner, SacMetrics, actor_step, critic_step, soft_update, temperature_step};
+use super::{
+    EntropyCoef, SacBatch, SacConfig, SacLearner, SacMetrics, actor_step, critic_step, soft_update, temperature_step,
+};
 use crate::device::update_on;
 use crate::nn::matrix;
-use crate::rng::{ChaCha8Rng, normal};
+use crate::rng::{ChaCha8Rng, normal, shuffle};
 use crate::{ActionSpace, LearnError, Rollout};
 use burn::tensor::Tensor;
 use std::time::Instant;
@@ -42,7 +45,7 @@ impl SacLearner {
             self.gradient_step(&mut sums)?;
         }
         self.base.updates += 1;
-        let penalised = self.base.score_config().is_some_and(|score| score.kl);
+        let penalised = self.base.prior_origin().is_some() || self.base.score_config().is_some_and(|score| score.kl);
         let entropy_coef = if due > 0 { Some(self.temperature()? as f32) } else { None };
         let (transitions, gradient_steps) = (self.buffer.seen, self.gradient_steps);
         Ok(SacMetrics { transitions, gradient_steps, entropy_coef, ..sums.means(penalised) })
@@ -61,12 +64,13 @@ impl SacLearner {
     /// The critics' step, the actor's and the temperature's where they are due, and the targets'.
     fn gradient_step(&mut self, sums: &mut MetricSums) -> Result<(), LearnError> {
         let number = self.gradient_steps;
-        let slots = self.buffer.draw(self.config.batch, &mut self.base.streams.stream("sac.batch", number));
+        let drawn = self.draw(number)?;
+        let seen_by_target = self.critics_of_target(number);
         let mut rng = self.base.streams.stream("sac.noise", number);
         self.gradient_steps += 1;
         let with_actor = self.gradient_steps.is_multiple_of(self.config.actor_every);
         let start = Instant::now();
-        let batch = self.batch(&slots, with_actor)?;
+        let batch = self.batch(&drawn, seen_by_target, with_actor)?;
         self.base.gathering += start.elapsed();
         let noise = self.noise(&mut rng);
         let (temperature, config) = (self.temperature()?, &self.config);
@@ -91,6 +95,32 @@ impl SacLearner {
         Ok(())
     }
 
+    /// The transitions of gradient step `number`: of what was played, and of what was recorded if there is anything.
+    fn draw(&self, number: u64) -> Result<ReplayBuffer, LearnError> {
+        let recorded = self.demos.as_ref().map_or(0, |demos| demos.of_batch(&self.config));
+        let mut rng = self.base.streams.stream("sac.batch", number);
+        let played = self.buffer.draw(self.config.batch - recorded, &mut rng);
+        match &self.demos {
+            None => self.buffer.picked(&played, None),
+            Some(demos) => {
+                let slots = demos.buffer.draw(recorded, &mut rng);
+                self.buffer.picked(&played, Some((&demos.buffer, &slots)))
+            }
+        }
+    }
+
+    /// Which critics the target of gradient step `number` is the least of; none for all.
+    fn critics_of_target(&self, number: u64) -> Vec<usize> {
+        let SacConfig { critics, target_critics, .. } = self.config;
+        if target_critics >= critics {
+            return Vec::new();
+        }
+        let mut all: Vec<usize> = (0..critics).collect();
+        shuffle(&mut all, &mut self.base.streams.stream("sac.target_critics", number));
+        all.truncate(target_critics);
+        all
+    }
+
     /// A step of the actor and, if it is tuned, one of the temperature.
     fn actor_update(
         &mut self,
@@ -111,7 +141,7 @@ impl SacLearner {
     }
 
     /// What the transitions' entropy is worth now.
-    fn temperature(&self) -> Result<f64, LearnError> {
+    pub(crate) fn temperature(&self) -> Result<f64, LearnError> {
         match self.config.entropy {
             EntropyCoef::Auto { .. } => self.nets.temperature(),
             EntropyCoef::Fixed(temperature) => Ok(temperature),

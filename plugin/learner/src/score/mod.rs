@@ -14,4 +14,4 @@ pub use confidence::{confidences, own_samples, penalty_weights};
 pub use config::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use penalty::{Penalty, decoder_kl, legacy_coinrun, legacy_d4rl, marginal_densities, penalty};
 pub use teacher::TeacherBatch;
-pub(crate) use teacher::{Teacher, TeacherOutput};
+pub(crate) use teacher::{Teacher, TeacherOutput, TiedTo};

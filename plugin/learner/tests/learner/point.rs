@@ -112,11 +112,44 @@ impl Field {
     }
 
     /// Share of the episodes of `ticks` ticks of play that reach their goals.
-    fn success(learner: &impl Learner, ticks: usize) -> f64 {
+    pub fn success(learner: &impl Learner, ticks: usize) -> f64 {
         let mut field = Self::new(32, 99);
         field.rollout(learner, ticks);
         field.reached.iter().filter(|reached| **reached).count() as f64 / field.reached.len() as f64
     }
+}
+
+/// Episodes of points that go straight to their goals, as rollouts of one environment each.
+pub fn recordings(episodes: u64) -> Vec<Rollout> {
+    let streams = Streams::new(21);
+    let episode = |i| {
+        let mut point = Point::new(&mut streams.stream("recorded", i));
+        let mut rollout = Rollout::new(1, OBS, 0, &SPACE);
+        loop {
+            let Point { place: [x, y], goal: [to_x, to_y], .. } = point;
+            let velocity = [to_x - x, to_y - y].map(|way| (5.0 * way).clamp(-1.0, 1.0));
+            let obs = [x, y, to_x, to_y];
+            let (reward, end, cut) = point.step(&velocity);
+            let step = RolloutStep {
+                obs: (&obs).into(),
+                z: &[],
+                actions: &Actions::Continuous { dim: 2, values: velocity.to_vec() },
+                log_probs: &[0.0],
+                values: &[0.0],
+                rewards: &[reward],
+                terminated: &[end],
+                truncated: &[cut],
+                final_values: &[0.0],
+            };
+            rollout.push_step(step).expect("continuous");
+            if end || cut {
+                rollout.next_values = vec![0.0];
+                rollout.ends.next_obs = vec![0.0; OBS].into();
+                return rollout;
+            }
+        }
+    };
+    (0..episodes).map(episode).filter(|rollout| rollout.terminated.last() == Some(&true)).collect()
 }
 
 pub fn sac_config() -> SacConfig {

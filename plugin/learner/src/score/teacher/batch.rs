@@ -46,7 +46,7 @@ impl TeacherOutput {
 }
 
 impl Teacher {
-    /// The decoder's distributions and confidence in `states` where `actions` were taken; `None` if there is no penalty.
+    /// The distributions of what the policy is tied to, and its confidence, in `states` where `actions` were taken; `None` if there is no penalty.
     /// `squashed`: the policy is a squashed Gaussian.
     pub(crate) fn output<R: Rng + ?Sized>(
         &self,
@@ -59,7 +59,7 @@ impl Teacher {
         if !self.config.kl {
             return Ok(None);
         }
-        let dist = self.decoder_policy(device).forward(states.z, states.obs, states.n)?.into_dist();
+        let dist = self.origin_policy(device).forward(states.z, states.obs, states.n)?.into_dist();
         let confidence = penalty_weights(&self.config, &dist, actions, own_samples_from)?;
         let dist = if squashed { unsquashed(&dist) } else { dist };
         Ok(Some(TeacherOutput { dist, confidence }))
@@ -72,6 +72,7 @@ mod tests {
     use crate::policy::VECTORS_AT_A_TIME;
     use crate::rng::{Streams, normal};
     use crate::score::ScoreConfig;
+    use crate::score::TiedTo;
     use crate::skill::{SkillConfig, SkillDescription, SkillModel, SkillNets};
     use crate::{ActionSpace, ObsKind};
 
@@ -85,7 +86,7 @@ mod tests {
             SkillNets::new(&config, observation, space, &Streams::new(0), &device.plain()).expect("good settings");
         let description = SkillDescription { config, observation, action_space: space };
         let model = SkillModel::new(description, &nets, None, device);
-        let teacher = Teacher::new(ScoreConfig::default(), &model, device).expect("the same device");
+        let teacher = Teacher::new(ScoreConfig::default(), TiedTo::Decoder, &model, device).expect("the same device");
         let mut rng = Streams::new(1).stream("rows", 0);
         let n = VECTORS_AT_A_TIME + 1;
         let mut numbers = |width: usize| -> Vec<f32> { (0..n * width).map(|_| normal(&mut rng)).collect() };

@@ -1,6 +1,6 @@
 //! The teacher in a learner's checkpoint.
 
-use super::Teacher;
+use super::{Teacher, TiedTo};
 use crate::file::TensorFile;
 use crate::norm::put_obs_stats;
 use crate::score::ScoreConfig;
@@ -19,14 +19,14 @@ impl Teacher {
 
     /// What [`Self::put`] has added to `file`, the checkpoint of a policy of `spec`.
     pub(crate) fn take(
-        config: ScoreConfig,
+        (config, tied_to): (ScoreConfig, TiedTo),
         description: SkillDescription,
         spec: PolicySpec,
         file: &mut TensorFile,
         device: DeviceKind,
     ) -> Result<Self, FileError> {
         let actors = Actors::stored(&description, file, &device.plain())?;
-        let mut teacher = Self { config, description, actors, stats: None };
+        let mut teacher = Self { config, tied_to, description, actors, stats: None };
         let tied = teacher.policy_spec();
         if tied != spec {
             return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));

@@ -2,16 +2,34 @@
 
 use crate::nn::moved;
 use crate::norm::ObsStats;
-use crate::policy::{Actor, Policy};
+use crate::policy::{Actor, ActorShape, Policy};
 use crate::score::{PriorKind, ScoreConfig};
 use crate::skill::{Actors, Prior, SkillDescription, SkillModel, SkillSource};
 use crate::{DeviceKind, LearnError, PolicySpec};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Which network of a skill model a policy starts as and stays close to.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) enum TiedTo {
+    /// The decoder π(a | s, z), for a policy that acts.
+    #[default]
+    Decoder,
+    /// The prior p(z | s), for a policy whose actions are skills.
+    Prior,
+}
+
+impl TiedTo {
+    pub(crate) fn is_decoder(&self) -> bool {
+        *self == Self::Decoder
+    }
+}
 
 /// The decoder and the prior of a skill model, and how a learner uses them.
 #[derive(Clone, Debug)]
 pub(crate) struct Teacher {
     pub(crate) config: ScoreConfig,
+    pub(crate) tied_to: TiedTo,
     pub(crate) description: SkillDescription,
     pub(super) actors: Actors,
     /// How decoder and prior see observations, and the policy that is tied to them.
@@ -20,20 +38,45 @@ pub(crate) struct Teacher {
 
 impl Teacher {
     /// `model`, used as `config` says.
-    pub(crate) fn new(config: ScoreConfig, model: &SkillModel, device: DeviceKind) -> Result<Self, LearnError> {
+    pub(crate) fn new(
+        config: ScoreConfig,
+        tied_to: TiedTo,
+        model: &SkillModel,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
         let mut actors = Actors { decoder: model.nets.decoder.clone(), prior: model.nets.prior.clone() };
         if model.device != device {
             device.check()?;
             let to = device.plain();
             actors = Actors { decoder: moved(&actors.decoder, &to)?, prior: moved(&actors.prior, &to)? };
         }
-        Ok(Self { config, description: model.description.clone(), actors, stats: model.stats.clone() })
+        let (description, stats) = (model.description.clone(), model.stats.clone());
+        Ok(Self { config, tied_to, description, actors, stats })
     }
 
     /// What a policy tied to this skill model reads and does.
     pub(crate) fn policy_spec(&self) -> PolicySpec {
         let latent = if self.config.condition { self.latent() } else { 0 };
-        PolicySpec { latent, ..self.description.decoder_spec() }
+        match self.tied_to {
+            TiedTo::Decoder => PolicySpec { latent, ..self.description.decoder_spec() },
+            TiedTo::Prior => self.description.prior_spec(),
+        }
+    }
+
+    /// The layers of a policy that is a copy.
+    pub(crate) fn shape(&self) -> ActorShape {
+        match self.tied_to {
+            TiedTo::Decoder => self.description.decoder_shape(),
+            TiedTo::Prior => self.description.prior_shape(),
+        }
+    }
+
+    /// Width of the skills that a rollout of the policy must hold.
+    pub(crate) fn rollout_latent(&self) -> usize {
+        match self.tied_to {
+            TiedTo::Decoder => self.latent(),
+            TiedTo::Prior => 0,
+        }
     }
 
     /// Width of a skill.
@@ -41,14 +84,17 @@ impl Teacher {
         self.description.config.latent
     }
 
-    /// Whether the policy's layers are those of the decoder, and not those that the learner's settings describe.
+    /// Whether the policy's layers are those of the network that it is tied to, and not those that the learner's settings describe.
     pub(crate) fn is_copied(&self) -> bool {
         self.config.init_from_decoder
     }
 
-    /// The decoder, which a policy that is a copy starts as.
-    pub(crate) fn decoder(&self) -> &Actor {
-        &self.actors.decoder
+    /// What a policy that is a copy starts as.
+    pub(crate) fn origin(&self) -> &Actor {
+        match self.tied_to {
+            TiedTo::Decoder => &self.actors.decoder,
+            TiedTo::Prior => &self.actors.prior,
+        }
     }
 
     /// `Ok` if these settings can work. `norm_obs`: the learner would normalise observations itself.
@@ -57,7 +103,7 @@ impl Teacher {
     /// [`LearnError::Config`] if they cannot.
     pub(crate) fn check(&self, norm_obs: bool) -> Result<(), LearnError> {
         self.config.validate()?;
-        self.config.check_space(self.description.action_space)?;
+        self.config.check_space(self.policy_spec().action_space)?;
         let bad = |text: &str| Err(LearnError::Config(text.to_owned()));
         if norm_obs && self.description.config.norm_obs {
             return bad(
@@ -76,14 +122,16 @@ impl Teacher {
 
     /// Where skills come from, by [`ScoreConfig::prior`].
     pub(crate) fn prior(&self, device: DeviceKind) -> Prior {
-        let (latent, tanh) = (self.latent(), self.description.config.tanh_latent);
         match self.config.prior {
-            PriorKind::StandardNormal => Prior::standard_normal(latent, tanh),
-            PriorKind::Learned => {
-                let (stats, observation) = (self.stats.clone(), self.description.observation);
-                Prior::learned(&self.actors.prior, stats, observation, latent, tanh, device.plain())
-            }
+            PriorKind::StandardNormal => Prior::standard_normal(self.latent(), self.description.config.tanh_latent),
+            PriorKind::Learned => self.prior_of(&self.actors.prior, device),
         }
+    }
+
+    /// Skills from `actor`, which has the prior's layers.
+    pub(crate) fn prior_of(&self, actor: &Actor, device: DeviceKind) -> Prior {
+        let (latent, tanh) = (self.latent(), self.description.config.tanh_latent);
+        Prior::learned(actor, self.stats.clone(), self.description.observation, latent, tanh, device.plain())
     }
 
     /// Prior and decoder with the horizon and the draw, as a policy needs them in play.
@@ -92,8 +140,17 @@ impl Teacher {
         SkillSource { prior: self.prior(device), decoder: self.decoder_policy(device), horizon, draw }
     }
 
+    /// The network that the policy is tied to, as a policy.
+    pub(super) fn origin_policy(&self, device: DeviceKind) -> Policy {
+        let spec = match self.tied_to {
+            TiedTo::Decoder => return self.decoder_policy(device),
+            TiedTo::Prior => self.description.prior_spec(),
+        };
+        Policy::new(&self.actors.prior, None, self.stats.clone(), spec, device.plain())
+    }
+
     /// The decoder as a policy.
-    pub(super) fn decoder_policy(&self, device: DeviceKind) -> Policy {
+    pub(crate) fn decoder_policy(&self, device: DeviceKind) -> Policy {
         let spec = self.description.decoder_spec();
         Policy::new(&self.actors.decoder, None, self.stats.clone(), spec, device.plain())
     }

@@ -22,7 +22,7 @@ impl Teacher {
         }
         let played = policy.forward(z, obs, n)?;
         let squashed = played.squashed;
-        let mut decoded = self.decoder_policy(device).forward(z, obs, n)?.into_dist();
+        let mut decoded = self.origin_policy(device).forward(z, obs, n)?.into_dist();
         if squashed {
             decoded = unsquashed(&decoded);
         }

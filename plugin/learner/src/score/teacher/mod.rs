@@ -7,4 +7,4 @@ mod initial_kl;
 
 pub use batch::TeacherBatch;
 pub(crate) use batch::TeacherOutput;
-pub(crate) use frozen::Teacher;
+pub(crate) use frozen::{Teacher, TiedTo};

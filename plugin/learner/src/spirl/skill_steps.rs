@@ -1,0 +1,181 @@
+//! From ticks to skills: what a policy over skills learns from.
+
+use crate::sac::check_ends;
+use crate::{ActionSpace, Actions, EndStates, LearnError, Rollout};
+
+/// The state after a skill.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum After {
+    /// There is none: the game was over.
+    Nothing,
+    /// A row in which the next skill was drawn.
+    Row(usize),
+    /// The last state of an episode that was cut off, by its place among [`EndStates::cut_rows`].
+    Cut(usize),
+    /// Where the rollout of this environment stopped.
+    End(usize),
+}
+
+/// A skill that was drawn and played to its end within the rollout.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct SkillStep {
+    /// Where it was drawn.
+    row: usize,
+    /// Σ γᵗ r over its ticks.
+    reward: f64,
+    after: After,
+}
+
+/// The rollout as skills see it, in one environment: each row is a state in which a skill was drawn, the action is that skill
+/// (`Actions::Continuous`, as the decoder read it), and its reward what its ticks earned, discounted by `gamma`.
+///
+/// The skills of an environment follow one another; behind its last one, and wherever an episode was cut off, the row counts as
+/// truncated with the state that came after among the ends. Skills that the beginning or the end of the rollout has cut are
+/// left out: the state in which the last one was drawn is the one after its predecessor. Log-probabilities and values are left
+/// at 0.
+///
+/// # Errors
+/// [`LearnError::Shape`] or [`LearnError::Config`] if the rollout does not say when skills were drawn, or in none of its environments one was drawn and
+/// played to its end.
+pub(super) fn skill_rollout(rollout: &Rollout, gamma: f64) -> Result<Rollout, LearnError> {
+    check_ends(rollout)?;
+    LearnError::check("rollout left", rollout.rows(), rollout.left.len())?;
+    LearnError::check("rollout ends next_left", rollout.envs, rollout.ends.next_left.len())?;
+    let latent = rollout.latent;
+    let mut skills = Rollout { envs: 1, ..Rollout::new(1, rollout.obs_kind, 0, &ActionSpace::Continuous(latent)) };
+    let mut drawn = Vec::new();
+    for env in 0..rollout.envs {
+        let steps = skill_steps(rollout, env, gamma);
+        for (i, step) in steps.iter().enumerate() {
+            let next = steps.get(i + 1).map(|next| next.row);
+            push(&mut skills, rollout, step, next)?;
+            drawn.extend_from_slice(&rollout.z[step.row * latent..(step.row + 1) * latent]);
+        }
+    }
+    if skills.steps == 0 {
+        let text = "no skill was played to its end: rollouts must be at least twice as long as skills are held";
+        return Err(LearnError::Config(text.to_owned()));
+    }
+    let n = skills.steps;
+    skills.actions = Actions::Continuous { dim: latent, values: drawn };
+    (skills.log_probs, skills.values, skills.final_values) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    skills.next_values = vec![0.0];
+    skills.ends.next_obs.push(rollout.obs.row(0, rollout.obs_kind.numbers()))?;
+    Ok(skills)
+}
+
+/// The skills that an environment has played to their ends.
+fn skill_steps(rollout: &Rollout, env: usize, gamma: f64) -> Vec<SkillStep> {
+    let (mut steps, mut open): (Vec<SkillStep>, Option<(SkillStep, f64)>) = (Vec::new(), None);
+    let mut close = |open: &mut Option<(SkillStep, f64)>, after| {
+        steps.extend(open.take().map(|(step, _)| SkillStep { after, ..step }));
+    };
+    for row in (env..rollout.rows()).step_by(rollout.envs) {
+        // A skill that was drawn just now has all of its ticks left.
+        if rollout.left[row] >= 1.0 {
+            close(&mut open, After::Row(row));
+            open = Some((SkillStep { row, reward: 0.0, after: After::Nothing }, 1.0));
+        }
+        if let Some((step, discount)) = &mut open {
+            step.reward += *discount * f64::from(rollout.rewards[row]);
+            *discount *= gamma;
+        }
+        if rollout.terminated[row] {
+            close(&mut open, After::Nothing);
+        } else if let Ok(cut) = rollout.ends.cut_rows.binary_search(&row) {
+            close(&mut open, After::Cut(cut));
+        }
+    }
+    if rollout.ends.next_left[env] >= 1.0 {
+        close(&mut open, After::End(env));
+    }
+    steps
+}
+
+/// Adds one skill; `next` is the row of the one that is added behind it.
+fn push(skills: &mut Rollout, rollout: &Rollout, step: &SkillStep, next: Option<usize>) -> Result<(), LearnError> {
+    let width = rollout.obs_kind.numbers();
+    let EndStates { cut_obs, next_obs, .. } = &rollout.ends;
+    skills.obs.push(rollout.obs.row(step.row, width))?;
+    skills.rewards.push(step.reward as f32);
+    skills.terminated.push(step.after == After::Nothing);
+    let state = match step.after {
+        After::Nothing => None,
+        After::Row(row) if Some(row) == next => None,
+        After::Row(row) => Some(rollout.obs.row(row, width)),
+        After::Cut(cut) => Some(cut_obs.row(cut, width)),
+        After::End(env) => Some(next_obs.row(env, width)),
+    };
+    skills.truncated.push(state.is_some());
+    skills.steps += 1;
+    match state {
+        Some(state) => skills.push_cut(0, state, &[]),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One environment of nine ticks, skills held for two: the first tick ends a skill of before, an episode terminates after
+    /// one tick of its skill, another is cut off, and the last skill has only begun.
+    fn rollout(next_left: f32) -> Rollout {
+        let n = 9;
+        let mut rollout = Rollout {
+            steps: n,
+            obs: (0..9u8).map(f32::from).collect::<Vec<f32>>().into(),
+            z: (0..9u8).map(|i| f32::from(i) * 0.1).collect(),
+            left: vec![0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 1.0, 0.5],
+            actions: Actions::Discrete(vec![0; n]),
+            log_probs: vec![0.0; n],
+            values: vec![0.0; n],
+            rewards: vec![1.0; n],
+            terminated: (0..n).map(|row| row == 3).collect(),
+            truncated: (0..n).map(|row| row == 6).collect(),
+            final_values: vec![0.0; n],
+            next_values: vec![0.0],
+            ..Rollout::new(1, 1, 1, &ActionSpace::Discrete(2))
+        };
+        rollout.ends.cut_rows = vec![6];
+        rollout.ends.cut_obs.push(&[60.0]).expect("vectors");
+        (rollout.ends.cut_z, rollout.ends.next_z) = (vec![0.0], vec![0.0]);
+        rollout.ends.next_obs.push(&[90.0]).expect("vectors");
+        rollout.ends.next_left = vec![next_left];
+        rollout.check().expect("it fits");
+        rollout
+    }
+
+    #[test]
+    fn by_hand() {
+        let skills = skill_rollout(&rollout(1.0), 0.5).expect("there are some");
+        skills.check().expect("it fits");
+        assert_eq!(skills.obs, vec![1.0, 3.0, 4.0, 6.0, 7.0].into());
+        assert_eq!(skills.rewards, [1.5, 1.0, 1.5, 1.0, 1.5]);
+        assert_eq!(skills.terminated, [false, true, false, false, false]);
+        assert_eq!(skills.truncated, [false, false, false, true, true]);
+        assert_eq!((skills.ends.cut_rows, skills.ends.cut_obs), (vec![3, 4], vec![60.0, 90.0].into()));
+        let Actions::Continuous { dim: 1, values } = skills.actions else { panic!("skills") };
+        assert_eq!(values, [0.1, 0.3, 0.4, 0.6, 0.7].map(|z: f64| z as f32));
+    }
+
+    #[test]
+    fn a_skill_that_the_rollout_cuts_is_only_the_state_behind_the_one_before() {
+        let mut rollout = rollout(0.5);
+        (rollout.truncated[6], rollout.ends.cut_rows) = (false, Vec::new());
+        rollout.ends.cut_obs.clear();
+        rollout.ends.cut_z.clear();
+        let skills = skill_rollout(&rollout, 0.5).expect("there are some");
+        assert_eq!(skills.obs, vec![1.0, 3.0, 4.0, 6.0].into());
+        assert_eq!((skills.ends.cut_rows, skills.ends.cut_obs), (vec![3], vec![7.0].into()));
+    }
+
+    #[test]
+    fn rollouts_without_a_whole_skill_are_refused() {
+        let mut rollout = rollout(0.5);
+        rollout.left = vec![0.5; 9];
+        assert!(skill_rollout(&rollout, 0.5).expect_err("none").to_string().contains("twice as long"));
+        rollout.left.clear();
+        assert!(skill_rollout(&rollout, 0.5).expect_err("who knows").to_string().contains("left"));
+    }
+}

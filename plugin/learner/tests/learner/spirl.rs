@@ -1,0 +1,158 @@
+//! SPiRL: a policy over skills that start as the prior, learned by PPO and by SAC.
+
+use crate::walkers::{SPACE, Walkers, skills_of_directions};
+use playbot_learner::rng::{Streams, normal};
+use playbot_learner::{
+    DeviceKind, LearnError, Learner, PpoConfig, PriorKind, Rollout, SacConfig, ScoreConfig, SkillDraw, SkillModel,
+    SpirlConfig, SpirlLearner, TimeLimit,
+};
+use std::sync::LazyLock;
+
+/// Ticks for which a skill is held.
+const HORIZON: usize = 4;
+
+static MODEL: LazyLock<SkillModel> = LazyLock::new(skills_of_directions);
+
+fn score() -> ScoreConfig {
+    ScoreConfig { horizon: HORIZON, ..ScoreConfig::default() }
+}
+
+fn ppo_config() -> PpoConfig {
+    PpoConfig {
+        lr: 2e-3,
+        num_steps: 64,
+        minibatches: 4,
+        epochs: 6,
+        gamma: 0.98,
+        hidden: vec![32],
+        ..PpoConfig::default()
+    }
+}
+
+fn ppo(config: SpirlConfig) -> SpirlLearner {
+    SpirlLearner::ppo(config, ppo_config(), &score(), &MODEL, 1, DeviceKind::Flex).expect("good settings")
+}
+
+fn sac_config() -> SacConfig {
+    SacConfig { updates_per_step: 1.0, num_steps: 32, learning_starts: 64, ..crate::point::sac_config() }
+}
+
+fn sac(config: SpirlConfig) -> SpirlLearner {
+    SpirlLearner::sac(config, sac_config(), &ppo_config(), &score(), &MODEL, 1, DeviceKind::Flex)
+        .expect("good settings")
+}
+
+/// What the last of so many updates reported.
+fn train(learner: &mut SpirlLearner, updates: usize, ticks: usize) -> Vec<(&'static str, f64)> {
+    let mut walkers = Walkers::new(16, HORIZON, 1);
+    let mut last = Vec::new();
+    for _ in 0..updates {
+        let rollout = walkers.rollout(learner, ticks);
+        last = learner.learn(&rollout).expect("finite").scalars().collect();
+    }
+    last
+}
+
+fn number(scalars: &[(&'static str, f64)], tag: &str) -> f64 {
+    scalars.iter().find(|(name, _)| *name == tag).unwrap_or_else(|| panic!("{tag} in {scalars:?}")).1
+}
+
+#[test]
+fn skills_come_from_the_prior_at_first() {
+    let obs: Vec<f32> = (0..12u8).map(|i| f32::from(i) * 0.1 - 0.5).collect();
+    let draw = |prior: playbot_learner::Prior| {
+        let mut rng = Streams::new(3).stream("z", 0);
+        prior.sample(&obs, 3, SkillDraw::Sample, &mut |_| normal(&mut rng)).expect("finite")
+    };
+    for learner in [ppo(SpirlConfig::default()), sac(SpirlConfig::default())] {
+        assert_eq!(learner.initial_kl(&[], (&obs).into(), 3).expect("a copy"), Some(0.0));
+        assert_eq!(draw(learner.skills().expect("it has some").prior), draw(MODEL.prior()));
+        assert_eq!((learner.rollout_latent(), learner.spec().action_space), (2, SPACE));
+    }
+}
+
+#[test]
+fn it_learns_which_skills_lead_to_the_goal() {
+    let success = |learner: &SpirlLearner| Walkers::new(64, HORIZON, 77).success(learner, 120);
+    let before = success(&ppo(SpirlConfig::default()));
+    assert!(before < 0.4, "{before} by chance");
+    let loose = SpirlConfig { target_kl: Some(3.0), ..SpirlConfig::default() };
+    let mut by_ppo = ppo(loose.clone());
+    train(&mut by_ppo, 40, 64);
+    let mut by_sac = sac(loose);
+    train(&mut by_sac, 40, 32);
+    for learner in [by_ppo, by_sac] {
+        let after = success(&learner);
+        assert!(after > 0.8, "{after} after training");
+    }
+    let tight = SpirlConfig { kl_coef: 1e3, target_kl: None, learn_decoder: false };
+    let mut held = ppo(tight);
+    let last = train(&mut held, 20, 64);
+    assert!(
+        success(&held) < 0.4 && number(&last, "spirl/prior_kl") < 0.01,
+        "who may not leave the prior learns nothing"
+    );
+}
+
+#[test]
+fn the_price_is_tuned_for_the_divergence_that_is_wanted() {
+    for target in [0.1, 0.5] {
+        let config = SpirlConfig { target_kl: Some(target), ..SpirlConfig::default() };
+        let last = train(&mut ppo(config.clone()), 60, 64);
+        let kl = number(&last, "spirl/prior_kl");
+        assert!((0.4 * target..2.5 * target).contains(&kl), "{kl} nats by PPO, {target} wanted");
+        let kl = number(&train(&mut sac(config), 60, 32), "spirl/prior_kl");
+        assert!((0.4 * target..2.5 * target).contains(&kl), "{kl} nats by SAC, {target} wanted");
+    }
+}
+
+#[test]
+fn the_decoder_learns_only_if_it_shall() {
+    let obs = [0.1, 0.2, 0.3, 0.4];
+    let head = |learner: &SpirlLearner| learner.policy().forward(&[0.5, -0.5], &obs, 1).expect("finite").head;
+    for learn_decoder in [false, true] {
+        let mut learner = ppo(SpirlConfig { learn_decoder, ..SpirlConfig::default() });
+        let before = head(&learner);
+        let last = train(&mut learner, 2, 64);
+        assert_eq!(head(&learner) != before, learn_decoder);
+        assert_eq!(last.iter().any(|(tag, _)| *tag == "losses/policy_loss"), learn_decoder, "{last:?}");
+    }
+}
+
+#[test]
+fn a_restart_goes_on_to_the_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    for learn_decoder in [false, true] {
+        let config = SpirlConfig { learn_decoder, ..SpirlConfig::default() };
+        for mut learner in [ppo(config.clone()), sac(config.clone())] {
+            train(&mut learner, 3, 32);
+            learner.save(&path).expect("written");
+            let mut loaded = SpirlLearner::load(&path, DeviceKind::Flex).expect("read");
+            assert_eq!((loaded.updates(), loaded.config()), (3, &config));
+            assert_eq!(train(&mut learner, 2, 32), train(&mut loaded, 2, 32));
+            let bytes = |learner: &SpirlLearner| {
+                learner.save(&path).expect("written");
+                std::fs::read(&path).expect("readable")
+            };
+            assert_eq!(bytes(&learner), bytes(&loaded));
+        }
+    }
+}
+
+#[test]
+fn what_cannot_work_is_refused() {
+    let refused = |score: ScoreConfig, ppo: PpoConfig| {
+        let learner = SpirlLearner::ppo(SpirlConfig::default(), ppo, &score, &MODEL, 1, DeviceKind::Flex);
+        learner.expect_err("cannot work").to_string()
+    };
+    assert!(refused(ScoreConfig { skill_draw: SkillDraw::Mean, ..score() }, ppo_config()).contains("skill_draw"));
+    assert!(refused(ScoreConfig { prior: PriorKind::StandardNormal, ..score() }, ppo_config()).contains("prior"));
+    let legacy = PpoConfig { time_limit: TimeLimit::Legacy, ..ppo_config() };
+    assert!(refused(score(), legacy).contains("time_limit"));
+
+    let mut learner = ppo(SpirlConfig::default());
+    let short: Rollout = Walkers::new(2, HORIZON, 1).rollout(&learner, HORIZON - 1);
+    let error = learner.learn(&short).expect_err("no whole skill");
+    assert!(matches!(&error, LearnError::Config(text) if text.contains("twice as long")), "{error}");
+}
