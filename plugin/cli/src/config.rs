@@ -45,9 +45,10 @@ enum Verb {
 /// Checks what an experiment says of its game. Recordings may still be made.
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     experiment.check_levels(open::game(games, from, experiment)?)?;
-    let demos = experiment.demos.as_deref().filter(|_| experiment.algorithm.needs_skills());
+    let algorithm = experiment.algorithm;
+    let demos = experiment.demos.as_deref().filter(|_| algorithm.needs_skills() || algorithm.trains_on_demos());
     if let Some(path) = demos.filter(|path| !from.find_recordings(path, games).exists()) {
-        tell!("warning: there are no recordings at {}, from which skills are learned (`demos`)", path.display());
+        tell!("warning: there are no recordings at {}, from which {algorithm} learns (`demos`)", path.display());
     }
     Ok(())
 }

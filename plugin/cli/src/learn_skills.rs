@@ -6,11 +6,7 @@ use std::{
 };
 
 use playbot_lab::games::Games;
-use playbot_lab::{
-    demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
-    game::Game,
-    train::Experiment,
-};
+use playbot_lab::train::Experiment;
 use playbot_learner::{Dataset, DeviceKind, FileError, SkillMetrics, SkillModel, SkillTrainer};
 use serde_json::json;
 
@@ -19,11 +15,12 @@ use super::{
     differences::{Options, in_words},
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option, quoted},
-    interrupt, missing_demos,
+    interrupt,
     number::counted,
     open,
     output::{beside, prepare},
     program, progress,
+    read_demos::read_demos,
 };
 
 /// Learn the skill model (encoder, decoder, prior) from recordings.
@@ -173,39 +170,8 @@ pub struct SkillCheckpoint<'a> {
 fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
     json!({
         "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl, "accuracy": metrics.accuracy,
+        "held_out_nll": metrics.held_out_nll(), "held_out_kl": metrics.held_out.map(|held_out| held_out.kl),
     })
-}
-
-/// Reads recordings, replaying them through the sensor where they keep no observations. Says first how much memory
-/// pictures will take.
-///
-/// # Errors
-///
-/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a
-/// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
-pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
-    experiment.check_actions(game.actions())?;
-    let demos = Demonstrations::of(game, experiment, path)
-        .map_err(|error| missing_demos::explain(error, game, experiment, path))?;
-    let observation_config = experiment.observation_config();
-    let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
-    begin_to_tell!(
-        "{} in {} from {}",
-        counted(steps, "step"),
-        counted(demos.episodes() as u64, "episode"),
-        path.display()
-    );
-    if experiment.demo_steps.is_some_and(|wanted| wanted < steps) {
-        begin_to_tell!(" (more than was asked for: episodes are kept whole)");
-    }
-    match demos.picture_bytes() {
-        0 => tell!(),
-        bytes => tell!(": {observation_config} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
-    }
-    let bar = progress::bar("replay recordings", steps, "steps");
-    let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
-    bar.finish_and_clear();
-    Ok(dataset?)
 }
 
 /// Learns the model, with a progress bar and, where there is room for one, a checkpoint after each epoch, from which a
@@ -226,7 +192,7 @@ pub fn learn(
     let per_epoch = trainer.batches_per_epoch() as u64;
     let bar = progress::bar("learn skills", epochs * per_epoch, "batches");
     bar.set_position(trainer.epochs_done() * per_epoch + trainer.batches_done() as u64);
-    while trainer.epochs_done() < epochs {
+    while trainer.epochs_done() < epochs && !trainer.is_over() {
         let metrics = trainer.train_epoch(&mut |_| {
             bar.inc(1);
             if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -240,11 +206,21 @@ pub fn learn(
             bar.finish_and_clear();
             return Ok(None);
         };
-        bar.set_message(format!("NLL {:.3} KL {:.2}", metrics.nll, metrics.kl));
+        let apart = metrics.held_out_nll().map_or(String::new(), |nll| format!(", held-out NLL {nll:.3}"));
+        bar.set_message(format!("NLL {:.3} KL {:.2}{apart}", metrics.nll, metrics.kl));
         after_epoch(trainer.epochs_done(), &metrics)?;
     }
     bar.finish_and_clear();
+    tell_best(&trainer);
     Ok(Some(trainer.into_model().with_picture(experiment.observation_config().card())))
+}
+
+/// Says which epoch's model is kept, where that need not be the last one's.
+fn tell_best(trainer: &SkillTrainer) {
+    if let Some(best) = trainer.best_epoch() {
+        let done = counted(trainer.epochs_done(), "epoch");
+        tell!("of {done} number {best} was best on the episodes kept apart, so its model is kept");
+    }
 }
 
 /// A trainer at its start, or where the checkpoint left it.

@@ -43,6 +43,7 @@ mod policy;
 mod program;
 mod progress;
 mod quickstart;
+mod read_demos;
 mod record;
 mod recording;
 mod replay;

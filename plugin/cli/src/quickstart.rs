@@ -30,6 +30,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
     interrupt, learn_skills, methods, open, program,
+    read_demos::read_demos,
     train::{create_run, drive, tell_length},
 };
 
@@ -108,7 +109,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     check_folder(&args.run)?;
     // Not later: where there is nothing to learn from, no folder is made.
     let demos = args.from.recordings(&experiment, games)?;
-    let dataset = learn_skills::read_demos(game, &experiment, &demos, args.threads.threads)?;
+    let dataset = read_demos(game, &experiment, &demos, args.threads.threads)?;
     let _lock = take_folder(&args.run)?;
     tell_length(&trained);
     let Some(skills) = skills(&experiment, dataset, &args)? else {

@@ -6,7 +6,7 @@ use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{game::Game, games::Games, split::LevelSplit, train::Experiment};
 use playbot_learner::Dataset;
 
-use super::{error::CliError, experiment::ExperimentArgs, learn_skills::read_demos};
+use super::{error::CliError, experiment::ExperimentArgs, read_demos::read_demos};
 
 /// Reads recordings, and keeps the last ones for the runs that share them.
 pub struct StudyDemos<'a> {

@@ -32,6 +32,7 @@ use super::{
     experiment::ExperimentArgs,
     learn_skills::{self, SkillCheckpoint},
     methods,
+    read_demos::read_rollouts,
     study_demos::StudyDemos,
     train::{drive, run_info},
 };
@@ -222,7 +223,7 @@ impl<'a> Runner<'a> {
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
         } else {
-            Trainer::new(game, experiment, skills.as_ref(), self.device, self.threads)?
+            self.trainer(game, experiment, skills.as_ref())?
         };
         if !drive(&dir, &mut trainer, title, |report| on_step(report.step))? {
             return Ok(None);
@@ -231,6 +232,21 @@ impl<'a> Runner<'a> {
         let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
         let curve = success_curve(dir.path())?;
         Ok(Some(TrainedRun { dir, player, training, curve }))
+    }
+
+    /// A trainer at its first step.
+    fn trainer(
+        &self,
+        game: &dyn Game,
+        experiment: &Experiment,
+        skills: Option<&SkillModel>,
+    ) -> Result<Trainer, CliError> {
+        if !experiment.algorithm.trains_on_demos() {
+            return Ok(Trainer::new(game, experiment, skills, self.device, self.threads)?);
+        }
+        let path = self.from.recordings(experiment, self.games)?;
+        let demos = read_rollouts(game, experiment, &path, self.threads)?;
+        Ok(Trainer::with_demos(game, experiment, &demos, self.device, self.threads)?)
     }
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.

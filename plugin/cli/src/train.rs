@@ -23,6 +23,7 @@ use super::{
     error::{CliError, Outcome},
     experiment::{ExperimentArgs, sets_key},
     interrupt, open, program, progress,
+    read_demos::read_rollouts,
 };
 use bevy_playbot::unknown_name::UnknownName;
 use repeated::resumed;
@@ -40,10 +41,10 @@ pub use length::rounded;
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
-    /// score-ppo, ppo, score-sac or sac, instead of the experiment's.
+    /// score-ppo, ppo, score-sac, sac, spirl-ppo, spirl-sac or rlpd, instead of the experiment's.
     #[arg(long, value_parser = trained)]
     algorithm: Option<Algorithm>,
-    /// Skill model, as written by `playbot learn-skills --out FILE`; needed by score-ppo and score-sac.
+    /// Skill model, as written by `playbot learn-skills --out FILE`; needed by score-ppo, score-sac, spirl-ppo and spirl-sac.
     #[arg(long, value_name = "FILE")]
     skills: Option<PathBuf>,
     /// Folder of the run.
@@ -127,8 +128,15 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         Some(path) => Some(open::skills(path, args.compute.device(), &args.from)?),
         None => None,
     };
-    let trainer = Trainer::new(game, &experiment, skills.as_ref(), args.compute.device(), args.compute.threads())
-        .map_err(|error| explain(error, args, &experiment))?;
+    let (device, threads) = (args.compute.device(), args.compute.threads());
+    let trainer = if experiment.algorithm.trains_on_demos() {
+        experiment.check()?;
+        let demos = read_rollouts(game, &experiment, &args.from.recordings(&experiment, games)?, threads)?;
+        Trainer::with_demos(game, &experiment, &demos, device, threads)
+    } else {
+        Trainer::new(game, &experiment, skills.as_ref(), device, threads)
+    };
+    let trainer = trainer.map_err(|error| explain(error, args, &experiment))?;
     let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.compute.device(), args.force)?;
     if args.from.experiment.is_none() {
         let Experiment { train, test, .. } = &experiment;

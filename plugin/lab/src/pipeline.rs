@@ -115,7 +115,7 @@ pub fn learn_skills(
     experiment.check_actions(game.actions())?;
     let dataset = Demonstrations::of(game, experiment, experiment.recordings()?)?.dataset(game, threads, |_| {})?;
     let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?;
-    while trainer.epochs_done() < experiment.skills.epochs as u64 {
+    while trainer.epochs_done() < experiment.skills.epochs as u64 && !trainer.is_over() {
         trainer.train_epoch(&mut |_| ControlFlow::Continue(()))?;
     }
     Ok(trainer.into_model().with_picture(experiment.observation_config().card()))
@@ -135,7 +135,12 @@ pub fn train(
     threads: usize,
     mut after_update: impl FnMut(&UpdateReport),
 ) -> Result<Trainer, PipelineError> {
-    let mut trainer = Trainer::new(game, experiment, skills, device, threads)?;
+    let mut trainer = if experiment.algorithm.trains_on_demos() {
+        let demos = Demonstrations::of(game, experiment, experiment.recordings()?)?.rollouts(game, threads, |_| {})?;
+        Trainer::with_demos(game, experiment, &demos, device, threads)?
+    } else {
+        Trainer::new(game, experiment, skills, device, threads)?
+    };
     while !trainer.is_done() {
         after_update(&trainer.update()?);
     }

@@ -18,16 +18,32 @@ pub enum Algorithm {
     ScoreSac,
     /// SAC without skills.
     Sac,
+    /// A policy over skills by PPO (SPiRL): which skill the decoder plays is learned.
+    SpirlPpo,
+    /// A policy over skills by SAC.
+    SpirlSac,
+    /// SAC with recordings in each batch (RLPD).
+    Rlpd,
     /// Behaviour cloning: the skill model's decoder under its prior, as learned from demonstrations.
     BehaviourCloning,
 }
 
 impl Algorithm {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac, Self::BehaviourCloning];
+    pub const ALL: [Self; 8] = [
+        Self::ScorePpo,
+        Self::Ppo,
+        Self::ScoreSac,
+        Self::Sac,
+        Self::SpirlPpo,
+        Self::SpirlSac,
+        Self::Rlpd,
+        Self::BehaviourCloning,
+    ];
 
     /// Those that learn from play, see [`is_trained`](Self::is_trained).
-    pub const TRAINED: [Self; 4] = [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac];
+    pub const TRAINED: [Self; 7] =
+        [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac, Self::SpirlPpo, Self::SpirlSac, Self::Rlpd];
 
     /// Name on the command line, in files and in results.
     pub fn name(self) -> &'static str {
@@ -36,20 +52,36 @@ impl Algorithm {
             Self::Ppo => "ppo",
             Self::ScoreSac => "score-sac",
             Self::Sac => "sac",
+            Self::SpirlPpo => "spirl-ppo",
+            Self::SpirlSac => "spirl-sac",
+            Self::Rlpd => "rlpd",
             Self::BehaviourCloning => "bc",
         }
     }
 
     /// Whether a skill model is needed.
     pub fn needs_skills(self) -> bool {
-        matches!(self, Self::ScorePpo | Self::ScoreSac | Self::BehaviourCloning)
+        match self {
+            Self::ScorePpo | Self::ScoreSac | Self::SpirlPpo | Self::SpirlSac | Self::BehaviourCloning => true,
+            Self::Ppo | Self::Sac | Self::Rlpd => false,
+        }
+    }
+
+    /// Whether it learns which skill to play, instead of drawing it from the prior.
+    pub fn learns_prior(self) -> bool {
+        matches!(self, Self::SpirlPpo | Self::SpirlSac)
+    }
+
+    /// Whether recordings are part of what it is trained on; skills are learned from them beforehand.
+    pub fn trains_on_demos(self) -> bool {
+        self == Self::Rlpd
     }
 
     /// The learner whose settings count. Behaviour cloning trains none; where settings are asked for, it has those of PPO.
     pub fn learner(self) -> LearnerKind {
         match self {
-            Self::ScorePpo | Self::Ppo | Self::BehaviourCloning => LearnerKind::Ppo,
-            Self::ScoreSac | Self::Sac => LearnerKind::Sac,
+            Self::ScorePpo | Self::Ppo | Self::SpirlPpo | Self::BehaviourCloning => LearnerKind::Ppo,
+            Self::ScoreSac | Self::Sac | Self::SpirlSac | Self::Rlpd => LearnerKind::Sac,
         }
     }
 

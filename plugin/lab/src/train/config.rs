@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use playbot_learner::{PpoConfig, SacConfig, ScoreConfig, SkillConfig};
+use playbot_learner::{PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig};
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::checkpoint::CheckpointConfig;
@@ -38,10 +38,10 @@ pub struct Experiment {
     pub train: LevelSplit,
     /// Held-out levels to evaluate on; never trained on.
     pub test: LevelSplit,
-    /// File or folder of demonstrations; `None` for algorithms that learn no skills.
+    /// File or folder of demonstrations; `None` for algorithms that learn nothing from any.
     #[serde(default, serialize_with = "plain")]
     pub demos: Option<PathBuf>,
-    /// Learn skills from at most so many recorded steps: whole episodes, drawn evenly over the recordings. From all of
+    /// Learn from at most so many recorded steps: whole episodes, drawn evenly over the recordings. From all of
     /// them if none is named.
     #[serde(default)]
     pub demo_steps: Option<u64>,
@@ -63,15 +63,21 @@ pub struct Experiment {
     /// The skill model.
     #[serde(default)]
     pub skills: SkillConfig,
-    /// The learner of score-ppo and ppo.
+    /// The learner of score-ppo, ppo and spirl-ppo.
     #[serde(default)]
     pub ppo: PpoConfig,
-    /// The learner of score-sac and sac.
+    /// The learner of score-sac, sac, spirl-sac and rlpd.
     #[serde(default)]
     pub sac: SacConfig,
     /// The three steps of SCORE.
     #[serde(default)]
     pub score: ScoreConfig,
+    /// What spirl-ppo and spirl-sac add to that.
+    #[serde(default)]
+    pub spirl: SpirlConfig,
+    /// What rlpd adds to `sac`.
+    #[serde(default)]
+    pub rlpd: RlpdConfig,
     /// Evaluation.
     #[serde(default)]
     pub eval: EvalConfig,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use playbot_learner::ActionSpace;
+use playbot_learner::{ActionSpace, PriorKind, SkillDraw, TimeLimit};
 
 use super::{
     config::{Experiment, LearnerKind},
@@ -49,10 +49,13 @@ impl Experiment {
         self.score.validate().map_err(settings)?;
         self.sac.validate().map_err(settings)?;
         self.ppo_config().validate().map_err(settings)?;
-        if self.algorithm.needs_skills() {
+        self.spirl.validate().map_err(settings)?;
+        self.rlpd.validate().map_err(settings)?;
+        if self.algorithm.needs_skills() || self.algorithm.trains_on_demos() {
             self.recordings()?;
         }
         self.check_normalisers()?;
+        self.check_skill_draws()?;
         self.check_batches()
     }
 
@@ -105,7 +108,7 @@ impl Experiment {
         self.score.check_space(space).map_err(settings)?;
         let squashed = match self.algorithm.learner() {
             LearnerKind::Ppo => false,
-            LearnerKind::Sac => matches!(space, ActionSpace::Continuous(_)),
+            LearnerKind::Sac => matches!(space, ActionSpace::Continuous(_)) && !self.algorithm.learns_prior(),
         };
         if squashed && self.score.init_from_decoder {
             let why = "SAC squashes continuous actions, so its policy cannot start as a copy of the decoder; set it to \
@@ -143,10 +146,36 @@ impl Experiment {
                 "with `skills.norm_obs` the policy sees through the frozen normaliser of its skills",
             );
         }
-        if self.score.init_from_decoder {
-            let why = "a policy that starts as a copy of the decoder must see what the decoder saw; set \
+        if self.score.init_from_decoder || self.algorithm.learns_prior() {
+            let why = "a policy that starts as a copy of decoder or prior must see what they saw; set \
                        `skills.norm_obs` instead, which normalises for both";
             return refuse(key, true, why);
+        }
+        Ok(())
+    }
+
+    /// A policy over skills learns from whole skills that were drawn.
+    fn check_skill_draws(&self) -> Result<(), ExperimentError> {
+        if !self.algorithm.learns_prior() {
+            return Ok(());
+        }
+        if self.score.prior != PriorKind::Learned {
+            return refuse("score.prior", "StandardNormal", "a policy over skills starts as the learned prior");
+        }
+        if self.score.skill_draw != SkillDraw::Sample {
+            return refuse("score.skill_draw", "Mean", "a policy over skills learns from skills that are drawn");
+        }
+        let (key, steps, limit_key, limit) = match self.algorithm.learner() {
+            LearnerKind::Ppo => ("ppo.num_steps", self.ppo.num_steps, "ppo.time_limit", self.ppo.time_limit),
+            LearnerKind::Sac => ("sac.num_steps", self.sac.num_steps, "sac.time_limit", self.sac.time_limit),
+        };
+        if limit != TimeLimit::Bootstrap {
+            return refuse(limit_key, "Legacy", "a policy over skills needs Bootstrap: its rollouts are cut anyway");
+        }
+        let least = self.score.horizon.saturating_mul(2);
+        if steps < least {
+            let why = format!("a policy over skills learns from whole ones, so it takes 2 × `score.horizon` = {least}");
+            return refuse(key, steps, why);
         }
         Ok(())
     }
@@ -210,7 +239,7 @@ mod tests {
         for algorithm in Algorithm::ALL {
             let without = check(&format!(r#"algorithm: "{algorithm}""#));
             assert_eq!(without, check(&format!(r#"algorithm: "{algorithm}", demos: None"#)));
-            match algorithm.needs_skills() {
+            match algorithm.needs_skills() || algorithm.trains_on_demos() {
                 true => {
                     assert!(without.expect_err("nothing to learn from").contains("`demos` is missing"), "{algorithm}")
                 }

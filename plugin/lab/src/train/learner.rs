@@ -6,7 +6,9 @@ use std::{
 };
 
 pub use playbot_learner::LearnerMetrics;
-use playbot_learner::{DeviceKind, FileError, Learner, PolicySpec, PpoLearner, SacLearner, SkillModel};
+use playbot_learner::{
+    DeviceKind, FileError, Learner, PolicySpec, PpoLearner, Rollout, SacLearner, SkillModel, SpirlLearner,
+};
 
 use super::{
     algorithm::{Algorithm, LearnerKind},
@@ -36,7 +38,8 @@ impl DerefMut for TrainedLearner {
 }
 
 impl TrainedLearner {
-    /// A learner with fresh weights, tied to `skills` if the experiment's algorithm needs them.
+    /// A learner with fresh weights, tied to `skills` if the experiment's algorithm needs them. `demos` are what it trains on
+    /// beside its own play, if it does.
     ///
     /// # Errors
     ///
@@ -45,6 +48,7 @@ impl TrainedLearner {
         game: &dyn Game,
         experiment: &Experiment,
         skills: Option<&SkillModel>,
+        demos: &[Rollout],
         device: DeviceKind,
     ) -> Result<Self, TrainError> {
         let algorithm = experiment.algorithm;
@@ -60,6 +64,19 @@ impl TrainedLearner {
         match learner {
             LearnerKind::Ppo => {}
             LearnerKind::Sac => warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent)),
+        }
+        if let Some(model) = skills.filter(|_| algorithm.learns_prior()) {
+            let spirl = experiment.spirl.clone();
+            return Ok(Self::of(match learner {
+                LearnerKind::Ppo => SpirlLearner::ppo(spirl, ppo, &score, model, seed, device)?,
+                LearnerKind::Sac => SpirlLearner::sac(spirl, sac, &ppo, &score, model, seed, device)?,
+            }));
+        }
+        if algorithm.trains_on_demos() {
+            if demos.is_empty() {
+                return Err(TrainError::NoDemos(algorithm));
+            }
+            return Ok(Self::of(SacLearner::with_demos(sac, &experiment.rlpd, demos, spec, seed, device)?));
         }
         Ok(match (learner, skills) {
             (LearnerKind::Ppo, None) => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
@@ -84,6 +101,9 @@ impl TrainedLearner {
     ///
     /// [`FileError`] says what is wrong with the file.
     pub fn load(algorithm: Algorithm, path: &Path, device: DeviceKind) -> Result<Self, FileError> {
+        if algorithm.learns_prior() {
+            return Ok(Self::of(SpirlLearner::load(path, device)?));
+        }
         Ok(match algorithm.learner() {
             LearnerKind::Ppo => Self::of(PpoLearner::load(path, device)?),
             LearnerKind::Sac => Self::of(SacLearner::load(path, device)?),

@@ -27,6 +27,9 @@ pub enum TrainError {
          `--skills skills.safetensors`"
     )]
     NoSkills(Algorithm),
+    /// The algorithm trains on recordings too.
+    #[error("{0} trains on recordings with rewards, and there are none: name them in `demos`")]
+    NoDemos(Algorithm),
     /// The algorithm does not learn from play.
     #[error("{0} is not trained: measure its skill model with `playbot eval --skills FILE`")]
     NotTrained(Algorithm),

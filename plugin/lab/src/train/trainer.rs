@@ -51,7 +51,25 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
-        let learner = TrainedLearner::new(game, experiment, skills, device)?;
+        let learner = TrainedLearner::new(game, experiment, skills, &[], device)?;
+        Self::with_learner(game, experiment, learner, threads)
+    }
+
+    /// A trainer at its first step for an algorithm that trains on recordings too:
+    /// [`rollouts`](crate::demo::dataset::Demonstrations::rollouts) gives them.
+    ///
+    /// # Errors
+    ///
+    /// As for [`new`](Self::new); and if nothing in the recordings was ever rewarded.
+    pub fn with_demos(
+        game: &dyn Game,
+        experiment: &Experiment,
+        demos: &[Rollout],
+        device: DeviceKind,
+        threads: usize,
+    ) -> Result<Self, TrainError> {
+        check(game, experiment)?;
+        let learner = TrainedLearner::new(game, experiment, None, demos, device)?;
         Self::with_learner(game, experiment, learner, threads)
     }
 
@@ -84,6 +102,7 @@ impl Trainer {
     pub fn update(&mut self) -> Result<UpdateReport, TrainError> {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
+        self.renew_skills();
         let steps = self.experiment.rollout_steps();
         let (rollout, finished) = self.collect(&policy, latent, steps)?;
         let collect_s = start.elapsed().as_secs_f64();
@@ -98,6 +117,14 @@ impl Trainer {
         report.clipped_share =
             report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
         Ok(report)
+    }
+
+    /// Draws skills from what was learned of them, where that goes on.
+    fn renew_skills(&mut self) {
+        let prior = self.skill_prior().filter(|_| self.experiment.algorithm.learns_prior());
+        for (collector, prior) in self.collectors.iter_mut().zip(std::iter::repeat(prior).flatten()) {
+            collector.world_mut().insert_resource(prior);
+        }
     }
 
     /// Plays `steps` ticks in all Worlds at once. Their observations share one piece of memory, which is kept.
@@ -128,9 +155,10 @@ impl Trainer {
         Ok((Rollout::join_around(obs, rollouts)?, finished))
     }
 
-    /// Before the first update of SCORE, the policy must be the decoder, to the bit.
+    /// Before the first update of SCORE, the policy must be the decoder, to the bit; likewise a policy over skills the prior.
     fn initial_kl(&self, rollout: &Rollout) -> Result<Option<f32>, LearnError> {
-        let copied = self.experiment.algorithm.needs_skills() && self.experiment.score.init_from_decoder;
+        let Experiment { algorithm, score, .. } = &self.experiment;
+        let copied = algorithm.learns_prior() || (algorithm.needs_skills() && score.init_from_decoder);
         if self.progress.updates > 0 || !copied {
             return Ok(None);
         }

@@ -1,5 +1,6 @@
 //! A trainer's complete state in one file.
 
+use super::held_out::Best;
 use super::{Dataset, SkillDescription, SkillNets, SkillTrainer};
 use crate::file::{FileKind, TensorFile};
 use crate::norm::{put_obs_stats, take_obs_stats};
@@ -27,6 +28,9 @@ struct Header {
     /// A hash of the demonstrations; the first checkpoints had none.
     #[serde(default)]
     demo_hash: Option<u64>,
+    /// The epoch that was best on demonstrations kept apart, and the loss there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    best: Option<(u64, f32)>,
 }
 
 impl SkillTrainer {
@@ -43,15 +47,19 @@ impl SkillTrainer {
             windows_done: self.next,
             adam_steps: self.adam.steps,
             batches: self.sums.count,
-            demo_episodes: self.dataset.episodes(),
-            demo_steps: self.dataset.steps(),
+            demo_episodes: self.extent.0,
+            demo_steps: self.extent.1,
             demo_hash: Some(self.fingerprint),
+            best: self.best.as_ref().map(|best| (best.epoch, best.loss)),
         };
         let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("", &self.nets)?;
         file.put_adam(&self.adam)?;
         if let Some(stats) = &self.stats {
             put_obs_stats(&mut file, "obs_norm", stats);
+        }
+        if let Some(best) = &self.best {
+            file.put_network("best", &best.nets)?;
         }
         file.put_f64("epoch_sums", &self.sums.total);
         file.write()
@@ -83,7 +91,14 @@ impl SkillTrainer {
                 dataset.action_space()
             )));
         }
-        let nets = SkillNets::stored(&skill, &mut file, &device.plain())?;
+        let nets = SkillNets::stored(&skill, &mut file, "", &device.plain())?;
+        let best = match header.best {
+            None => None,
+            Some((epoch, loss)) => {
+                let nets = SkillNets::stored(&skill, &mut file, "best", &device.plain())?;
+                Some(Best { epoch, loss, nets })
+            }
+        };
         let trainer = Self::with_nets(skill.config, dataset, &nets, header.seed, device);
         let mut trainer = trainer.map_err(|e| file.learner(e))?;
         if header.demo_hash.is_some_and(|hash| hash != trainer.fingerprint) {
@@ -97,6 +112,7 @@ impl SkillTrainer {
         trainer.sums.count = header.batches;
         let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
         trainer.sums.total.copy_from_slice(&sums);
+        trainer.best = best;
         trainer.epoch = header.epoch;
         let windows = trainer.cut_windows(header.epoch);
         trainer.windows = windows.map_err(|e| file.learner(e))?;

@@ -85,6 +85,13 @@ pub struct SkillConfig {
     /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
     #[serde(skip_serializing_if = "is_zero")]
     pub weight_decay: f64,
+    /// Share of the episodes that is not learned from, but measured after each epoch.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub held_out: f64,
+    /// Epochs without progress on those after which learning stops; the model is then that of the best epoch. `None` learns
+    /// for all epochs, and the model is that of the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patience: Option<usize>,
 }
 
 /// Settings that do nothing are not written: files and studies find what was learned before there were any.
@@ -119,6 +126,8 @@ impl Default for SkillConfig {
             norm_obs: false,
             augment: Vec::new(),
             weight_decay: 0.0,
+            held_out: 0.0,
+            patience: None,
         }
     }
 }
@@ -150,6 +159,18 @@ impl SkillConfig {
         if !(0.0..1.0).contains(&self.action_noise) {
             let found = self.action_noise;
             return Err(LearnError::Config(format!("skill action_noise must be at least 0 and below 1, not {found}")));
+        }
+        if !(0.0..=0.9).contains(&self.held_out) {
+            return Err(LearnError::Config(format!("skill held_out must lie in 0..0.9, not {}", self.held_out)));
+        }
+        match self.patience {
+            Some(0) => return Err(LearnError::Config("skill patience must be at least 1".to_owned())),
+            Some(_) if self.held_out == 0.0 => {
+                let text =
+                    "skill patience needs demonstrations that are kept apart: set skill held_out, such as to 0.05";
+                return Err(LearnError::Config(text.to_owned()));
+            }
+            _ => {}
         }
         let weights = [("beta", self.beta), ("latent_reg", self.latent_reg), ("weight_decay", self.weight_decay)];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {

@@ -134,7 +134,7 @@ impl SkillModel {
         let header: Header = file.header(FILE)?;
         device.check().map_err(|e| file.learner(e))?;
         let description = header.skill;
-        let nets = SkillNets::stored(&description, &mut file, &device.plain())?;
+        let nets = SkillNets::stored(&description, &mut file, "", &device.plain())?;
         if let Some(picture) = &header.picture {
             picture.check(description.observation).map_err(|e| file.learner(e))?;
         }

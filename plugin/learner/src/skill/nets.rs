@@ -61,12 +61,14 @@ impl SkillNets {
     pub(crate) fn stored(
         description: &SkillDescription,
         file: &mut TensorFile,
+        prefix: &str,
         device: &Device,
     ) -> Result<Self, FileError> {
-        let Actors { decoder, prior } = Actors::stored(description, file, device)?;
+        let Actors { decoder, prior } = Actors::stored(description, file, prefix, device)?;
         let (config, observation) = (&description.config, description.observation);
         let action_width = config.action_input.width(description.action_space);
-        let encoder = Encoder::build(&mut file.params(device), "encoder", config, observation, action_width)?;
+        let encoder =
+            Encoder::build(&mut file.params(device), &path(prefix, "encoder"), config, observation, action_width)?;
         Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent })
     }
 
@@ -125,6 +127,7 @@ impl Actors {
     pub(crate) fn stored(
         description: &SkillDescription,
         file: &mut TensorFile,
+        prefix: &str,
         device: &Device,
     ) -> Result<Self, FileError> {
         let config = &description.config;
@@ -132,8 +135,8 @@ impl Actors {
         config.check_observation(description.observation).map_err(|e| file.learner(e))?;
         let (decoder, prior) = (description.decoder_spec(), description.prior_spec());
         Ok(Self {
-            decoder: description.decoder_shape().stored(&decoder, file, "decoder", device)?,
-            prior: description.prior_shape().stored(&prior, file, "prior", device)?,
+            decoder: description.decoder_shape().stored(&decoder, file, &path(prefix, "decoder"), device)?,
+            prior: description.prior_shape().stored(&prior, file, &path(prefix, "prior"), device)?,
         })
     }
 }

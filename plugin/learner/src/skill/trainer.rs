@@ -1,34 +1,19 @@
 //! Training of the skill model.
 
-use super::{Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, Window, skill_loss};
-use crate::device::{is_host, update_on};
-use crate::nn::{
-    ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, host, matrix, scalar, tracked,
+use super::held_out::{Best, HeldOut};
+use super::metrics::{MetricSums, accuracy};
+use super::{
+    Dataset, SkillConfig, SkillDescription, SkillForward, SkillMetrics, SkillModel, SkillNets, Window, skill_loss,
 };
+use crate::device::{is_host, update_on};
+use crate::nn::{ActionBatch, Adam, AdamConfig, NamedGrads, ObsBatch, check_loss, host, matrix, scalar, tracked};
 use crate::norm::ObsStats;
 use crate::observation::augmented;
-use crate::rng::{Streams, normal};
+use crate::rng::{ChaCha8Rng, Streams, normal};
 use crate::{Actions, DeviceKind, LearnError, ObsKind, Observations};
 use burn::tensor::Tensor;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-
-/// What one batch, or the mean over an epoch's batches, looked like.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SkillMetrics {
-    /// The whole loss.
-    pub loss: f32,
-    /// Negative log-likelihood of a window's actions, in nats (see [`super::Reduction`]).
-    pub nll: f32,
-    /// KL from the encoder to the prior, in nats.
-    pub kl: f32,
-    /// Mean Euclidean norm of the decoder's latent.
-    pub latent_norm: f32,
-    /// Share of steps whose action is the decoder's most likely one; `None` for continuous actions.
-    pub accuracy: Option<f32>,
-    /// Norm of the gradient before clipping.
-    pub grad_norm: f32,
-}
 
 /// Where training stands, after each batch.
 #[derive(Clone, Copy, Debug)]
@@ -47,9 +32,14 @@ pub struct SkillProgress {
 #[derive(Debug)]
 pub struct SkillTrainer {
     pub(super) config: SkillConfig,
+    /// What is learned from.
     pub(super) dataset: Dataset,
-    /// The hash of `dataset`.
+    pub(super) held_out: Option<HeldOut>,
+    pub(super) best: Option<Best>,
+    /// The hash of all demonstrations.
     pub(super) fingerprint: u64,
+    /// Episodes and steps of all demonstrations.
+    pub(super) extent: (usize, usize),
     /// How the networks see observations, if not raw.
     pub(super) stats: Option<Arc<ObsStats>>,
     pub(super) nets: SkillNets,
@@ -61,13 +51,6 @@ pub struct SkillTrainer {
     pub(super) next: usize,
     pub(super) sums: MetricSums,
     last_epoch: SkillMetrics,
-}
-
-/// What the running epoch's batches add up to.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct MetricSums {
-    pub(super) count: usize,
-    pub(super) total: [f64; 6],
 }
 
 impl SkillTrainer {
@@ -101,6 +84,8 @@ impl SkillTrainer {
     ) -> Result<Self, LearnError> {
         Self::check(&config, &dataset)?;
         let streams = Streams::new(seed);
+        let (fingerprint, extent) = (dataset.fingerprint(), (dataset.episodes(), dataset.steps()));
+        let (dataset, held_out) = dataset.without_held_out(&config, &streams)?;
         let windows = dataset.windows(config.window, config.windows, &streams, 0)?;
         Ok(Self {
             stats: if config.norm_obs { dataset.stats().map(Arc::new) } else { None },
@@ -111,8 +96,11 @@ impl SkillTrainer {
             sums: MetricSums::default(),
             last_epoch: SkillMetrics::default(),
             config,
-            fingerprint: dataset.fingerprint(),
+            fingerprint,
+            extent,
             dataset,
+            held_out,
+            best: None,
             streams,
             device,
             windows,
@@ -157,7 +145,8 @@ impl SkillTrainer {
         if end == self.windows.len() {
             self.epoch += 1;
             self.next = 0;
-            self.last_epoch = std::mem::take(&mut self.sums).mean(metrics.accuracy.is_some());
+            let means = std::mem::take(&mut self.sums).mean(metrics.accuracy.is_some());
+            self.last_epoch = SkillMetrics { held_out: self.measure_held_out()?, ..means };
             self.windows = self.cut_windows(self.epoch)?;
         }
         Ok(metrics)
@@ -187,9 +176,9 @@ impl SkillTrainer {
         }
     }
 
-    /// The model as it is now.
+    /// The model as it is now; with [`SkillConfig::patience`] as it was best.
     pub fn model(&self) -> SkillModel {
-        SkillModel::new(self.description(), &self.nets, self.stats.clone(), self.device)
+        SkillModel::new(self.description(), &self.nets_of_model(), self.stats.clone(), self.device)
     }
 
     pub(super) fn cut_windows(&self, epoch: u64) -> Result<Vec<Window>, LearnError> {
@@ -210,7 +199,9 @@ impl SkillTrainer {
     }
 
     fn step(&mut self, windows: &[Window]) -> Result<SkillMetrics, LearnError> {
-        let (forward, actions) = self.forward(windows)?;
+        let mut noise = self.streams.stream("skill.noise", self.adam.steps());
+        let mut changes = self.streams.stream("skill.augment", self.adam.steps());
+        let (forward, actions) = self.forward_of(&self.dataset, windows, Some(&mut changes), &mut noise)?;
         let loss = skill_loss(&forward, &self.config);
         let accuracy = accuracy(&forward.decoded, &actions)?;
         let parts = [&loss.total, &loss.nll, &loss.kl, &loss.latent_norm];
@@ -224,7 +215,7 @@ impl SkillTrainer {
             check_loss(name, value, steps)?;
         }
         let grad_norm = self.descend(loss.total)?;
-        Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm })
+        Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm, held_out: None })
     }
 
     /// Gradient, clipping, one step of Adam; gives the norm before clipping.
@@ -241,52 +232,34 @@ impl SkillTrainer {
         norm.is_finite().then_some(norm).ok_or_else(lost)
     }
 
-    fn forward(&self, windows: &[Window]) -> Result<(SkillForward, Actions), LearnError> {
+    /// The networks on windows of `dataset`, with draws of skills from `noise`; images are changed if `changes` are given.
+    pub(super) fn forward_of(
+        &self,
+        dataset: &Dataset,
+        windows: &[Window],
+        changes: Option<&mut ChaCha8Rng>,
+        noise: &mut ChaCha8Rng,
+    ) -> Result<(SkillForward, Actions), LearnError> {
         let (batch, steps) = (windows.len(), self.config.window);
-        let (input, space) = (self.config.action_input, self.dataset.space);
+        let (input, space) = (self.config.action_input, dataset.space);
         let device = self.device.plain();
-        let (mut observations, actions) = self.dataset.gather(windows, steps)?;
+        let (mut observations, actions) = dataset.gather(windows, steps)?;
         if let (Some(stats), Observations::Vector(values)) = (&self.stats, &mut observations) {
             *values = stats.normalize(values);
         }
-        if let (Observations::Image(pixels), ObsKind::Image(shape)) = (&mut observations, &self.dataset.observation)
+        if let (Observations::Image(pixels), ObsKind::Image(shape), Some(changes)) =
+            (&mut observations, &dataset.observation, changes)
             && !self.config.augment.is_empty()
         {
-            let mut rng = self.streams.stream("skill.augment", self.adam.steps());
             let all: Vec<usize> = (0..steps * batch).collect();
-            *pixels = augmented(pixels, shape, &all, &self.config.augment, &mut rng);
+            *pixels = augmented(pixels, shape, &all, &self.config.augment, changes);
         }
-        let states = ObsBatch::new(observations, &self.dataset.observation, &device);
+        let states = ObsBatch::new(observations, &dataset.observation, &device);
         let encoded = matrix(input.encode(&actions, space)?, steps * batch, input.width(space), &device);
-        let mut rng = self.streams.stream("skill.noise", self.adam.steps());
-        let noise = (0..batch * self.config.latent).map(|_| normal(&mut rng)).collect();
+        let noise = (0..batch * self.config.latent).map(|_| normal(noise)).collect();
         let noise = matrix(noise, batch, self.config.latent, &device);
         let rows = ActionBatch::new(&actions, &device);
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
-    }
-}
-
-fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError> {
-    let (Dist::Categorical { log_probs }, Actions::Discrete(actions)) = (decoded, actions) else {
-        return Ok(None);
-    };
-    let [rows, dim] = log_probs.dims();
-    let log_probs = host(log_probs.clone().inner())?;
-    let hits = log_probs.chunks_exact(dim).zip(actions).filter(|(row, a)| argmax(row) == **a).count();
-    Ok(Some(hits as f32 / rows as f32))
-}
-
-impl MetricSums {
-    fn add(&mut self, m: &SkillMetrics) {
-        let values = [m.loss, m.nll, m.kl, m.latent_norm, m.accuracy.unwrap_or(0.0), m.grad_norm];
-        self.count += 1;
-        self.total.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(x));
-    }
-
-    fn mean(self, accuracy: bool) -> SkillMetrics {
-        let [loss, nll, kl, latent_norm, hits, grad_norm] =
-            self.total.map(|sum| (sum / self.count.max(1) as f64) as f32);
-        SkillMetrics { loss, nll, kl, latent_norm, accuracy: accuracy.then_some(hits), grad_norm }
     }
 }

@@ -10,6 +10,7 @@ mod errors;
 mod files;
 #[cfg(feature = "wgpu")]
 mod gpu;
+mod held_out;
 mod image_task;
 mod images;
 mod noisy;

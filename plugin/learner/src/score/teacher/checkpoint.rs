@@ -25,7 +25,7 @@ impl Teacher {
         file: &mut TensorFile,
         device: DeviceKind,
     ) -> Result<Self, FileError> {
-        let actors = Actors::stored(&description, file, &device.plain())?;
+        let actors = Actors::stored(&description, file, "", &device.plain())?;
         let mut teacher = Self { config, tied_to, description, actors, stats: None };
         let tied = teacher.policy_spec();
         if tied != spec {

@@ -1,0 +1,65 @@
+//! Reading recordings with a progress bar: what skills are learned from, and what is trained on.
+
+use std::path::Path;
+
+use playbot_lab::{
+    demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
+    game::Game,
+    train::Experiment,
+};
+use playbot_learner::{Dataset, Rollout};
+
+use super::{error::CliError, missing_demos, number::counted, progress};
+
+/// Reads recordings, replaying them through the sensor where they keep no observations. Says first how much memory
+/// pictures will take.
+///
+/// # Errors
+///
+/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a
+/// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
+pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
+    experiment.check_actions(game.actions())?;
+    let demos = demonstrations(game, experiment, path)?;
+    let observation_config = experiment.observation_config();
+    let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
+    match demos.picture_bytes() {
+        0 => tell!(),
+        bytes => tell!(": {observation_config} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+    }
+    let bar = progress::bar("replay recordings", steps, "steps");
+    let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));
+    bar.finish_and_clear();
+    Ok(dataset?)
+}
+
+/// Reads recordings with their rewards, for algorithms that train on them: all of them are replayed.
+///
+/// # Errors
+///
+/// A recording cannot be read, belongs to another game, shows a held-out level or does not replay.
+pub fn read_rollouts(
+    game: &dyn Game,
+    experiment: &Experiment,
+    path: &Path,
+    threads: usize,
+) -> Result<Vec<Rollout>, CliError> {
+    let demos = demonstrations(game, experiment, path)?;
+    tell!();
+    let bar = progress::bar("replay recordings", demos.steps(), "steps");
+    let rollouts = demos.rollouts(game, threads, |steps| bar.inc(steps));
+    bar.finish_and_clear();
+    Ok(rollouts?)
+}
+
+/// Opens recordings and begins to say what there is in them.
+fn demonstrations(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Demonstrations, CliError> {
+    let demos = Demonstrations::of(game, experiment, path)
+        .map_err(|error| missing_demos::explain(error, game, experiment, path))?;
+    let (steps, episodes) = (demos.steps(), demos.episodes() as u64);
+    begin_to_tell!("{} in {} from {}", counted(steps, "step"), counted(episodes, "episode"), path.display());
+    if experiment.demo_steps.is_some_and(|wanted| wanted < steps) {
+        begin_to_tell!(" (more than was asked for: episodes are kept whole)");
+    }
+    Ok(demos)
+}

@@ -1,0 +1,56 @@
+//! What learning a skill model looks like.
+
+use super::HeldOutMetrics;
+use crate::nn::{Dist, argmax, host};
+use crate::{Actions, LearnError};
+
+/// What one batch, or the mean over an epoch's batches, looked like.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SkillMetrics {
+    /// The whole loss.
+    pub loss: f32,
+    /// Negative log-likelihood of a window's actions, in nats (see [`super::Reduction`]).
+    pub nll: f32,
+    /// KL from the encoder to the prior, in nats.
+    pub kl: f32,
+    /// Mean Euclidean norm of the decoder's latent.
+    pub latent_norm: f32,
+    /// Share of steps whose action is the decoder's most likely one; `None` for continuous actions.
+    pub accuracy: Option<f32>,
+    /// Norm of the gradient before clipping.
+    pub grad_norm: f32,
+    /// What an epoch's networks make of demonstrations kept apart; `None` for a single batch, and where there are none.
+    pub held_out: Option<HeldOutMetrics>,
+}
+
+/// What the running epoch's batches add up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct MetricSums {
+    pub(super) count: usize,
+    pub(super) total: [f64; 6],
+}
+
+impl MetricSums {
+    pub(super) fn add(&mut self, m: &SkillMetrics) {
+        let values = [m.loss, m.nll, m.kl, m.latent_norm, m.accuracy.unwrap_or(0.0), m.grad_norm];
+        self.count += 1;
+        self.total.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(x));
+    }
+
+    pub(super) fn mean(self, accuracy: bool) -> SkillMetrics {
+        let [loss, nll, kl, latent_norm, hits, grad_norm] =
+            self.total.map(|sum| (sum / self.count.max(1) as f64) as f32);
+        SkillMetrics { loss, nll, kl, latent_norm, accuracy: accuracy.then_some(hits), grad_norm, held_out: None }
+    }
+}
+
+/// Share of the actions that are the most likely ones; `None` for continuous actions.
+pub(super) fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError> {
+    let (Dist::Categorical { log_probs }, Actions::Discrete(actions)) = (decoded, actions) else {
+        return Ok(None);
+    };
+    let [rows, dim] = log_probs.dims();
+    let log_probs = host(log_probs.clone().inner())?;
+    let hits = log_probs.chunks_exact(dim).zip(actions).filter(|(row, a)| argmax(row) == **a).count();
+    Ok(Some(hits as f32 / rows as f32))
+}

@@ -1,0 +1,101 @@
+//! Demonstrations that are kept apart while a skill model is learned.
+
+use crate::skill::corridor_demos;
+use playbot_learner::rng::{Streams, below, normal};
+use playbot_learner::{
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, SkillConfig, SkillMetrics, SkillTrainer,
+};
+use std::ops::ControlFlow;
+
+fn config() -> SkillConfig {
+    SkillConfig { held_out: 0.2, lr: 1e-2, hidden: vec![64, 64], ..crate::skill::config() }
+}
+
+/// Actions that have nothing to do with what is seen: all that can be learned of them is to know them by heart.
+fn coins() -> Dataset {
+    let mut rng = Streams::new(3).stream("coins", 0);
+    let episode = |_| DemoEpisode {
+        observations: (0..30 * 6).map(|_| normal(&mut rng)).collect::<Vec<f32>>().into(),
+        actions: Actions::Discrete((0..30).map(|_| below(&mut rng, 3) as u32).collect()),
+    };
+    Dataset::new(6, ActionSpace::Discrete(3), (0..20).map(episode).collect()).expect("consistent")
+}
+
+fn epoch(trainer: &mut SkillTrainer) -> SkillMetrics {
+    trainer.train_epoch(&mut |_| ControlFlow::Continue(())).expect("finite").expect("not stopped")
+}
+
+fn trainer(config: SkillConfig, demos: Dataset) -> SkillTrainer {
+    SkillTrainer::new(config, demos, 1, DeviceKind::Flex).expect("windows fit")
+}
+
+#[test]
+fn what_is_kept_apart_tells_learning_from_knowing_by_heart() {
+    let losses = |demos: Dataset, epochs: usize| -> Vec<(f32, f32)> {
+        let mut trainer = trainer(SkillConfig { beta: 1.0, ..config() }, demos);
+        let all = (0..epochs).map(|_| epoch(&mut trainer));
+        all.map(|metrics| (metrics.loss, metrics.held_out.expect("some are kept apart").loss)).collect()
+    };
+    let heart = losses(coins(), 60);
+    let (first, last) = (heart[0], heart[59]);
+    assert!(last.0 < 0.7 * first.0, "it knows them better and better: {first:?} to {last:?}");
+    assert!(last.1 > 1.1 * first.1, "and others worse and worse: {first:?} to {last:?}");
+    let learned = losses(corridor_demos(100), 10);
+    let (first, last) = (learned[0], learned[9]);
+    assert!((last.0 - last.1).abs() < 0.4 && last.1 < 0.7 * first.1, "{first:?} to {last:?}");
+}
+
+#[test]
+fn learning_stops_in_time_and_the_best_model_is_kept() {
+    let patient = SkillConfig { beta: 1.0, patience: Some(4), ..config() };
+    let mut trainer = trainer(patient, coins());
+    let (mut best, mut model) = (f32::INFINITY, None);
+    while !trainer.is_over() {
+        let loss = epoch(&mut trainer).held_out.expect("some are kept apart").loss;
+        if loss < best {
+            (best, model) = (loss, Some(trainer.model()));
+        }
+        assert!(trainer.epochs_done() < 60, "it never stops");
+    }
+    assert_eq!(trainer.best_epoch(), Some(trainer.epochs_done() - 4));
+    let says = |model: &playbot_learner::SkillModel| model.policy().forward(&[0.1; 2], &[0.5; 6], 1).expect("finite");
+    let kept = trainer.model();
+    assert_eq!(says(&kept), says(&model.expect("there was a best one")));
+    epoch(&mut trainer);
+    assert_eq!(says(&trainer.into_model()), says(&kept), "what comes later is not better");
+}
+
+#[test]
+fn a_stopped_training_remembers_the_best_model() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("skills.checkpoint");
+    let mut whole = trainer(SkillConfig { patience: Some(4), beta: 1.0, ..config() }, coins());
+    for _ in 0..8 {
+        epoch(&mut whole);
+    }
+    whole.save(&path).expect("written");
+    let mut loaded = SkillTrainer::load(&path, coins(), DeviceKind::Flex).expect("read");
+    assert_eq!((loaded.best_epoch(), loaded.is_over()), (whole.best_epoch(), whole.is_over()));
+    assert_eq!(epoch(&mut loaded), epoch(&mut whole));
+    let bytes = |trainer: &SkillTrainer| {
+        trainer.save(&path).expect("written");
+        std::fs::read(&path).expect("readable")
+    };
+    assert_eq!(bytes(&loaded), bytes(&whole));
+}
+
+#[test]
+fn what_cannot_be_kept_apart_is_refused() {
+    let error = |config: SkillConfig, demos| {
+        SkillTrainer::new(config, demos, 1, DeviceKind::Flex).expect_err("cannot work").to_string()
+    };
+    assert!(error(config(), corridor_demos(1)).contains("none is left"));
+    assert!(error(SkillConfig { held_out: 1.0, ..config() }, corridor_demos(9)).contains("held_out"));
+    let blind = SkillConfig { held_out: 0.0, patience: Some(3), ..config() };
+    assert!(error(blind, corridor_demos(9)).contains("patience needs"));
+    assert!(matches!(
+        SkillTrainer::new(SkillConfig { patience: Some(0), ..config() }, corridor_demos(9), 1, DeviceKind::Flex),
+        Err(LearnError::Config(text)) if text.contains("at least 1")
+    ));
+    assert_eq!(epoch(&mut trainer(crate::skill::config(), corridor_demos(9))).held_out, None);
+}
