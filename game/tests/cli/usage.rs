@@ -63,7 +63,10 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         ),
         (&["eval", "--bot", "random", "--set", "test=hard"], "mode:first..last"),
         (&["train", "--run", "r", "--algorithm", "bc"], "playbot eval --skills"),
-        (&["train", "--run", "r", "--algorithm", "bc"], "those that are: score-ppo, ppo, score-sac, sac\n"),
+        (
+            &["train", "--run", "r", "--algorithm", "bc"],
+            "those that are: score-ppo, ppo, score-sac, sac, spirl-ppo, spirl-sac, rlpd\n",
+        ),
         (
             &["train", "--run", "r", "--set", "ppo.lr=1"],
             "`playbot learn-skills --set ppo.lr=1 --out skills.safetensors`",

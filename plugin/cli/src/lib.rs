@@ -50,6 +50,7 @@ mod replay;
 mod report;
 mod runs;
 mod study;
+mod study_cost;
 mod study_demos;
 mod study_run;
 mod test;

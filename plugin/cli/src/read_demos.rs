@@ -5,11 +5,12 @@ use std::path::Path;
 use playbot_lab::{
     demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
     game::Game,
+    games::Games,
     train::Experiment,
 };
 use playbot_learner::{Dataset, Rollout};
 
-use super::{error::CliError, missing_demos, number::counted, progress};
+use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::counted, progress};
 
 /// Reads recordings, replaying them through the sensor where they keep no observations. Says first how much memory
 /// pictures will take.
@@ -33,18 +34,24 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
     Ok(dataset?)
 }
 
-/// Reads recordings with their rewards, for algorithms that train on them: all of them are replayed.
+/// The recordings of an experiment with their rewards, if its algorithm trains on them: all of them are replayed.
 ///
 /// # Errors
 ///
-/// A recording cannot be read, belongs to another game, shows a held-out level or does not replay.
+/// The experiment does not go together, or a recording cannot be read, belongs to another game, shows a held-out level or
+/// does not replay.
 pub fn read_rollouts(
     game: &dyn Game,
     experiment: &Experiment,
-    path: &Path,
+    from: &ExperimentArgs,
+    games: &Games,
     threads: usize,
 ) -> Result<Vec<Rollout>, CliError> {
-    let demos = demonstrations(game, experiment, path)?;
+    if !experiment.algorithm.trains_on_demos() {
+        return Ok(Vec::new());
+    }
+    experiment.check()?;
+    let demos = demonstrations(game, experiment, &from.recordings(experiment, games)?)?;
     tell!();
     let bar = progress::bar("replay recordings", demos.steps(), "steps");
     let rollouts = demos.rollouts(game, threads, |steps| bar.inc(steps));

@@ -24,6 +24,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
     interrupt, open, output, program, progress,
+    study_cost::cost_table,
     study_run::Runner,
     train::rounded,
 };
@@ -31,7 +32,7 @@ use super::{
 /// Compare variants of an experiment over several seeds.
 ///
 /// Every variant with every seed learns skills, trains, and is measured on the held-out levels. The tables and the
-/// plot say nothing of the machine: the same study gives the same files.
+/// plot say nothing of the machine: the same study gives the same files. Only cost.md says what it took.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot study --experiment my.ron --out study
@@ -47,7 +48,7 @@ pub struct Args {
     /// Seeds, instead of the experiment's.
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
-    /// Folder for table.md, curves.svg and results.json, which are replaced.
+    /// Folder for table.md, curves.svg, results.json and cost.md, which are replaced.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Folder of the runs; `runs/` and the name of the experiment file if none is named.
@@ -95,12 +96,14 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return Ok(Outcome::Stopped);
     };
     write(&args.out, &report)?;
+    let cost = cost_table(&runs, &folder, &command(&args), args.compute.threads());
+    write_atomically(&args.out.join("cost.md"), cost.as_bytes())?;
     if args.json {
         report.results.iter().try_for_each(|result| print_line(json!(result)))?;
     } else {
         print_line(report.summary().trim_end())?;
     }
-    tell!("written to {}: table.md, curves.svg, results.json", args.out.display());
+    tell!("written to {}: table.md, curves.svg, results.json, cost.md", args.out.display());
     Ok(Outcome::Pass)
 }
 

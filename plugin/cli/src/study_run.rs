@@ -33,6 +33,7 @@ use super::{
     learn_skills::{self, SkillCheckpoint},
     methods,
     read_demos::read_rollouts,
+    study_cost::CostClock,
     study_demos::StudyDemos,
     train::{drive, run_info},
 };
@@ -74,7 +75,7 @@ struct TrainedRun {
     curve: SuccessCurve,
 }
 
-/// What came of a run, or `None` after Ctrl-C.
+/// What came of a run; `None` after Ctrl-C.
 pub type Ended = Option<(StudyResult, SuccessCurve)>;
 
 impl<'a> Runner<'a> {
@@ -105,11 +106,11 @@ impl<'a> Runner<'a> {
         fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
         let lock = RunLock::take(&folder)?;
         let dir = if is_saved { RunFolder::Begun(RunDir::open_with(lock)?.run) } else { RunFolder::New(lock) };
+        let clock = CostClock::start();
         // Nobody else writes there until the result is written.
-        let Some(TrainedRun { dir: _dir, player, training, curve }) = self.player(game, run, dir, title, on_step)?
-        else {
-            return Ok(None);
-        };
+        let trained = self.player(game, run, dir, title, on_step)?;
+        clock.note(&folder)?;
+        let Some(TrainedRun { dir: _dir, player, training, curve }) = trained else { return Ok(None) };
         let experiment = &run.experiment;
         let plan = EvalPlan::of(experiment, &experiment.test, self.threads);
         let measured = methods::measure(game, &run.id(), &player, &plan)?;
@@ -223,7 +224,8 @@ impl<'a> Runner<'a> {
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
         } else {
-            self.trainer(game, experiment, skills.as_ref())?
+            let demos = read_rollouts(game, experiment, self.from, self.games, self.threads)?;
+            Trainer::with_demos(game, experiment, skills.as_ref(), &demos, self.device, self.threads)?
         };
         if !drive(&dir, &mut trainer, title, |report| on_step(report.step))? {
             return Ok(None);
@@ -232,21 +234,6 @@ impl<'a> Runner<'a> {
         let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
         let curve = success_curve(dir.path())?;
         Ok(Some(TrainedRun { dir, player, training, curve }))
-    }
-
-    /// A trainer at its first step.
-    fn trainer(
-        &self,
-        game: &dyn Game,
-        experiment: &Experiment,
-        skills: Option<&SkillModel>,
-    ) -> Result<Trainer, CliError> {
-        if !experiment.algorithm.trains_on_demos() {
-            return Ok(Trainer::new(game, experiment, skills, self.device, self.threads)?);
-        }
-        let path = self.from.recordings(experiment, self.games)?;
-        let demos = read_rollouts(game, experiment, &path, self.threads)?;
-        Ok(Trainer::with_demos(game, experiment, &demos, self.device, self.threads)?)
     }
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.

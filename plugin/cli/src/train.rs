@@ -129,14 +129,9 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         None => None,
     };
     let (device, threads) = (args.compute.device(), args.compute.threads());
-    let trainer = if experiment.algorithm.trains_on_demos() {
-        experiment.check()?;
-        let demos = read_rollouts(game, &experiment, &args.from.recordings(&experiment, games)?, threads)?;
-        Trainer::with_demos(game, &experiment, &demos, device, threads)
-    } else {
-        Trainer::new(game, &experiment, skills.as_ref(), device, threads)
-    };
-    let trainer = trainer.map_err(|error| explain(error, args, &experiment))?;
+    let demos = read_rollouts(game, &experiment, &args.from, games, threads)?;
+    let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &demos, device, threads)
+        .map_err(|error| explain(error, args, &experiment))?;
     let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.compute.device(), args.force)?;
     if args.from.experiment.is_none() {
         let Experiment { train, test, .. } = &experiment;

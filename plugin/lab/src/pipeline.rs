@@ -135,12 +135,11 @@ pub fn train(
     threads: usize,
     mut after_update: impl FnMut(&UpdateReport),
 ) -> Result<Trainer, PipelineError> {
-    let mut trainer = if experiment.algorithm.trains_on_demos() {
-        let demos = Demonstrations::of(game, experiment, experiment.recordings()?)?.rollouts(game, threads, |_| {})?;
-        Trainer::with_demos(game, experiment, &demos, device, threads)?
-    } else {
-        Trainer::new(game, experiment, skills, device, threads)?
+    let demos = match experiment.algorithm.trains_on_demos() {
+        true => Demonstrations::of(game, experiment, experiment.recordings()?)?.rollouts(game, threads, |_| {})?,
+        false => Vec::new(),
     };
+    let mut trainer = Trainer::with_demos(game, experiment, skills, &demos, device, threads)?;
     while !trainer.is_done() {
         after_update(&trainer.update()?);
     }

@@ -21,6 +21,8 @@ const EXPERIMENT: &str = r#"(
     steps: 512, arenas: 4, worlds: 2,
     skills: (window: 2, epochs: 4, batch: 8, hidden: [8, 8], encoder_hidden: 8, gru_hidden: 8, latent: 2, lr: 0.003),
     ppo: (num_steps: 32, minibatches: 2, hidden: [8, 8], lr: 0.003),
+    sac: (num_steps: 8, batch: 16, learning_starts: 64, hidden: [8, 8], updates_per_step: 0.1),
+    rlpd: (critics: 3),
     score: (horizon: 2),
 )"#;
 
@@ -83,6 +85,30 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     assert_eq!((measured.method.as_str(), measured.split.as_str()), ("learned", "plain:8..15"));
     assert_eq!(measured.episodes, 8 * u64::from(experiment.eval.episodes_per_level));
     assert_eq!(measure(&shipped), measured, "what is shipped plays as what was trained");
+}
+
+#[test]
+fn what_chooses_skills_is_shipped_with_what_it_has_learned_of_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let demos = folder.path().join("right.demo");
+    pipeline::record(&Shown, &levels("plain:16..35"), 0.1, &demos).expect("recorded");
+    for algorithm in [Algorithm::SpirlPpo, Algorithm::Rlpd] {
+        let experiment = Experiment { algorithm, ..experiment(&demos) };
+        let skills = algorithm
+            .needs_skills()
+            .then(|| pipeline::learn_skills(&Shown, &experiment, DeviceKind::Flex, 2).expect("learned"));
+        let trainer = pipeline::train(&Shown, &experiment, skills.as_ref(), DeviceKind::Flex, 2, |_| {});
+        let file = pipeline::policy(&Shown, &trainer.expect("trained"));
+        assert_eq!((file.card.algorithm.as_str(), file.skills.is_some()), (algorithm.name(), skills.is_some()));
+        let path = folder.path().join(algorithm.name());
+        playbot_lab::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
+        let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
+        let measure = |file| {
+            let player = Player::of_file(file, ActionDraw::Sample);
+            pipeline::evaluate(&Shown, &experiment, "learned", &player, 2).expect("measured")
+        };
+        assert_eq!(measure(&shipped), measure(&file), "{algorithm}: what is shipped plays as what was trained");
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 use playbot_games::coinrun::CoinRun;
 use playbot_lab::prelude::*;
 use playbot_lab::{
+    demo::dataset::Demonstrations,
     pipeline::learn_skills,
     train::{
         Algorithm, Experiment, TrainError, Trainer,
@@ -13,7 +14,7 @@ use playbot_lab::{
     },
     worlds::build_world,
 };
-use playbot_learner::{DeviceKind, SkillModel};
+use playbot_learner::{DeviceKind, Rollout, SkillModel};
 use playbot_tests::{
     Corridor,
     recording::record_random,
@@ -25,7 +26,7 @@ const EXPERIMENT: &str = r#"(
     steps: 2048, arenas: 8, worlds: 4,
     skills: (window: 3, epochs: 4, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2, lr: 0.003),
     ppo: (num_steps: 32, minibatches: 4, hidden: [16, 16], lr: 0.003),
-    sac: (num_steps: 4, batch: 32, buffer: 512, learning_starts: 200, hidden: [16, 16], updates_per_step: 0.1),
+    sac: (num_steps: 8, batch: 32, buffer: 512, learning_starts: 200, hidden: [16, 16], updates_per_step: 0.1),
     score: (horizon: 3),
 )"#;
 
@@ -33,24 +34,53 @@ fn experiment() -> Experiment {
     parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid")
 }
 
-/// A skill model from a random walker that is worth copying in half of its steps.
-fn skills(folder: &Path) -> SkillModel {
-    let path = folder.join("walk.demo");
-    record_random(&Corridor, "plain", 5, &path, 16..76);
-    let experiment = Experiment { demos: Some(path), ..experiment() };
-    learn_skills(&Corridor, &experiment, DeviceKind::Flex, 2).expect("learns")
+/// Recordings of a random walker, and a skill model from them that is worth copying in half of its steps.
+struct Given {
+    skills: SkillModel,
+    demos: Vec<Rollout>,
 }
 
-fn trainer(algorithm: Algorithm, skills: &SkillModel, threads: usize) -> Trainer {
-    let skills = algorithm.needs_skills().then_some(skills);
-    let experiment = Experiment { algorithm, ..experiment() };
-    Trainer::new(&Corridor, &experiment, skills, DeviceKind::Flex, threads).expect("fits")
+impl Given {
+    fn new(folder: &Path) -> Self {
+        let path = folder.join("walk.demo");
+        record_random(&Corridor, "plain", 5, &path, 16..76);
+        let experiment = Experiment { demos: Some(path.clone()), ..experiment() };
+        let skills = learn_skills(&Corridor, &experiment, DeviceKind::Flex, 2).expect("learns");
+        let demos = Demonstrations::of(&Corridor, &experiment, &path).expect("readable");
+        Self { skills, demos: demos.rollouts(&Corridor, 2, |_| {}).expect("they replay") }
+    }
+
+    fn trainer(&self, algorithm: Algorithm, threads: usize) -> Trainer {
+        let skills = algorithm.needs_skills().then_some(&self.skills);
+        let experiment = Experiment { algorithm, ..experiment() };
+        let trainer = Trainer::with_demos(&Corridor, &experiment, skills, &self.demos, DeviceKind::Flex, threads);
+        trainer.expect("fits")
+    }
+}
+
+#[test]
+fn recordings_are_trained_on_with_the_rewards_that_they_earn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let given = Given::new(folder.path());
+    let ends: Vec<bool> = given.demos.iter().flat_map(|episode| episode.terminated.clone()).collect();
+    let rewards: Vec<f32> = given.demos.iter().flat_map(|episode| episode.rewards.clone()).collect();
+    assert!(ends.iter().any(|&end| end), "somebody got out");
+    for (reward, end) in rewards.into_iter().zip(ends) {
+        assert_eq!(reward > 0.0, end, "only the exit pays");
+    }
+    for episode in &given.demos {
+        episode.check().expect("it fits together");
+        assert!(!episode.truncated.contains(&true), "nobody knows what came after a cut");
+    }
+    let without =
+        Trainer::new(&Corridor, &Experiment { algorithm: Algorithm::Rlpd, ..experiment() }, None, DeviceKind::Flex, 1);
+    assert!(matches!(without.err(), Some(TrainError::NoDemos(Algorithm::Rlpd))));
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("a folder");
-    let skills = skills(folder.path());
+    let given = Given::new(folder.path());
     for algorithm in Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()) {
         // Where there are fewer threads than Worlds, these decide together.
         let results: Vec<_> = [1, 2, 2, 4]
@@ -58,7 +88,7 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
             .enumerate()
             .map(|(index, threads)| {
                 let run = folder.path().join(format!("{algorithm}-{index}"));
-                train(&run, trainer(algorithm, &skills, threads), None);
+                train(&run, given.trainer(algorithm, threads), None);
                 written(&run)
             })
             .collect();
@@ -71,19 +101,22 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
-    let skills = skills(folder.path());
+    let given = Given::new(folder.path());
     for algorithm in Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()) {
-        check_resuming(&Corridor, |threads| trainer(algorithm, &skills, threads), 3);
+        check_resuming(&Corridor, |threads| given.trainer(algorithm, threads), 3);
     }
 }
 
 #[test]
 fn the_first_policy_of_score_is_the_decoder() {
     let folder = tempfile::tempdir().expect("a folder");
-    let skills = skills(folder.path());
-    let mut trainer = trainer(Algorithm::ScorePpo, &skills, 1);
-    assert_eq!(trainer.update().expect("learns").initial_kl, Some(0.0));
-    assert_eq!(trainer.update().expect("learns").initial_kl, None, "it is checked once");
+    let given = Given::new(folder.path());
+    // Of a policy over skills it is the prior.
+    for algorithm in [Algorithm::ScorePpo, Algorithm::SpirlPpo, Algorithm::SpirlSac] {
+        let mut trainer = given.trainer(algorithm, 1);
+        assert_eq!(trainer.update().expect("learns").initial_kl, Some(0.0));
+        assert_eq!(trainer.update().expect("learns").initial_kl, None, "it is checked once");
+    }
 }
 
 #[test]
@@ -111,7 +144,7 @@ fn skills_are_asked_for_and_must_fit() {
 #[test]
 fn skills_and_policies_of_another_game_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let skills = skills(folder.path());
+    let Given { skills, .. } = Given::new(folder.path());
     let coinrun = CoinRun::default();
     let mut foreign = experiment();
     foreign.train = "hard:0..7".parse().expect("a split");

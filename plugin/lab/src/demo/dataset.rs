@@ -2,10 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode as LearnerEpisode, LearnError, ObsKind, Observations, Rollout, Streams,
-    rng::shuffle,
-};
+use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations, Streams, rng::shuffle};
 
 use super::{
     replay_observations::{ObservedEpisode, observe_replays},
@@ -13,7 +10,7 @@ use super::{
 };
 use crate::sensors::GameSensors;
 use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment};
-use bevy_playbot::demo::file::{DemoEnd, DemoEpisode, DemoReader, EpisodeActions, find_demos};
+use bevy_playbot::demo::file::{DemoEpisode, DemoReader, EpisodeActions, find_demos};
 use bevy_playbot::vision::ObservationConfig;
 
 /// Most memory that the pictures of a data set may take.
@@ -25,19 +22,19 @@ pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
 /// sensor. Vectors that a recording keeps are used as they are.
 #[derive(Debug)]
 pub struct Demonstrations {
-    observation_config: ObservationConfig,
-    episodes: Vec<Demonstration>,
+    pub(super) observation_config: ObservationConfig,
+    pub(super) episodes: Vec<Demonstration>,
 }
 
 /// One episode and where it comes from.
 #[derive(Debug)]
-struct Demonstration {
+pub(super) struct Demonstration {
     file: Arc<Path>,
     index: usize,
     mode: Arc<str>,
-    episode: Arc<DemoEpisode>,
+    pub(super) episode: Arc<DemoEpisode>,
     /// Its file keeps the vectors that the game has now.
-    is_seen: bool,
+    pub(super) is_seen: bool,
 }
 
 impl Demonstrations {
@@ -177,34 +174,8 @@ impl Demonstrations {
         Ok(Dataset::new(self.observation_config.obs_kind(game), game.actions(), episodes)?)
     }
 
-    /// What was played, with its rewards, as rollouts of one environment each. Every episode is replayed, so that what it
-    /// earned is what it earns today. The last step of an episode that did not end by the rules is left out: nobody has
-    /// recorded what came after it.
-    ///
-    /// # Errors
-    ///
-    /// [`VerifyError`] if an episode does not replay.
-    pub fn rollouts(
-        mut self,
-        game: &dyn Game,
-        threads: usize,
-        progress: impl Fn(u64) + Sync,
-    ) -> Result<Vec<Rollout>, VerifyError> {
-        self.episodes.iter_mut().for_each(|demo| demo.is_seen = false);
-        let originals = self.originals();
-        let observed = self.observe(game, threads, &originals, &progress)?;
-        let kind = self.observation_config.obs_kind(game);
-        let mut rollouts = Vec::new();
-        for (demo, original) in self.episodes.iter().zip(originals) {
-            if let Some(observations) = observed.get(&original) {
-                rollouts.extend(rollout(&demo.episode, observations, &kind, &game.actions())?);
-            }
-        }
-        Ok(rollouts)
-    }
-
     /// For each episode the index of the first one that is the same game from beginning to end.
-    fn originals(&self) -> Vec<usize> {
+    pub(super) fn originals(&self) -> Vec<usize> {
         let mut first = BTreeMap::new();
         let key = |demo: &Demonstration| (demo.mode.clone(), demo.episode.level_seed, bits(&demo.episode.actions));
         self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(key(demo)).or_insert(i)).collect()
@@ -216,7 +187,7 @@ impl Demonstrations {
     }
 
     /// Replays what no file keeps, mode by mode.
-    fn observe(
+    pub(super) fn observe(
         &self,
         game: &dyn Game,
         threads: usize,
@@ -246,31 +217,6 @@ impl Demonstrations {
     }
 }
 
-/// The steps of an episode whose outcome is known, if there are any.
-fn rollout(
-    episode: &DemoEpisode,
-    observations: &Observations,
-    kind: &ObsKind,
-    space: &ActionSpace,
-) -> Result<Option<Rollout>, LearnError> {
-    let is_terminated = matches!(episode.end, DemoEnd::Terminated { .. });
-    let steps = episode.len().saturating_sub(usize::from(!is_terminated));
-    if steps == 0 {
-        return Ok(None);
-    }
-    let (width, mut actions) = (kind.numbers(), Actions::empty(space));
-    actions.extend_rows(&learner_actions(episode), 0, steps)?;
-    let mut rollout = Rollout { steps, actions, ..Rollout::new(1, *kind, 0, space) };
-    rollout.obs.push(observations.rows(0..steps, width))?;
-    rollout.rewards = episode.rewards[..steps].to_vec();
-    (rollout.log_probs, rollout.values, rollout.final_values) = (vec![0.0; steps], vec![0.0; steps], vec![0.0; steps]);
-    (rollout.terminated, rollout.truncated) = (vec![false; steps], vec![false; steps]);
-    rollout.terminated[steps - 1] = is_terminated;
-    rollout.next_values = vec![0.0];
-    rollout.ends.next_obs.push(observations.row(episode.len() - 1, width))?;
-    Ok(Some(rollout))
-}
-
 /// Actions as numbers that can be compared.
 fn bits(actions: &EpisodeActions) -> Vec<u32> {
     match actions {
@@ -279,7 +225,7 @@ fn bits(actions: &EpisodeActions) -> Vec<u32> {
     }
 }
 
-fn learner_actions(episode: &DemoEpisode) -> Actions {
+pub(super) fn learner_actions(episode: &DemoEpisode) -> Actions {
     match &episode.actions {
         EpisodeActions::Discrete(list) => Actions::Discrete(list.clone()),
         EpisodeActions::Continuous { dim, values } => Actions::Continuous { dim: *dim, values: values.clone() },

@@ -3,4 +3,5 @@
 pub mod dataset;
 pub mod demonstration;
 mod replay_observations;
+mod rollouts;
 pub mod verify;

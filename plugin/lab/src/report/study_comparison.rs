@@ -4,7 +4,7 @@ use super::{
     bootstrap::{Estimate, interquartile_mean, probability_of_improvement},
     number::{UNKNOWN, fixed, mean_and_error},
     study::StudyReport,
-    study_table::markdown,
+    study_table::markdown_table,
 };
 
 impl StudyReport {
@@ -31,7 +31,7 @@ impl StudyReport {
         format!(
             "The held-out return of **{first}** less that of each other variant, on the same levels and with the same seeds. ± is \
              the standard error over levels and seeds; what is further from 0 than two of them is called clear.\n\n{}\n",
-            markdown(&headings, rows.into_iter())
+            markdown_table(&headings, rows.into_iter())
         )
     }
 
@@ -63,7 +63,7 @@ impl StudyReport {
              higher return on a level than a run of the variant, where equal returns count half. In brackets are 95 % intervals by \
              a bootstrap over seeds and levels.\n\n{}\n",
             variants[0],
-            markdown(&["variant", "interquartile mean", &above], rows.into_iter())
+            markdown_table(&["variant", "interquartile mean", &above], rows.into_iter())
         )
     }
 }

@@ -76,7 +76,7 @@ impl StudyReport {
                 mean_cell(&tested(|run| run.test.return_mean), 2),
             ]
         });
-        markdown(&headings, rows)
+        markdown_table(&headings, rows)
     }
 
     fn every_seed(&self) -> String {
@@ -104,7 +104,7 @@ impl StudyReport {
                 fixed(test.length_mean, 1),
             ]
         });
-        markdown(&headings, rows)
+        markdown_table(&headings, rows)
     }
 }
 
@@ -140,7 +140,7 @@ fn share_cell(values: &[f64]) -> String {
 }
 
 /// A table with its first column to the left and the others to the right, padded so that the text itself is readable.
-pub(super) fn markdown(headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+pub fn markdown_table(headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut lines = vec![headings.iter().map(|heading| (*heading).to_owned()).collect::<Vec<_>>()];
     lines.extend(rows);
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);

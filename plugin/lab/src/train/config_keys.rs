@@ -75,7 +75,9 @@ pub(super) struct Keys(BTreeMap<String, Value>);
 
 /// All keys there are, with an example of each value.
 static ALL: LazyLock<Keys> = LazyLock::new(|| {
-    let least = r#"(game: "-", train: "-:0..0", test: "-:1..1", demos: "-", steps: 1)"#;
+    // With keys that are not written as long as they do nothing.
+    let least = r#"(game: "-", train: "-:0..0", test: "-:1..1", demos: "-", steps: 1, skills: (
+        augment: [Translate(1)], weight_decay: 0.1, held_out: 0.1, patience: Some(1)))"#;
     let example: Experiment = reader().from_str(least).expect("every required key is there");
     Keys::of_experiment(&example, &Origin::start_of(Path::new("example"))).expect("it was just read")
 });
@@ -88,6 +90,11 @@ fn reader() -> Options {
 /// Whether a text is one value of RON, of whatever type.
 pub(super) fn check_syntax(text: &str) -> Result<(), SpannedError> {
     reader().from_str::<IgnoredAny>(text).map(|_| ())
+}
+
+/// What a key of older files is called now.
+pub(super) fn renamed(key: &str) -> Option<&'static str> {
+    (key == "sac.alpha_lr").then_some("sac.temperature_lr")
 }
 
 impl Keys {
@@ -206,6 +213,10 @@ impl Keys {
 
     /// Puts a value in.
     pub(super) fn put(&mut self, key: String, value: Value) {
+        let key = match renamed(&key) {
+            Some(name) => name.to_owned(),
+            None => key,
+        };
         self.0.insert(key, value);
     }
 

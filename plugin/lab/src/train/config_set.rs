@@ -3,7 +3,7 @@
 use super::{
     config::Experiment,
     config_error::{ConfigError, no_value, unknown_key},
-    config_keys::{Keys, Origin, Value, check_syntax},
+    config_keys::{Keys, Origin, Value, check_syntax, renamed},
 };
 
 impl Experiment {
@@ -27,7 +27,7 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
     let Some((key, text)) = set.split_once('=') else {
         return Err(refuse("write key=value, such as ppo.lr=0.0003".to_owned()));
     };
-    let (key, text) = (key.trim(), text.trim());
+    let (key, text) = (renamed(key.trim()).unwrap_or(key.trim()), text.trim());
     if key == "base" {
         return Err(refuse("`base` names what a file is built on: write it into an experiment file".to_owned()));
     }
@@ -79,6 +79,17 @@ mod tests {
 
     fn error(set: &str) -> String {
         experiment().with_set(&[set]).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn keys_that_are_not_written_as_long_as_they_do_nothing_can_be_set() {
+        let sets =
+            ["skills.held_out=0.1", "skills.patience=3", "skills.weight_decay=0.01", "skills.augment=[Translate(2)]"];
+        let skills = experiment().with_set(&sets).expect("known keys").skills;
+        assert_eq!((skills.held_out, skills.patience, skills.weight_decay), (0.1, Some(3), 0.01));
+        assert_eq!(skills.augment.len(), 1);
+        let older = experiment().with_set(&["sac.alpha_lr=0.5"]).expect("an older name");
+        assert_eq!(older.sac.temperature_lr, 0.5);
     }
 
     #[test]

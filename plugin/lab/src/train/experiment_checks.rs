@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use playbot_learner::{ActionSpace, PriorKind, SkillDraw, TimeLimit};
+use playbot_learner::ActionSpace;
 
 use super::{
     config::{Experiment, LearnerKind},
@@ -150,32 +150,6 @@ impl Experiment {
             let why = "a policy that starts as a copy of decoder or prior must see what they saw; set \
                        `skills.norm_obs` instead, which normalises for both";
             return refuse(key, true, why);
-        }
-        Ok(())
-    }
-
-    /// A policy over skills learns from whole skills that were drawn.
-    fn check_skill_draws(&self) -> Result<(), ExperimentError> {
-        if !self.algorithm.learns_prior() {
-            return Ok(());
-        }
-        if self.score.prior != PriorKind::Learned {
-            return refuse("score.prior", "StandardNormal", "a policy over skills starts as the learned prior");
-        }
-        if self.score.skill_draw != SkillDraw::Sample {
-            return refuse("score.skill_draw", "Mean", "a policy over skills learns from skills that are drawn");
-        }
-        let (key, steps, limit_key, limit) = match self.algorithm.learner() {
-            LearnerKind::Ppo => ("ppo.num_steps", self.ppo.num_steps, "ppo.time_limit", self.ppo.time_limit),
-            LearnerKind::Sac => ("sac.num_steps", self.sac.num_steps, "sac.time_limit", self.sac.time_limit),
-        };
-        if limit != TimeLimit::Bootstrap {
-            return refuse(limit_key, "Legacy", "a policy over skills needs Bootstrap: its rollouts are cut anyway");
-        }
-        let least = self.score.horizon.saturating_mul(2);
-        if steps < least {
-            let why = format!("a policy over skills learns from whole ones, so it takes 2 × `score.horizon` = {least}");
-            return refuse(key, steps, why);
         }
         Ok(())
     }

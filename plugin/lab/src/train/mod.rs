@@ -23,6 +23,7 @@ pub mod metrics_log;
 mod missing_run;
 mod passed_over;
 pub mod presets;
+mod prior_checks;
 pub(crate) mod progress;
 mod replaced_run;
 mod ron_keys;

@@ -50,26 +50,25 @@ impl Trainer {
         device: DeviceKind,
         threads: usize,
     ) -> Result<Self, TrainError> {
-        check(game, experiment)?;
-        let learner = TrainedLearner::new(game, experiment, skills, &[], device)?;
-        Self::with_learner(game, experiment, learner, threads)
+        Self::with_demos(game, experiment, skills, &[], device, threads)
     }
 
-    /// A trainer at its first step for an algorithm that trains on recordings too:
-    /// [`rollouts`](crate::demo::dataset::Demonstrations::rollouts) gives them.
+    /// [`new`](Self::new) for algorithms that may train on recordings too:
+    /// [`rollouts`](crate::demo::dataset::Demonstrations::rollouts) gives them. The others do not look at them.
     ///
     /// # Errors
     ///
-    /// As for [`new`](Self::new); and if nothing in the recordings was ever rewarded.
+    /// As there; and if nothing in the recordings was ever rewarded.
     pub fn with_demos(
         game: &dyn Game,
         experiment: &Experiment,
+        skills: Option<&SkillModel>,
         demos: &[Rollout],
         device: DeviceKind,
         threads: usize,
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
-        let learner = TrainedLearner::new(game, experiment, None, demos, device)?;
+        let learner = TrainedLearner::new(game, experiment, skills, demos, device)?;
         Self::with_learner(game, experiment, learner, threads)
     }
 
@@ -121,9 +120,9 @@ impl Trainer {
 
     /// Draws skills from what was learned of them, where that goes on.
     fn renew_skills(&mut self) {
-        let prior = self.skill_prior().filter(|_| self.experiment.algorithm.learns_prior());
-        for (collector, prior) in self.collectors.iter_mut().zip(std::iter::repeat(prior).flatten()) {
-            collector.world_mut().insert_resource(prior);
+        let Some(prior) = self.skill_prior().filter(|_| self.experiment.algorithm.learns_prior()) else { return };
+        for collector in &mut self.collectors {
+            collector.world_mut().insert_resource(prior.clone());
         }
     }
 

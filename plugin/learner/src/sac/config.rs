@@ -37,7 +37,8 @@ pub struct SacConfig {
     /// Learning rate of the critics' Adam (the released code has 1e-3).
     pub critic_lr: f64,
     /// Learning rate of the temperature's Adam.
-    #[serde(rename = "alpha_lr")]
+    // Its name was that of the papers, where SCORE has an α of its own.
+    #[serde(alias = "alpha_lr")]
     pub temperature_lr: f64,
     /// Transitions in a gradient step, drawn with replacement.
     pub batch: usize,
@@ -147,7 +148,7 @@ impl SacConfig {
         let positive = [
             ("actor_lr", self.actor_lr),
             ("critic_lr", self.critic_lr),
-            ("alpha_lr", self.temperature_lr),
+            ("temperature_lr", self.temperature_lr),
             ("updates_per_step", self.updates_per_step),
             ("tau", self.tau),
             ("adam_eps", self.adam_eps),

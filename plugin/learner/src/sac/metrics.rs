@@ -47,7 +47,7 @@ impl SacMetrics {
             ("losses/actor_loss", self.actor_loss),
             ("losses/entropy", self.entropy),
             ("losses/actor_grad_norm", self.actor_grad_norm),
-            ("losses/alpha_loss", self.temperature_loss),
+            ("losses/temperature_loss", self.temperature_loss),
             ("score/decoder_kl", self.decoder_kl),
             ("score/alpha_mean", self.confidence),
         ];

@@ -206,7 +206,7 @@ pub fn temperature_step(
     let loss = temperature_loss(nets.log_temperature.0.clone(), actions.cost(), target_entropy);
     let steps = adam.steps();
     let metrics = TemperatureStep {
-        temperature_loss: finite("alpha_loss", &loss, steps)?,
+        temperature_loss: finite("temperature_loss", &loss, steps)?,
         log_prob: finite("log_prob", &log_prob.mean(), steps)?,
     };
     descend(&mut nets.log_temperature, "", adam, loss.backward(), lr)?;

@@ -122,7 +122,9 @@ fn gradient_steps_keep_pace_with_the_transitions() {
     assert_eq!(steps, [0, 0, 5, 11, 16, 22, 27, 33]);
     assert_eq!((last.transitions, learner.transitions(), learner.updates()), (128, 128, 8));
     let names: Vec<_> = last.scalars().into_iter().map(|(name, _)| name).collect();
-    for name in ["charts/entropy_coef", "losses/actor_loss", "losses/qf_loss", "losses/entropy", "losses/alpha_loss"] {
+    for name in
+        ["charts/entropy_coef", "losses/actor_loss", "losses/qf_loss", "losses/entropy", "losses/temperature_loss"]
+    {
         assert!(names.contains(&name), "{name}");
     }
     assert!(!names.contains(&"score/decoder_kl"));

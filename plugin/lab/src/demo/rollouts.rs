@@ -1,0 +1,63 @@
+//! Turning recordings into what an algorithm trains on beside its own play.
+
+use bevy_playbot::demo::file::{DemoEnd, DemoEpisode};
+use playbot_learner::{ActionSpace, Actions, LearnError, ObsKind, Observations, Rollout};
+
+use super::{
+    dataset::{Demonstrations, learner_actions},
+    verify::VerifyError,
+};
+use crate::{game::Game, sensors::GameSensors};
+
+impl Demonstrations {
+    /// What was played, with its rewards, as rollouts of one environment each. Every episode is replayed, so that what it
+    /// earned is what it earns today. The last step of an episode that did not end by the rules is left out: nobody has
+    /// recorded what came after it.
+    ///
+    /// # Errors
+    ///
+    /// [`VerifyError`] if an episode does not replay.
+    pub fn rollouts(
+        mut self,
+        game: &dyn Game,
+        threads: usize,
+        progress: impl Fn(u64) + Sync,
+    ) -> Result<Vec<Rollout>, VerifyError> {
+        self.episodes.iter_mut().for_each(|demo| demo.is_seen = false);
+        let originals = self.originals();
+        let observed = self.observe(game, threads, &originals, &progress)?;
+        let kind = self.observation_config.obs_kind(game);
+        let mut rollouts = Vec::new();
+        for (demo, original) in self.episodes.iter().zip(originals) {
+            if let Some(observations) = observed.get(&original) {
+                rollouts.extend(rollout(&demo.episode, observations, &kind, &game.actions())?);
+            }
+        }
+        Ok(rollouts)
+    }
+}
+
+/// The steps of an episode whose outcome is known, if there are any.
+fn rollout(
+    episode: &DemoEpisode,
+    observations: &Observations,
+    kind: &ObsKind,
+    space: &ActionSpace,
+) -> Result<Option<Rollout>, LearnError> {
+    let is_terminated = matches!(episode.end, DemoEnd::Terminated { .. });
+    let steps = episode.len().saturating_sub(usize::from(!is_terminated));
+    if steps == 0 {
+        return Ok(None);
+    }
+    let (width, mut actions) = (kind.numbers(), Actions::empty(space));
+    actions.extend_rows(&learner_actions(episode), 0, steps)?;
+    let mut rollout = Rollout { steps, actions, ..Rollout::new(1, *kind, 0, space) };
+    rollout.obs.push(observations.rows(0..steps, width))?;
+    rollout.rewards = episode.rewards[..steps].to_vec();
+    (rollout.log_probs, rollout.values, rollout.final_values) = (vec![0.0; steps], vec![0.0; steps], vec![0.0; steps]);
+    (rollout.terminated, rollout.truncated) = (vec![false; steps], vec![false; steps]);
+    rollout.terminated[steps - 1] = is_terminated;
+    rollout.next_values = vec![0.0];
+    rollout.ends.next_obs.push(observations.row(episode.len() - 1, width))?;
+    Ok(Some(rollout))
+}
