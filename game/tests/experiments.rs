@@ -72,15 +72,15 @@ fn what_is_held_out_is_not_trained_on_by_another_name() {
 
 /// Mazes of the paper's tables and figures, with the methods that are compared there.
 const MAZES: [(&str, &[&str]); 10] = [
-    ("antmaze-medium", &["score-ppo", "sac", "ppo"]),
+    ("antmaze-medium", &["score-ppo", "sac", "ppo", "spirl-ppo", "rlpd"]),
     ("antmaze-large", &["score-ppo", "sac", "ppo"]),
     ("antmaze-xl", &["score-ppo", "sac", "ppo"]),
     ("antmaze-to-large", &["score-medium", "score-large", "ppo-medium"]),
     ("antmaze-to-xl", &["score-medium", "score-large", "score-xl", "ppo-large"]),
     ("antmaze-ablation", &["score-ppo", "no-init", "no-kl", "no-alpha", "own-sample-alpha", "ppo"]),
     ("antmaze-random", &["score-ppo", "ppo", "bc"]),
-    ("maze2d-medium", &["score-ppo", "sac", "ppo"]),
-    ("maze2d-large", &["score-ppo", "sac", "ppo"]),
+    ("maze2d-medium", &["score-ppo", "sac", "ppo", "rlpd"]),
+    ("maze2d-large", &["score-ppo", "sac", "ppo", "rlpd"]),
     ("maze2d-random", &["score-ppo", "ppo", "bc"]),
 ];
 
