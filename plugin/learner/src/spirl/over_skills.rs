@@ -54,6 +54,7 @@ impl OverSkills {
         };
         gamma.powf(1.0 / self.teacher().config.horizon as f64)
     }
+
     /// Learns π(z | s) from a rollout of skills; gives what there is to report, by other names than what acts reports.
     pub(super) fn learn(
         &mut self,
