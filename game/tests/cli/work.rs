@@ -106,6 +106,8 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     assert_eq!(methods, ["score-ppo", "ppo", "bc", "right-jump", "random"]);
     let report = std::fs::read_to_string(folder.path().join("runs/quick/report.html")).expect("written");
     assert!(report.contains("score-ppo") && report.contains("<svg"));
+    let headline = "steps to 80 % success in training: score-ppo ";
+    assert!(report.contains(headline) && errors(&quick).contains(headline), "{}", errors(&quick));
 
     std::fs::write(folder.path().join("not.safetensors"), b"nothing of the kind").expect("writable");
     let foreign = run(&["eval", "--skills", "not.safetensors"]);

@@ -12,9 +12,11 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
-    report::to_text_table,
+    report::{statistics::steps_to_reach, to_text_table, whole},
+    runs::RunCurves,
     train::{
         Algorithm, Experiment, Trainer,
+        metrics_log::SUCCESS_RATE,
         run_dir::{check_replaceable, is_unstarted, write_atomically},
         run_lock::RunLock,
     },
@@ -89,6 +91,8 @@ struct Trained {
     algorithm: Algorithm,
     player: Player,
     curve: Vec<CurvePoint>,
+    /// Steps until its success rate first was at the experiment's threshold.
+    steps_to_threshold: Option<u64>,
     steps_per_s: f64,
     finished: bool,
 }
@@ -145,7 +149,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if !args.json {
         print_line(to_text_table(&rows))?;
     }
-    let comparison = compare(&trained);
+    let comparison = format!("{}; {}", headline(&trained, experiment.study.threshold), compare(&trained));
     tell!("{comparison}");
     let report = args.run.join("report.html");
     write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
@@ -235,7 +239,9 @@ fn train_one(
     })?;
     let steps_per_s = trainer.steps() as f64 / start.elapsed().as_secs_f64();
     let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
-    Ok(Trained { algorithm, player, curve, steps_per_s, finished })
+    let settled = RunCurves::read(run.path())?;
+    let steps_to_threshold = steps_to_reach(settled.settled(SUCCESS_RATE), experiment.study.threshold);
+    Ok(Trained { algorithm, player, curve, steps_to_threshold, steps_per_s, finished })
 }
 
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
@@ -247,6 +253,15 @@ fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
         program = program::name()
     );
     Outcome::Stopped
+}
+
+/// How many steps each took until it mostly succeeded.
+fn headline(trained: &[Trained], threshold: f64) -> String {
+    let each = trained.iter().map(|Trained { algorithm, steps_to_threshold, .. }| match steps_to_threshold {
+        Some(steps) => format!("{algorithm} {}", whole(*steps as f64)),
+        None => format!("{algorithm} not reached"),
+    });
+    format!("steps to {:.0} % success in training: {}", 100.0 * threshold, each.collect::<Vec<_>>().join(", "))
 }
 
 /// How many steps SCORE needed for what PPO reached in the end, in words.

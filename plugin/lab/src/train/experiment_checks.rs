@@ -54,6 +54,10 @@ impl Experiment {
         if self.algorithm.needs_skills() || self.algorithm.trains_on_demos() {
             self.recordings()?;
         }
+        if self.algorithm.trains_on_demos() && self.observation_config().is_image() {
+            let why = format!("{} learns from vectors only", self.algorithm);
+            return refuse("observation", format!("{:?}", self.observation), why);
+        }
         self.check_normalisers()?;
         self.check_skill_draws()?;
         self.check_batches()

@@ -62,8 +62,8 @@ pub enum ExperimentError {
         /// What it must be.
         why: String,
     },
-    /// There is nothing to learn skills from.
-    #[error("`demos` is missing: skills are learned from recordings, so name a file or a folder of them")]
+    /// There is nothing to learn from.
+    #[error("`demos` is missing: there is something to learn from recordings, so name a file or a folder of them")]
     NoDemos,
     /// The learner refuses its settings.
     #[error("{0}")]

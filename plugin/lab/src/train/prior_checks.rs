@@ -56,6 +56,7 @@ mod tests {
             (r#"algorithm: "spirl-ppo", ppo: (norm_obs: true)"#, "`ppo.norm_obs` is true"),
             (r#"algorithm: "spirl-ppo", spirl: (target_kl: Some(0.0))"#, "spirl target_kl must be positive"),
             (r#"algorithm: "rlpd", rlpd: (demo_share: 1.0)"#, "rlpd demo_share must lie between"),
+            (r#"algorithm: "rlpd", observation: Raster"#, "`observation` is Raster: rlpd learns from vectors only"),
         ] {
             let text = check(changes).expect_err(changes);
             assert!(text.contains(words), "{changes}: {text}");
