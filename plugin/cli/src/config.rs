@@ -46,7 +46,7 @@ enum Verb {
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     experiment.check_levels(open::game(games, from, experiment)?)?;
     let algorithm = experiment.algorithm;
-    let demos = experiment.demos.as_deref().filter(|_| algorithm.needs_skills() || algorithm.trains_on_demos());
+    let demos = experiment.demos.as_deref().filter(|_| algorithm.learns_from_demos());
     if let Some(path) = demos.filter(|path| !from.find_recordings(path, games).exists()) {
         tell!("warning: there are no recordings at {}, from which {algorithm} learns (`demos`)", path.display());
     }

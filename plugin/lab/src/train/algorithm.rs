@@ -72,6 +72,11 @@ impl Algorithm {
         matches!(self, Self::SpirlPpo | Self::SpirlSac)
     }
 
+    /// Whether there is nothing to learn without recordings: of skills, or of what was done.
+    pub fn learns_from_demos(self) -> bool {
+        self.needs_skills() || self.trains_on_demos()
+    }
+
     /// Whether recordings are part of what it is trained on; skills are learned from them beforehand.
     pub fn trains_on_demos(self) -> bool {
         self == Self::Rlpd

@@ -51,7 +51,7 @@ impl Experiment {
         self.ppo_config().validate().map_err(settings)?;
         self.spirl.validate().map_err(settings)?;
         self.rlpd.validate().map_err(settings)?;
-        if self.algorithm.needs_skills() || self.algorithm.trains_on_demos() {
+        if self.algorithm.learns_from_demos() {
             self.recordings()?;
         }
         if self.algorithm.trains_on_demos() && self.observation_config().is_image() {
@@ -217,7 +217,7 @@ mod tests {
         for algorithm in Algorithm::ALL {
             let without = check(&format!(r#"algorithm: "{algorithm}""#));
             assert_eq!(without, check(&format!(r#"algorithm: "{algorithm}", demos: None"#)));
-            match algorithm.needs_skills() || algorithm.trains_on_demos() {
+            match algorithm.learns_from_demos() {
                 true => {
                     assert!(without.expect_err("nothing to learn from").contains("`demos` is missing"), "{algorithm}")
                 }

@@ -52,37 +52,26 @@ impl TrainedLearner {
         device: DeviceKind,
     ) -> Result<Self, TrainError> {
         let algorithm = experiment.algorithm;
-        if !algorithm.is_trained() {
-            return Err(TrainError::NotTrained(algorithm));
-        }
         let (seed, score) = (experiment.seed, experiment.score.clone());
         let spec =
             PolicySpec { obs: experiment.observation_config().obs_kind(game), latent: 0, action_space: game.actions() };
-        let skills = if algorithm.needs_skills() { Some(fitting(game, experiment, skills)?) } else { None };
-        let (ppo, sac) = (experiment.ppo_config(), experiment.sac.clone());
-        let learner = algorithm.learner();
-        match learner {
-            LearnerKind::Ppo => {}
-            LearnerKind::Sac => warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent)),
+        let (ppo, sac, spirl) = (experiment.ppo_config(), experiment.sac.clone(), experiment.spirl.clone());
+        if algorithm.learner() == LearnerKind::Sac {
+            warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
         }
-        if let Some(model) = skills.filter(|_| algorithm.learns_prior()) {
-            let spirl = experiment.spirl.clone();
-            return Ok(Self::of(match learner {
-                LearnerKind::Ppo => SpirlLearner::ppo(spirl, ppo, &score, model, seed, device)?,
-                LearnerKind::Sac => SpirlLearner::sac(spirl, sac, &ppo, &score, model, seed, device)?,
-            }));
+        if algorithm.trains_on_demos() && demos.is_empty() {
+            return Err(TrainError::NoDemos(algorithm));
         }
-        if algorithm.trains_on_demos() {
-            if demos.is_empty() {
-                return Err(TrainError::NoDemos(algorithm));
-            }
-            return Ok(Self::of(SacLearner::with_demos(sac, &experiment.rlpd, demos, spec, seed, device)?));
-        }
-        Ok(match (learner, skills) {
-            (LearnerKind::Ppo, None) => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
-            (LearnerKind::Ppo, Some(model)) => Self::of(PpoLearner::with_skill(ppo, score, model, seed, device)?),
-            (LearnerKind::Sac, None) => Self::of(SacLearner::new(sac, spec, seed, device)?),
-            (LearnerKind::Sac, Some(model)) => Self::of(SacLearner::with_skill(sac, score, model, seed, device)?),
+        let model = || fitting(game, experiment, skills);
+        Ok(match algorithm {
+            Algorithm::BehaviourCloning => return Err(TrainError::NotTrained(algorithm)),
+            Algorithm::Ppo => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
+            Algorithm::Sac => Self::of(SacLearner::new(sac, spec, seed, device)?),
+            Algorithm::Rlpd => Self::of(SacLearner::with_demos(sac, &experiment.rlpd, demos, spec, seed, device)?),
+            Algorithm::ScorePpo => Self::of(PpoLearner::with_skill(ppo, score, model()?, seed, device)?),
+            Algorithm::ScoreSac => Self::of(SacLearner::with_skill(sac, score, model()?, seed, device)?),
+            Algorithm::SpirlPpo => Self::of(SpirlLearner::ppo(spirl, ppo, &score, model()?, seed, device)?),
+            Algorithm::SpirlSac => Self::of(SpirlLearner::sac(spirl, sac, &ppo, &score, model()?, seed, device)?),
         })
     }
 

@@ -200,9 +200,6 @@ impl Learner for SpirlLearner {
     }
 
     fn skills(&self) -> Option<SkillSource> {
-        let teacher = self.over_skills.teacher();
-        let decoder = teacher.decoder_policy(self.base().device);
-        let (horizon, draw) = (teacher.config.horizon, teacher.config.skill_draw);
-        Some(SkillSource { prior: self.over_skills.prior(), decoder, horizon, draw })
+        Some(self.over_skills.teacher().source_of(self.over_skills.prior(), self.base().device))
     }
 }

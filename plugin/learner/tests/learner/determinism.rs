@@ -1,7 +1,8 @@
 //! The same seed gives the same bits, whatever the number of threads and the size of the batch.
 
 use crate::corridor::config;
-use crate::point::{self, Field};
+use crate::field::{Field, HURRY};
+use crate::point;
 use crate::score::model;
 use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::nn::{Activation, CnnKind};
@@ -156,7 +157,7 @@ fn discrete_sac_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn continuous_sac_does_not_depend_on_the_number_of_threads() {
     same_on_any_number_of_threads("continuous_sac_does_not_depend_on_the_number_of_threads", || {
-        let mut field = Field::new(8, 1);
+        let mut field = Field::new(&HURRY, 8, 1);
         sac(point::sac_config(), point::SPEC, |learner| field.rollout(learner, 8))
     });
 }

@@ -7,6 +7,7 @@ mod clock;
 mod corridor;
 mod determinism;
 mod errors;
+mod field;
 mod files;
 #[cfg(feature = "wgpu")]
 mod gpu;

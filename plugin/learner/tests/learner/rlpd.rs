@@ -1,6 +1,7 @@
 //! RLPD: SAC with recordings in each batch, and an ensemble of normalised critics.
 
-use crate::point::{Field, SPEC, recordings, sac_config};
+use crate::field::{Field, HURRY};
+use crate::point::{self, SPEC, recordings, sac_config};
 use playbot_learner::{DeviceKind, LearnError, Learner, RlpdConfig, SacConfig, SacLearner};
 
 fn config() -> SacConfig {
@@ -18,11 +19,11 @@ fn small() -> RlpdConfig {
 
 /// Success after so many steps of play.
 fn success(mut learner: SacLearner, steps: u64) -> f64 {
-    let mut field = Field::new(8, 1);
+    let mut field = Field::new(&HURRY, 8, 1);
     while learner.transitions() < steps {
         learner.update(&field.rollout(&learner, 8)).expect("finite");
     }
-    Field::success(&learner, 90)
+    point::success(&learner, 90)
 }
 
 #[test]
@@ -37,7 +38,7 @@ fn recordings_make_it_learn_sooner() {
 fn the_ensemble_and_its_normalised_layers_are_in_the_checkpoint() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("checkpoint.safetensors");
-    let (mut learner, mut field) = (rlpd(&small()), Field::new(4, 1));
+    let (mut learner, mut field) = (rlpd(&small()), Field::new(&HURRY, 4, 1));
     let mut play = |learner: &SacLearner| field.rollout(learner, 32);
     learner.update(&play(&learner)).expect("finite");
     learner.save(&path).expect("written");
@@ -58,7 +59,7 @@ fn the_ensemble_and_its_normalised_layers_are_in_the_checkpoint() {
 fn a_target_of_some_critics_is_not_that_of_all() {
     let loss = |target_critics| {
         let config = RlpdConfig { target_critics, ..small() };
-        let (mut learner, mut field) = (rlpd(&config), Field::new(4, 1));
+        let (mut learner, mut field) = (rlpd(&config), Field::new(&HURRY, 4, 1));
         let metrics = learner.update(&field.rollout(&learner, 64)).expect("finite");
         metrics.qf_values.expect("steps were due")
     };

@@ -1,7 +1,8 @@
 //! SAC: discrete actions, the numbers of an update by hand, restarts, and what goes wrong.
 
 use crate::errors::vectors;
-use crate::point::{self, Field};
+use crate::field::{Field, HURRY};
+use crate::point;
 use crate::toy::{BEST, Driver, OBS, SPACE};
 use playbot_learner::{
     ActionSpace, Actions, DeviceKind, EndStates, EntropyCoef, FileError, LearnError, Learner, ObsKind, PolicySpec,
@@ -165,7 +166,7 @@ fn a_loaded_learner_goes_on_bit_for_bit() {
     goes_on(learner(small.clone()), |learner| driver.rollout(learner, 8));
     let normalised = SacConfig { norm_obs: true, norm_reward: true, ..small };
     let continuous = SacLearner::new(normalised, point::SPEC, u64::MAX, DeviceKind::Flex).expect("good settings");
-    let mut field = Field::new(4, 1);
+    let mut field = Field::new(&HURRY, 4, 1);
     goes_on(continuous, |learner| field.rollout(learner, 8));
 }
 

@@ -1,6 +1,7 @@
 //! SPiRL: a policy over skills that start as the prior, learned by PPO and by SAC.
 
-use crate::walkers::{SPACE, Walkers, skills_of_directions};
+use crate::field::{Field, SPACE, WALK};
+use crate::walkers::skills_of_directions;
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
     DeviceKind, LearnError, Learner, PpoConfig, PriorKind, Rollout, SacConfig, ScoreConfig, SkillDraw, SkillModel,
@@ -44,7 +45,7 @@ fn sac(config: SpirlConfig) -> SpirlLearner {
 
 /// What the last of so many updates reported.
 fn train(learner: &mut SpirlLearner, updates: usize, ticks: usize) -> Vec<(&'static str, f64)> {
-    let mut walkers = Walkers::new(16, HORIZON, 1);
+    let mut walkers = Field::new(&WALK, 16, 1);
     let mut last = Vec::new();
     for _ in 0..updates {
         let rollout = walkers.rollout(learner, ticks);
@@ -73,7 +74,7 @@ fn skills_come_from_the_prior_at_first() {
 
 #[test]
 fn it_learns_which_skills_lead_to_the_goal() {
-    let success = |learner: &SpirlLearner| Walkers::new(64, HORIZON, 77).success(learner, 120);
+    let success = |learner: &SpirlLearner| Field::new(&WALK, 64, 77).success(learner, 120);
     let before = success(&ppo(SpirlConfig::default()));
     assert!(before < 0.4, "{before} by chance");
     let loose = SpirlConfig { target_kl: Some(3.0), ..SpirlConfig::default() };
@@ -152,7 +153,7 @@ fn what_cannot_work_is_refused() {
     assert!(refused(score(), legacy).contains("time_limit"));
 
     let mut learner = ppo(SpirlConfig::default());
-    let short: Rollout = Walkers::new(2, HORIZON, 1).rollout(&learner, HORIZON - 1);
+    let short: Rollout = Field::new(&WALK, 2, 1).rollout(&learner, HORIZON - 1);
     let error = learner.learn(&short).expect_err("no whole skill");
     assert!(matches!(&error, LearnError::Config(text) if text.contains("twice as long")), "{error}");
 }

@@ -136,22 +136,29 @@ impl Teacher {
 
     /// Prior and decoder with the horizon and the draw, as a policy needs them in play.
     pub(crate) fn source(&self, device: DeviceKind) -> SkillSource {
+        self.source_of(self.prior(device), device)
+    }
+
+    /// The same with skills from `prior`.
+    pub(crate) fn source_of(&self, prior: Prior, device: DeviceKind) -> SkillSource {
         let (horizon, draw) = (self.config.horizon, self.config.skill_draw);
-        SkillSource { prior: self.prior(device), decoder: self.decoder_policy(device), horizon, draw }
+        SkillSource { prior, decoder: self.decoder_policy(device), horizon, draw }
     }
 
     /// The network that the policy is tied to, as a policy.
     pub(super) fn origin_policy(&self, device: DeviceKind) -> Policy {
-        let spec = match self.tied_to {
-            TiedTo::Decoder => return self.decoder_policy(device),
-            TiedTo::Prior => self.description.prior_spec(),
-        };
-        Policy::new(&self.actors.prior, None, self.stats.clone(), spec, device.plain())
+        match self.tied_to {
+            TiedTo::Decoder => self.decoder_policy(device),
+            TiedTo::Prior => self.policy_of(&self.actors.prior, self.description.prior_spec(), device),
+        }
     }
 
     /// The decoder as a policy.
     pub(crate) fn decoder_policy(&self, device: DeviceKind) -> Policy {
-        let spec = self.description.decoder_spec();
-        Policy::new(&self.actors.decoder, None, self.stats.clone(), spec, device.plain())
+        self.policy_of(&self.actors.decoder, self.description.decoder_spec(), device)
+    }
+
+    fn policy_of(&self, actor: &Actor, spec: PolicySpec, device: DeviceKind) -> Policy {
+        Policy::new(actor, None, self.stats.clone(), spec, device.plain())
     }
 }

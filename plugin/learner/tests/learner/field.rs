@@ -1,0 +1,174 @@
+//! Points with goals in the plane, and a driver that plays them, with skills or without.
+
+use playbot_learner::rng::{ChaCha8Rng, Streams, normal, unit};
+use playbot_learner::{Action, ActionSpace, Actions, Learner, Rollout, RolloutStep, SkillSource};
+
+pub const OBS: usize = 4;
+pub const SPACE: ActionSpace = ActionSpace::Continuous(2);
+
+/// How points move, when they have arrived, and what pays.
+#[derive(Debug)]
+pub struct Rules {
+    /// How far a full action moves a point.
+    pub speed: f32,
+    /// How near the goal is there.
+    pub near: f32,
+    /// Steps until an episode is cut off.
+    pub limit: usize,
+    /// Reward of a step, by the distances before and after it.
+    pub reward: fn(f32, f32) -> f32,
+}
+
+/// Each step costs the distance that is left.
+pub static HURRY: Rules = Rules { speed: 0.2, near: 0.15, limit: 30, reward: |_, after| -after };
+/// Coming nearer pays.
+pub static WALK: Rules = Rules { speed: 0.1, near: 0.25, limit: 40, reward: |before, after| before - after };
+
+/// A point at (x, y) in [-1, 1]² and its goal; the action is a velocity.
+#[derive(Clone, Copy)]
+pub struct Point {
+    pub place: [f32; 2],
+    pub goal: [f32; 2],
+    time: usize,
+}
+
+impl Point {
+    pub fn new(rng: &mut ChaCha8Rng) -> Self {
+        let mut draw = || [(); 2].map(|()| 2.0 * unit(rng) as f32 - 1.0);
+        Self { place: draw(), goal: draw(), time: 0 }
+    }
+
+    pub fn observe(&self) -> [f32; OBS] {
+        [self.place[0], self.place[1], self.goal[0], self.goal[1]]
+    }
+
+    fn distance(&self) -> f32 {
+        (self.place[0] - self.goal[0]).hypot(self.place[1] - self.goal[1])
+    }
+
+    /// Reward, terminated, truncated.
+    pub fn step(&mut self, rules: &Rules, velocity: &[f32]) -> (f32, bool, bool) {
+        self.time += 1;
+        let before = self.distance();
+        for (x, v) in self.place.iter_mut().zip(velocity) {
+            *x = (*x + rules.speed * v.clamp(-1.0, 1.0)).clamp(-1.0, 1.0);
+        }
+        let after = self.distance();
+        ((rules.reward)(before, after), after < rules.near, self.time == rules.limit)
+    }
+}
+
+/// The skill that a point plays; empty where there are none.
+#[derive(Clone, Default)]
+struct Held {
+    z: Vec<f32>,
+    left: usize,
+}
+
+/// Several points at once, each with a skill of its own if there are any, and how their episodes ended.
+pub struct Field {
+    rules: &'static Rules,
+    points: Vec<Point>,
+    rngs: Vec<ChaCha8Rng>,
+    skills: Vec<Held>,
+    /// Whether each finished episode reached its goal.
+    pub reached: Vec<bool>,
+}
+
+impl Field {
+    pub fn new(rules: &'static Rules, envs: usize, seed: u64) -> Self {
+        let streams = Streams::new(seed);
+        let mut rngs: Vec<_> = (0..envs as u64).map(|i| streams.stream("point", i)).collect();
+        let points = rngs.iter_mut().map(Point::new).collect();
+        Self { rules, points, rngs, skills: vec![Held::default(); envs], reached: Vec::new() }
+    }
+
+    fn observe(&self) -> Vec<f32> {
+        self.points.iter().flat_map(Point::observe).collect()
+    }
+
+    fn z(&self) -> Vec<f32> {
+        self.skills.iter().flat_map(|held| held.z.iter().copied()).collect()
+    }
+
+    /// New skills for those whose have run out.
+    fn draw(&mut self, source: &SkillSource) {
+        for ((held, point), rng) in self.skills.iter_mut().zip(&self.points).zip(&mut self.rngs) {
+            if held.left == 0 {
+                let noise = &mut |_| normal(rng);
+                held.z = source.prior.sample(&point.observe(), 1, source.draw, noise).expect("finite");
+                held.left = source.horizon;
+            }
+        }
+    }
+
+    /// Which share of its skill each has before it.
+    fn shares_left(&self, source: &SkillSource) -> Vec<f32> {
+        let share = |held: &Held| if held.left == 0 { 1.0 } else { held.left as f32 / source.horizon as f32 };
+        self.skills.iter().map(share).collect()
+    }
+
+    /// Plays `ticks` ticks with the learner's policy, and its skills if it has any.
+    pub fn rollout(&mut self, learner: &impl Learner, ticks: usize) -> Rollout {
+        let (envs, policy, source) = (self.points.len(), learner.policy(), learner.skills());
+        let mut rollout = Rollout::new(envs, OBS, learner.rollout_latent(), &SPACE);
+        for _ in 0..ticks {
+            if let Some(source) = &source {
+                self.draw(source);
+                rollout.push_left(&self.shares_left(source));
+            }
+            let (obs, z) = (self.observe(), self.z());
+            let output = policy.forward(&z, &obs, envs).expect("finite");
+            let (mut actions, mut log_probs) = (Actions::empty(&SPACE), Vec::new());
+            let (mut rewards, mut terminated, mut truncated) = (Vec::new(), Vec::new(), Vec::new());
+            for (row, point) in self.points.iter_mut().enumerate() {
+                let (action, log_prob) = output.sample(row, &mut self.rngs[row]);
+                actions.push(&action).expect("continuous");
+                let Action::Continuous(velocity) = action else { panic!("continuous") };
+                let (reward, end, cut) = point.step(self.rules, &velocity);
+                log_probs.push(log_prob);
+                rewards.push(reward);
+                terminated.push(end);
+                truncated.push(cut);
+                self.skills[row].left = self.skills[row].left.saturating_sub(1);
+            }
+            let last = self.observe();
+            let step = RolloutStep {
+                obs: (&obs).into(),
+                z: &z,
+                actions: &actions,
+                log_probs: &log_probs,
+                values: &output.values,
+                rewards: &rewards,
+                terminated: &terminated,
+                truncated: &truncated,
+                final_values: &policy.values(&z, &last, envs).expect("finite"),
+            };
+            rollout.push_step(step).expect("continuous");
+            for row in 0..envs {
+                if truncated[row] && !terminated[row] {
+                    let obs = &last[row * OBS..(row + 1) * OBS];
+                    rollout.push_cut(row, obs, &self.skills[row].z).expect("vectors");
+                }
+                if truncated[row] || terminated[row] {
+                    self.reached.push(terminated[row]);
+                    (self.points[row], self.skills[row].left) = (Point::new(&mut self.rngs[row]), 0);
+                }
+            }
+        }
+        let (obs, z) = (self.observe(), self.z());
+        rollout.next_values = policy.values(&z, &obs, envs).expect("finite");
+        if let Some(source) = &source {
+            rollout.ends.next_left = self.shares_left(source);
+            rollout.ends.cut_left = vec![1.0; rollout.ends.cut_rows.len()];
+        }
+        (rollout.ends.next_obs, rollout.ends.next_z) = (obs.into(), z);
+        rollout
+    }
+
+    /// Share of the episodes of `ticks` ticks of play that reach their goals.
+    pub fn success(mut self, learner: &impl Learner, ticks: usize) -> f64 {
+        self.rollout(learner, ticks);
+        self.reached.iter().filter(|reached| **reached).count() as f64 / self.reached.len() as f64
+    }
+}
