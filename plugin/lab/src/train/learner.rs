@@ -56,8 +56,10 @@ impl TrainedLearner {
         let spec =
             PolicySpec { obs: experiment.observation_config().obs_kind(game), latent: 0, action_space: game.actions() };
         let (ppo, sac, spirl) = (experiment.ppo_config(), experiment.sac.clone(), experiment.spirl.clone());
-        if algorithm.learner() == LearnerKind::Sac {
-            warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent));
+        let skills = skills.filter(|_| algorithm.needs_skills());
+        match algorithm.learner() {
+            LearnerKind::Ppo => {}
+            LearnerKind::Sac => warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent)),
         }
         if algorithm.trains_on_demos() && demos.is_empty() {
             return Err(TrainError::NoDemos(algorithm));

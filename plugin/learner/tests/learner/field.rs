@@ -1,7 +1,8 @@
 //! Points with goals in the plane, and a driver that plays them, with skills or without.
 
+use crate::tick::Tick;
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal, unit};
-use playbot_learner::{Action, ActionSpace, Actions, Learner, Rollout, RolloutStep, SkillSource};
+use playbot_learner::{Action, ActionSpace, Learner, Rollout, SkillSource};
 
 pub const OBS: usize = 4;
 pub const SPACE: ActionSpace = ActionSpace::Continuous(2);
@@ -119,50 +120,32 @@ impl Field {
             }
             let (obs, z) = (self.observe(), self.z());
             let output = policy.forward(&z, &obs, envs).expect("finite");
-            let (mut actions, mut log_probs) = (Actions::empty(&SPACE), Vec::new());
-            let (mut rewards, mut terminated, mut truncated) = (Vec::new(), Vec::new(), Vec::new());
+            let mut tick = Tick::new(&SPACE);
             for (row, point) in self.points.iter_mut().enumerate() {
                 let (action, log_prob) = output.sample(row, &mut self.rngs[row]);
-                actions.push(&action).expect("continuous");
-                let Action::Continuous(velocity) = action else { panic!("continuous") };
-                let (reward, end, cut) = point.step(self.rules, &velocity);
-                log_probs.push(log_prob);
-                rewards.push(reward);
-                terminated.push(end);
-                truncated.push(cut);
+                let Action::Continuous(velocity) = &action else { panic!("continuous") };
+                tick.push(&action, log_prob, point.step(self.rules, velocity));
                 self.skills[row].left = self.skills[row].left.saturating_sub(1);
             }
             let last = self.observe();
-            let step = RolloutStep {
-                obs: (&obs).into(),
-                z: &z,
-                actions: &actions,
-                log_probs: &log_probs,
-                values: &output.values,
-                rewards: &rewards,
-                terminated: &terminated,
-                truncated: &truncated,
-                final_values: &policy.values(&z, &last, envs).expect("finite"),
-            };
-            rollout.push_step(step).expect("continuous");
+            tick.add_to(&mut rollout, (&obs).into(), &z, &output.values);
             for row in 0..envs {
-                if truncated[row] && !terminated[row] {
+                if tick.truncated[row] && !tick.terminated[row] {
                     let obs = &last[row * OBS..(row + 1) * OBS];
                     rollout.push_cut(row, obs, &self.skills[row].z).expect("vectors");
                 }
-                if truncated[row] || terminated[row] {
-                    self.reached.push(terminated[row]);
+                if tick.is_done(row) {
+                    self.reached.push(tick.terminated[row]);
                     (self.points[row], self.skills[row].left) = (Point::new(&mut self.rngs[row]), 0);
                 }
             }
         }
-        let (obs, z) = (self.observe(), self.z());
-        rollout.next_values = policy.values(&z, &obs, envs).expect("finite");
         if let Some(source) = &source {
             rollout.ends.next_left = self.shares_left(source);
             rollout.ends.cut_left = vec![1.0; rollout.ends.cut_rows.len()];
         }
-        (rollout.ends.next_obs, rollout.ends.next_z) = (obs.into(), z);
+        (rollout.ends.next_obs, rollout.ends.next_z) = (self.observe().into(), self.z());
+        rollout.bootstrap(&policy).expect("they fit");
         rollout
     }
 

@@ -1,10 +1,11 @@
 //! A task whose state is a picture, and a driver that plays it.
 
+use crate::tick::Tick;
 use playbot_learner::nn::CnnKind;
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
 use playbot_learner::{
     Action, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Learner, ObsKind, Observations,
-    PpoConfig, Rollout, RolloutStep, SkillConfig, SkillDraw, SkillModel, SkillTrainer,
+    PpoConfig, Rollout, SkillConfig, SkillDraw, SkillModel, SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -144,37 +145,21 @@ impl Driver {
         for _ in 0..steps {
             let output = policy.forward(&self.skills, &obs, envs).expect("finite");
             let z = self.skills.clone();
-            let (mut actions, mut log_probs, mut rewards) = (Actions::empty(&SPACE), Vec::new(), Vec::new());
-            let (mut terminated, mut truncated) = (Vec::new(), Vec::new());
+            let mut tick = Tick::new(&SPACE);
             for (row, player) in self.players.iter_mut().enumerate() {
                 let (action, log_prob) = output.sample(row, &mut player.rng);
                 let hit = action == Action::Discrete(player.quarter);
                 player.time += 1;
                 player.draw_picture();
-                actions.push(&action).expect("discrete");
-                log_probs.push(log_prob);
-                rewards.push(f32::from(u8::from(hit)));
-                terminated.push(!hit);
-                truncated.push(hit && player.time == LIMIT);
+                tick.push(&action, log_prob, (f32::from(u8::from(hit)), !hit, hit && player.time == LIMIT));
                 self.hits.push(hit);
             }
-            let step = RolloutStep {
-                obs: obs.as_slice(),
-                z: &z,
-                actions: &actions,
-                log_probs: &log_probs,
-                values: &output.values,
-                rewards: &rewards,
-                terminated: &terminated,
-                truncated: &truncated,
-                final_values: &vec![0.0; envs],
-            };
-            rollout.push_step(step).expect("one kind");
+            tick.add_to(&mut rollout, obs.as_slice(), &z, &output.values);
             for (row, player) in self.players.iter_mut().enumerate() {
-                if truncated[row] {
+                if tick.truncated[row] {
                     rollout.push_cut(row, &player.pixels, &z[row * latent..(row + 1) * latent]).expect("images");
                 }
-                if truncated[row] || terminated[row] {
+                if tick.is_done(row) {
                     player.time = 0;
                     player.draw_picture();
                 }

@@ -28,5 +28,6 @@ mod score_sac;
 mod skill;
 mod spirl;
 mod switches;
+mod tick;
 mod toy;
 mod walkers;

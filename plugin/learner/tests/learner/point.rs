@@ -1,10 +1,11 @@
 //! PPO and SAC bring a point to a goal in the plane.
 
 use crate::field::{Field, HURRY, OBS, Point, SPACE};
+use crate::tick::Tick;
 use playbot_learner::rng::Streams;
 use playbot_learner::{
-    Actions, DeviceKind, EntropyCoef, Learner, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout, RolloutStep,
-    SacConfig, SacLearner, TimeLimit,
+    Action, DeviceKind, EntropyCoef, Learner, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig,
+    SacLearner, TimeLimit,
 };
 
 pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(OBS), latent: 0, action_space: SPACE };
@@ -18,20 +19,10 @@ pub fn recordings(episodes: u64) -> Vec<Rollout> {
             let obs = point.observe();
             let [x, y, to_x, to_y] = obs;
             let velocity = [to_x - x, to_y - y].map(|way| (5.0 * way).clamp(-1.0, 1.0));
-            let (reward, end, cut) = point.step(&HURRY, &velocity);
-            let step = RolloutStep {
-                obs: (&obs).into(),
-                z: &[],
-                actions: &Actions::Continuous { dim: 2, values: velocity.to_vec() },
-                log_probs: &[0.0],
-                values: &[0.0],
-                rewards: &[reward],
-                terminated: &[end],
-                truncated: &[cut],
-                final_values: &[0.0],
-            };
-            rollout.push_step(step).expect("continuous");
-            if end || cut {
+            let mut tick = Tick::new(&SPACE);
+            tick.push(&Action::Continuous(velocity.to_vec()), 0.0, point.step(&HURRY, &velocity));
+            tick.add_to(&mut rollout, (&obs).into(), &[], &[0.0]);
+            if tick.is_done(0) {
                 rollout.next_values = vec![0.0];
                 rollout.ends.next_obs = vec![0.0; OBS].into();
                 return rollout;
