@@ -184,3 +184,22 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     done(folder, &learn);
     assert!(kept[0].exists() && !kept[1].exists());
 }
+
+#[test]
+fn what_any_variant_lacks_is_said_before_the_first_one_begins() {
+    let folder = prepared();
+    let folder = folder.path();
+    let refuse = |variant: &str, words: &str| {
+        let text = TINY
+            .replace("(name: \"cloned\"", &format!("(name: \"late\", set: [{variant}]),\n        (name: \"cloned\""));
+        fs::write(folder.join("tiny.ron"), text).expect("writable");
+        refused(&study(folder, "runs", &[]), words);
+        let begun = fs::read_dir(folder.join("runs")).map_or(0, Iterator::count);
+        assert_eq!(begun, 0, "nothing is begun where {variant} does not work");
+    };
+    refuse(r#""demos=elsewhere""#, "elsewhere");
+    refuse(r#""algorithm=rlpd", "demos=elsewhere""#, "elsewhere");
+    refuse(r#""ppo.augment=[Translate(2)]""#, "changes images");
+    refuse(r#""skills.augment=[Cutout(0.5)]""#, "changes images");
+    refuse(r#""algorithm=spirl-sac", "skills.tanh_latent=false""#, "`skills.tanh_latent` is false");
+}

@@ -20,7 +20,7 @@ use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::
 /// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a
 /// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
-    experiment.check_actions(game.actions())?;
+    experiment.check_game(game)?;
     let demos = demonstrations(game, experiment, path)?;
     let observation_config = experiment.observation_config();
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
@@ -59,10 +59,22 @@ pub fn read_rollouts(
     Ok(rollouts?)
 }
 
+/// Whether the recordings of an experiment can be read, are of its game, and show no held-out level. Nothing is replayed.
+///
+/// # Errors
+///
+/// As [`read_demos`], but for what only a replay finds.
+pub fn check_demos(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<(), CliError> {
+    opened(game, experiment, path).map(drop)
+}
+
+fn opened(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Demonstrations, CliError> {
+    Demonstrations::of(game, experiment, path).map_err(|error| missing_demos::explain(error, game, experiment, path))
+}
+
 /// Opens recordings and begins to say what there is in them.
 fn demonstrations(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Demonstrations, CliError> {
-    let demos = Demonstrations::of(game, experiment, path)
-        .map_err(|error| missing_demos::explain(error, game, experiment, path))?;
+    let demos = opened(game, experiment, path)?;
     let (steps, episodes) = (demos.steps(), demos.episodes() as u64);
     begin_to_tell!("{} in {} from {}", counted(steps, "step"), counted(episodes, "episode"), path.display());
     if experiment.demo_steps.is_some_and(|wanted| wanted < steps) {

@@ -26,7 +26,7 @@ use super::{
     interrupt, open, output, program, progress,
     study_cost::cost_table,
     study_run::Runner,
-    train::rounded,
+    train::{never_learns, rounded},
 };
 
 /// Compare variants of an experiment over several seeds.
@@ -81,13 +81,17 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let trained = runs.iter().filter(|run| run.experiment.algorithm.is_trained());
     let lengths: BTreeSet<String> = trained.filter_map(|run| rounded(&run.experiment)).collect();
     lengths.iter().for_each(|words| tell!("{words}"));
+    let idle: BTreeSet<String> = runs
+        .iter()
+        .filter_map(|run| Some((&run.variant, never_learns(&run.experiment)?)))
+        .map(|(variant, words)| format!("{variant}: {words}"))
+        .collect();
+    idle.iter().for_each(|words| tell!("warning: {words}"));
     interrupt::listen();
     interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
     let mut runner = Runner::new(games, &args.from, &folder, args.force, args.compute.device(), args.compute.threads());
     runner.check_folders(&runs)?;
-    if args.force {
-        runner.check_demos(&runs)?;
-    }
+    runner.check_demos(&runs)?;
     let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
         tell!(
             "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
@@ -153,7 +157,7 @@ fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>,
 fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     for StudyRun { experiment, .. } in runs {
         let game = open::game(games, from, experiment)?;
-        experiment.check_levels(game)?;
+        experiment.check_game(game)?;
         experiment.check_memory(game)?;
     }
     Ok(())

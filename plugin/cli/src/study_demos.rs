@@ -6,13 +6,19 @@ use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{game::Game, games::Games, split::LevelSplit, train::Experiment};
 use playbot_learner::Dataset;
 
-use super::{error::CliError, experiment::ExperimentArgs, read_demos::read_demos};
+use super::{
+    error::CliError,
+    experiment::ExperimentArgs,
+    read_demos::{check_demos, read_demos},
+};
 
 /// Reads recordings, and keeps the last ones for the runs that share them.
 pub struct StudyDemos<'a> {
     games: &'a Games<'a>,
     from: &'a ExperimentArgs,
     threads: usize,
+    /// What was found to be readable.
+    checked: Vec<RecordingsKey>,
     /// What was read last.
     last: Option<(RecordingsKey, Dataset)>,
 }
@@ -31,7 +37,32 @@ struct RecordingsKey {
 
 impl<'a> StudyDemos<'a> {
     pub fn new(games: &'a Games<'a>, from: &'a ExperimentArgs, threads: usize) -> Self {
-        Self { games, from, threads, last: None }
+        Self { games, from, threads, checked: Vec::new(), last: None }
+    }
+
+    /// Whether the recordings of an experiment can be read; those that were looked at already are not opened again.
+    ///
+    /// # Errors
+    ///
+    /// They cannot be read, belong to another game, or show held-out levels.
+    pub fn check(&mut self, experiment: &Experiment) -> Result<(), CliError> {
+        let key = self.key(experiment)?;
+        if !self.checked.contains(&key) {
+            let path = self.from.recordings(experiment, self.games)?;
+            check_demos(self.games.get(&experiment.game)?, experiment, &path)?;
+            self.checked.push(key);
+        }
+        Ok(())
+    }
+
+    fn key(&self, experiment: &Experiment) -> Result<RecordingsKey, CliError> {
+        Ok(RecordingsKey {
+            game: experiment.game.clone(),
+            path: self.from.find_recordings(experiment.recordings()?, self.games),
+            held_out: experiment.test.clone(),
+            observation_config: experiment.observation_config(),
+            steps: experiment.demo_steps,
+        })
     }
 
     /// The recordings of an experiment.
@@ -40,13 +71,7 @@ impl<'a> StudyDemos<'a> {
     ///
     /// They cannot be read, belong to another game, or show held-out levels.
     pub fn read(&mut self, game: &dyn Game, experiment: &Experiment) -> Result<Dataset, CliError> {
-        let key = RecordingsKey {
-            game: experiment.game.clone(),
-            path: self.from.find_recordings(experiment.recordings()?, self.games),
-            held_out: experiment.test.clone(),
-            observation_config: experiment.observation_config(),
-            steps: experiment.demo_steps,
-        };
+        let key = self.key(experiment)?;
         match &self.last {
             Some((known, dataset)) if *known == key => Ok(dataset.clone()),
             _ => {

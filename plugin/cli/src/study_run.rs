@@ -125,16 +125,27 @@ impl<'a> Runner<'a> {
         Ok(Some((result, curve)))
     }
 
-    /// Reads the demonstrations of all runs that learn skills, so that nothing is replaced if one cannot be read.
+    /// Opens the demonstrations of all runs that have yet to learn from some, so that nothing is begun, let alone replaced, if
+    /// those of another cannot be read.
     ///
     /// # Errors
     ///
     /// Recordings cannot be read, belong to another game, or show held-out levels.
     pub fn check_demos(&mut self, runs: &[StudyRun]) -> Result<(), CliError> {
-        for StudyRun { experiment, .. } in runs.iter().filter(|run| run.experiment.algorithm.needs_skills()) {
-            self.demos.read(self.games.get(&experiment.game)?, experiment)?;
+        for run in runs {
+            if self.wants_demos(run)? {
+                self.demos.check(&run.experiment)?;
+            }
         }
         Ok(())
+    }
+
+    /// Whether a run has yet to learn from recordings.
+    fn wants_demos(&self, run: &StudyRun) -> Result<bool, CliError> {
+        let algorithm = run.experiment.algorithm;
+        let is_measured = !self.force && self.folder.join(run.id()).join(RESULT).exists();
+        let has_skills = algorithm.needs_skills() && !self.force && self.skill_file(run)?.exists();
+        Ok(algorithm.learns_from_demos() && !is_measured && !has_skills)
     }
 
     /// Looks at the folders of all runs that are there, so that nothing is begun if one of them is in use, or is no run

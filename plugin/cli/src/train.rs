@@ -28,7 +28,7 @@ use super::{
 use bevy_playbot::unknown_name::UnknownName;
 use repeated::resumed;
 
-pub use length::rounded;
+pub use length::{never_learns, rounded};
 
 /// Train a policy, headless, over the experiment's training levels.
 #[derive(clap::Args)]
@@ -118,6 +118,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 pub fn tell_length(experiment: &Experiment) {
     if let Some(words) = rounded(experiment) {
         tell!("{words}");
+    }
+    if let Some(words) = never_learns(experiment) {
+        tell!("warning: {words}");
     }
 }
 

@@ -1,6 +1,9 @@
 //! How long a training is, in words.
 
-use playbot_lab::{report::whole, train::Experiment};
+use playbot_lab::{
+    report::whole,
+    train::{Experiment, LearnerKind},
+};
 
 use crate::number::counted;
 
@@ -14,6 +17,29 @@ pub fn rounded(experiment: &Experiment) -> Option<String> {
             counted(experiment.updates(), "update"),
             whole(experiment.steps_per_update() as f64),
             whole(trained as f64)
+        )
+    })
+}
+
+/// What is to be said of a training that is over before it learns; nothing of others.
+pub fn never_learns(experiment: &Experiment) -> Option<String> {
+    let algorithm = experiment.algorithm;
+    if algorithm.learner() != LearnerKind::Sac || !algorithm.is_trained() {
+        return None;
+    }
+    // Policies over skills learn from skills, not from ticks.
+    let (held, what) = match algorithm.learns_prior() {
+        true => (experiment.score.horizon as u64, "skills"),
+        false => (1, "steps"),
+    };
+    let (starts, seen) = (experiment.sac.learning_starts, experiment.whole_steps() / held);
+    (seen < starts).then(|| {
+        format!(
+            "nothing will be learned: {algorithm} begins to learn after {} {what} (`sac.learning_starts`), and {} steps \
+             are {} of them at most; train for longer, or set it lower",
+            whole(starts as f64),
+            whole(experiment.whole_steps() as f64),
+            whole(seen as f64),
         )
     })
 }
@@ -39,5 +65,23 @@ mod tests {
         assert_eq!(said(1).as_deref(), Some("1 step is rounded up to 1 update of 4,096: training for 4,096"));
         assert_eq!(said(4097).as_deref(), Some("4,097 steps are rounded up to 2 updates of 4,096: training for 8,192"));
         assert_eq!(said(8192), None);
+    }
+
+    #[test]
+    fn who_begins_to_learn_too_late_is_told() {
+        let said = |algorithm: &str, steps: u64| {
+            let text = format!(
+                r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: {steps}, algorithm: "{algorithm}", demos: "d",
+                arenas: 1, worlds: 1, sac: (num_steps: 100, learning_starts: 1000), score: (init_from_decoder: false, horizon: 4))"#
+            );
+            never_learns(&parse_experiment(&text, Path::new("x.ron")).expect("valid"))
+        };
+        let words = said("sac", 900).expect("too short");
+        assert!(words.contains("after 1,000 steps (`sac.learning_starts`), and 900 steps"), "{words}");
+        let words = said("spirl-sac", 3900).expect("too few skills");
+        assert!(words.contains("after 1,000 skills") && words.contains("3,900 steps are 975 of them"), "{words}");
+        for (algorithm, steps) in [("sac", 1000), ("spirl-sac", 4000), ("ppo", 900), ("bc", 900)] {
+            assert_eq!(said(algorithm, steps), None, "{algorithm}");
+        }
     }
 }

@@ -37,6 +37,18 @@ pub(super) struct Demonstration {
     pub(super) is_seen: bool,
 }
 
+impl Demonstration {
+    /// What is the same for all episodes of a level: mode and seed, or mode and the hash of the file that it is from, whose
+    /// number differs from recording to recording.
+    fn level(&self) -> (Arc<str>, Result<u64, u64>) {
+        let level = match &self.episode.level_file {
+            Some(file) => Err(file.hash),
+            None => Ok(self.episode.level_seed),
+        };
+        (self.mode.clone(), level)
+    }
+}
+
 impl Demonstrations {
     /// Reads all recordings of a game below a path.
     ///
@@ -171,13 +183,20 @@ impl Demonstrations {
             };
             episodes.push(LearnerEpisode { observations, actions: learner_actions(&demo.episode) });
         }
-        Ok(Dataset::new(self.observation_config.obs_kind(game), game.actions(), episodes)?)
+        let dataset = Dataset::new(self.observation_config.obs_kind(game), game.actions(), episodes)?;
+        Ok(dataset.with_levels(self.levels())?)
+    }
+
+    /// For each episode the index of the first one of the same level.
+    fn levels(&self) -> Vec<usize> {
+        let mut first = BTreeMap::new();
+        self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(demo.level()).or_insert(i)).collect()
     }
 
     /// For each episode the index of the first one that is the same game from beginning to end.
     pub(super) fn originals(&self) -> Vec<usize> {
         let mut first = BTreeMap::new();
-        let key = |demo: &Demonstration| (demo.mode.clone(), demo.episode.level_seed, bits(&demo.episode.actions));
+        let key = |demo: &Demonstration| (demo.level(), bits(&demo.episode.actions));
         self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(key(demo)).or_insert(i)).collect()
     }
 
@@ -235,7 +254,27 @@ pub(super) fn learner_actions(episode: &DemoEpisode) -> Actions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy_playbot::demo::file::DemoActions;
+    use bevy_playbot::{demo::file::DemoActions, level_files::LevelFile};
+
+    #[test]
+    fn levels_from_files_are_told_apart_by_what_is_in_them() {
+        let demo = |index, level_seed, hash: Option<u64>| Demonstration {
+            file: Path::new("a.demo").into(),
+            index,
+            mode: "plain".into(),
+            episode: Arc::new(DemoEpisode {
+                level_file: hash.map(|hash| LevelFile { path: "a.json".to_owned(), hash }),
+                ..DemoEpisode::new(level_seed, DemoActions::Discrete(2))
+            }),
+            is_seen: false,
+        };
+        // Each recording counts its files from 0.
+        let levels = [(0, None), (1, None), (0, None), (0, Some(5)), (0, Some(6)), (3, Some(5))];
+        let episodes = levels.into_iter().enumerate().map(|(i, (seed, hash))| demo(i, seed, hash)).collect();
+        let all = Demonstrations { observation_config: ObservationConfig::default(), episodes };
+        assert_eq!(all.levels(), [0, 1, 0, 3, 4, 3]);
+        assert_eq!(all.originals(), [0, 1, 0, 3, 4, 3], "all of them were left before their first action");
+    }
 
     #[test]
     fn what_is_kept_is_drawn_from_all_episodes_and_levels() {

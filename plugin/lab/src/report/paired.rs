@@ -1,6 +1,7 @@
 //! Whether one method is better than another: differences on the same levels with the same seeds.
 
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::statistics::mean_and_sd;
 
@@ -48,9 +49,23 @@ impl PairedDifference {
         Some(Self { mean: all, se: (squares / (seeds * levels) as f64).sqrt(), levels, seeds })
     }
 
-    /// Whether it is further from 0 than two standard errors.
-    pub fn is_clear(&self) -> bool {
-        self.mean.abs() > 2.0 * self.se
+    /// How probable a difference this far from 0 or further would be if there were none: Student's t with one degree of freedom
+    /// less than there are seeds. `None` with one seed, of which nothing follows for others.
+    ///
+    /// Differences that vary more from level to level than from seed to seed have more degrees of freedom than that, so that
+    /// it errs on the side of caution.
+    pub fn p_value(&self) -> Option<f64> {
+        let freedom = self.seeds.checked_sub(1).filter(|&freedom| freedom > 0)? as f64;
+        if self.se == 0.0 {
+            return Some(if self.mean == 0.0 { 1.0 } else { 0.0 });
+        }
+        let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
+        Some(2.0 * student.sf(self.mean.abs() / self.se))
+    }
+
+    /// Whether there is a difference by [`Self::p_value`], at 5 %; `None` where that says nothing.
+    pub fn is_clear(&self) -> Option<bool> {
+        self.p_value().map(|p| p < 0.05)
     }
 }
 
@@ -66,6 +81,7 @@ mod tests {
         // Differences 2, 1 and 6: squares 14 over n - 1 = 2 and n = 3.
         assert_eq!((difference.mean, difference.levels, difference.seeds), (3.0, 3, 1));
         assert!((difference.se - (14.0f64 / 6.0).sqrt()).abs() < 1e-12, "{difference:?}");
+        assert_eq!((difference.p_value(), difference.is_clear()), (None, None), "of other seeds it says nothing");
     }
 
     #[test]
@@ -74,35 +90,59 @@ mod tests {
         let easier = hard.map(|x| x + 0.5);
         let difference = PairedDifference::of(&[&easier, &easier], &[&hard, &hard]).expect("paired");
         assert_eq!((difference.mean, difference.se), (0.5, 0.0));
-        assert!(difference.is_clear());
+        assert_eq!(difference.is_clear(), Some(true));
+    }
+
+    /// The differences of two methods that do equally well, drawn again and again: deviations of seeds, levels and the rest.
+    fn of_equals(seeds: usize, levels: usize, deviations: [f64; 3], tries: usize) -> Vec<PairedDifference> {
+        let mut rng = Streams::new(3).stream("paired", 0);
+        let mut draw = |size: f64| size * f64::from(normal(&mut rng));
+        let zeros = vec![0.0; levels];
+        let mut once = || {
+            let of_level: Vec<f64> = (0..levels).map(|_| draw(deviations[1])).collect();
+            let rows: Vec<Vec<f64>> = (0..seeds)
+                .map(|_| {
+                    let seed = draw(deviations[0]);
+                    of_level.iter().map(|level| seed + level + draw(deviations[2])).collect()
+                })
+                .collect();
+            let one: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+            PairedDifference::of(&one, &vec![zeros.as_slice(); seeds]).expect("paired")
+        };
+        (0..tries).map(|_| once()).collect()
     }
 
     #[test]
     fn the_error_is_the_deviation_of_the_mean() {
         // Seeds deviate by 1, levels by 2, the rest by 3: the variance of the mean is 1/4 + 4/40 + 9/160.
-        let (seeds, levels) = (4, 40);
-        let mut rng = Streams::new(3).stream("paired", 0);
-        let mut draw = |size: f64| size * f64::from(normal(&mut rng));
-        let (mut squares, mut told) = (0.0, 0.0);
-        let tries = 2000;
-        for _ in 0..tries {
-            let of_level: Vec<f64> = (0..levels).map(|_| draw(2.0)).collect();
-            let rows: Vec<Vec<f64>> = (0..seeds)
-                .map(|_| {
-                    let seed = draw(1.0);
-                    of_level.iter().map(|level| seed + level + draw(3.0)).collect()
-                })
-                .collect();
-            let zeros = vec![0.0; levels];
-            let one: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-            let difference = PairedDifference::of(&one, &vec![zeros.as_slice(); seeds]).expect("paired");
-            squares += difference.mean.powi(2);
-            told += difference.se.powi(2);
-        }
-        let variance = 0.25 + 0.1 + 0.05625;
-        let (found, told) = (squares / f64::from(tries), told / f64::from(tries));
-        assert!((found / variance - 1.0).abs() < 0.1, "{found}");
+        let found = of_equals(4, 40, [1.0, 2.0, 3.0], 2000);
+        let mean = |value: fn(&PairedDifference) -> f64| found.iter().map(value).sum::<f64>() / found.len() as f64;
+        let (variance, squares, told) = (0.25 + 0.1 + 0.05625, mean(|d| d.mean.powi(2)), mean(|d| d.se.powi(2)));
+        assert!((squares / variance - 1.0).abs() < 0.1, "{squares}");
         assert!((told / variance - 1.0).abs() < 0.1, "{told}");
+    }
+
+    #[test]
+    fn equals_are_told_apart_in_one_of_twenty_studies_at_most() {
+        for (seeds, deviations) in
+            [(2, [1.0, 0.5, 1.0]), (3, [1.0, 0.1, 0.5]), (5, [1.0, 0.1, 0.5]), (3, [0.1, 1.0, 2.0])]
+        {
+            let found = of_equals(seeds, 30, deviations, 4000);
+            let wrong = found.iter().filter(|difference| difference.is_clear() == Some(true)).count() as f64 / 4000.0;
+            // Three standard errors of a share of 5 % in 4,000.
+            assert!(wrong < 0.05 + 0.0104, "{seeds} seeds that deviate by {deviations:?}: {wrong}");
+        }
+        // Two standard errors, for any number of seeds, would be wrong far more often.
+        let wrong = of_equals(3, 30, [1.0, 0.1, 0.5], 4000).iter().filter(|d| d.mean.abs() > 2.0 * d.se).count();
+        assert!(wrong > 600, "{wrong}");
+    }
+
+    #[test]
+    fn what_is_there_is_found() {
+        let found = PairedDifference { mean: 2.776, se: 1.0, levels: 9, seeds: 5 };
+        assert!((found.p_value().expect("five seeds") - 0.05).abs() < 1e-4, "the table of Student's t");
+        let nearer = PairedDifference { mean: -2.7, ..found };
+        assert_eq!((nearer.is_clear(), PairedDifference { mean: -2.8, ..found }.is_clear()), (Some(false), Some(true)));
     }
 
     #[test]

@@ -16,21 +16,27 @@ impl StudyReport {
         let rows: Vec<Vec<String>> = paired
             .map(|(other, found)| {
                 let words = match (found.is_clear(), found.mean > 0.0) {
-                    (false, _) => "no difference that is clear",
-                    (true, true) => "clearly above",
-                    (true, false) => "clearly below",
+                    (None, _) => "not to be told from one seed",
+                    (Some(false), _) => "no difference that is clear",
+                    (Some(true), true) => "clearly above",
+                    (Some(true), false) => "clearly below",
                 };
+                let p = found.p_value().map_or(UNKNOWN.to_owned(), |p| match p < 0.001 {
+                    true => "< 0.001".to_owned(),
+                    false => fixed(p, 3),
+                });
                 let [levels, seeds] = [found.levels, found.seeds].map(|count| count.to_string());
-                vec![other.to_owned(), mean_and_error(found.mean, found.se, 2), levels, seeds, words.to_owned()]
+                vec![other.to_owned(), mean_and_error(found.mean, found.se, 2), levels, seeds, p, words.to_owned()]
             })
             .collect();
         if rows.is_empty() {
             return String::new();
         }
-        let headings = ["other", "difference", "levels", "seeds", &format!("{first} is")];
+        let headings = ["other", "difference", "levels", "seeds", "p", &format!("{first} is")];
         format!(
             "The held-out return of **{first}** less that of each other variant, on the same levels and with the same seeds. ± is \
-             the standard error over levels and seeds; what is further from 0 than two of them is called clear.\n\n{}\n",
+             the standard error over levels and seeds; p is Student's t with one degree of freedom less than there are seeds, and \
+             below 0.05 the difference is called clear.\n\n{}\n",
             markdown_table(&headings, rows.into_iter())
         )
     }

@@ -48,7 +48,7 @@ impl StudyReport {
              over the seeds {}. Training figures are those of the last 100 episodes; the steps are those until their \
              success rate first was {}.",
             experiment.train,
-            fixed(experiment.steps as f64, 0),
+            fixed(experiment.whole_steps() as f64, 0),
             experiment.test,
             seeds.join(", "),
             rate_cell(experiment.study.threshold),

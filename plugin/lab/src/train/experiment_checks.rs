@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use playbot_learner::ActionSpace;
-
 use super::{
+    Algorithm,
     config::{Experiment, LearnerKind},
     experiment_error::{ExperimentError, refuse, settings},
 };
-use crate::{game::Game, held_out::HeldOut, split::LevelSplit};
 
 impl Experiment {
     /// Checks what single values cannot say.
@@ -59,67 +57,9 @@ impl Experiment {
             return refuse("observation", format!("{:?}", self.observation), why);
         }
         self.check_normalisers()?;
+        self.check_what_sac_lacks()?;
         self.check_skill_draws()?;
         self.check_batches()
-    }
-
-    /// Checks that the game has the modes, and that no held-out level is trained on, be it by another name
-    /// ([`Game::family`], [`Game::fingerprint`]).
-    ///
-    /// # Errors
-    ///
-    /// [`ExperimentError`] with the levels.
-    pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        self.check_train(game)?;
-        self.check_test(game)?;
-        match HeldOut::new(game, &self.test).first_of(&self.train) {
-            Some(level) => {
-                let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
-                Err(ExperimentError::Leak { train, level, test })
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// Checks that the game has the mode of the training levels.
-    ///
-    /// # Errors
-    ///
-    /// [`ExperimentError::Mode`].
-    pub fn check_train(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        check_mode("train", &self.train, game)
-    }
-
-    /// Checks that the game has the mode of the held-out levels.
-    ///
-    /// # Errors
-    ///
-    /// [`ExperimentError::Mode`].
-    pub fn check_test(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        check_mode("test", &self.test, game)
-    }
-
-    /// Checks what goes with the game's actions, before hours are spent on skills.
-    ///
-    /// # Errors
-    ///
-    /// [`ExperimentError`] with the key to change.
-    pub fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
-        self.skills.check_space(space).map_err(settings)?;
-        if !(self.algorithm.needs_skills() && self.algorithm.is_trained()) {
-            return Ok(());
-        }
-        self.score.check_space(space).map_err(settings)?;
-        let squashed = match self.algorithm.learner() {
-            LearnerKind::Ppo => false,
-            LearnerKind::Sac => matches!(space, ActionSpace::Continuous(_)) && !self.algorithm.learns_prior(),
-        };
-        if squashed && self.score.init_from_decoder {
-            let why = "SAC squashes continuous actions, so its policy cannot start as a copy of the decoder; set it to \
-                       false (the penalty still ties the two together)";
-            return refuse("score.init_from_decoder", true, why);
-        }
-        Ok(())
     }
 
     /// The demonstrations.
@@ -158,15 +98,32 @@ impl Experiment {
         Ok(())
     }
 
+    /// Settings of SCORE that only PPO has.
+    fn check_what_sac_lacks(&self) -> Result<(), ExperimentError> {
+        if self.algorithm != Algorithm::ScoreSac {
+            return Ok(());
+        }
+        if self.score.critic_clock {
+            return refuse("score.critic_clock", true, "is for PPO's critic; SAC's have no clock");
+        }
+        match self.score.kl_coef_end {
+            Some(end) => {
+                refuse("score.kl_coef_end", end, "is for PPO; with SAC the penalty keeps its weight, `score.kl_coef`")
+            }
+            None => Ok(()),
+        }
+    }
+
     fn check_batches(&self) -> Result<(), ExperimentError> {
         let (arenas, worlds) = (u64::from(self.arenas), u64::from(self.worlds));
         if !arenas.is_multiple_of(worlds) {
             let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
             return refuse("worlds", worlds, why);
         }
+        // A decoder that goes on learning does so by PPO, whatever learns the skills above it.
         match self.algorithm.learner() {
-            LearnerKind::Ppo => self.check_minibatches(arenas),
-            LearnerKind::Sac => Ok(()),
+            LearnerKind::Sac if !(self.algorithm == Algorithm::SpirlSac && self.spirl.learn_decoder) => Ok(()),
+            _ => self.check_minibatches(arenas),
         }
     }
 
@@ -180,16 +137,6 @@ impl Experiment {
         }
         Ok(())
     }
-}
-
-fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result<(), ExperimentError> {
-    let example = game.modes().first().copied().unwrap_or_default();
-    levels.check(game).map_err(|source| ExperimentError::Mode {
-        key,
-        levels: Box::new(levels.clone()),
-        source: Box::new(source),
-        example,
-    })
 }
 
 /// The divisor of `n` nearest to `wanted`, the larger one of two.
@@ -229,6 +176,29 @@ mod tests {
     }
 
     #[test]
+    fn what_only_ppo_has_is_refused_for_sac() {
+        let sac = r#"algorithm: "score-sac", demos: "d""#;
+        for (changes, key) in
+            [("critic_clock: true", "score.critic_clock"), ("kl_coef_end: Some(0.0)", "score.kl_coef_end")]
+        {
+            let text = check(&format!("{sac}, score: ({changes})")).expect_err("does nothing");
+            assert!(text.starts_with(&format!("`{key}` is ")) && text.contains("PPO"), "{text}");
+            assert_eq!(check(&format!(r#"demos: "d", score: ({changes})"#)), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_decoder_that_goes_on_learning_has_minibatches() {
+        let spirl = |learn| {
+            format!(
+                r#"algorithm: "spirl-sac", demos: "d", ppo: (num_steps: 64, minibatches: 7), spirl: (learn_decoder: {learn})"#
+            )
+        };
+        assert_eq!(check(&spirl(false)), Ok(()));
+        assert!(check(&spirl(true)).expect_err("7 divides nothing").contains("`ppo.minibatches` is 7"));
+    }
+
+    #[test]
     fn nobody_plays_nowhere() {
         // Not with the learning rate that cannot fall over no updates.
         let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("nobody");
@@ -264,26 +234,6 @@ mod tests {
             assert_eq!(check(&format!("{frozen}, {changes}")), Ok(()), "{changes}");
         }
         assert_eq!(check(r#"demos: "d", ppo: (norm_obs: true), score: (init_from_decoder: false)"#), Ok(()));
-    }
-
-    #[test]
-    fn actions_are_checked_before_skills_are_learned() {
-        let check = |changes: &str, space| {
-            let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, demos: "d", {changes})"#);
-            let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
-            experiment.check_actions(space).map_err(|error| error.to_string())
-        };
-        for (changes, words) in [
-            ("skills: (action_noise: 0.2)", "action_noise"),
-            ("score: (penalty: LegacyCoinrun)", "LegacyCoinrun is for discrete actions only"),
-            (r#"algorithm: "score-sac""#, "`score.init_from_decoder` is true: SAC squashes"),
-        ] {
-            let text = check(changes, ActionSpace::Continuous(8)).expect_err(changes);
-            assert!(text.contains(words), "{text}");
-            assert_eq!(check(changes, ActionSpace::Discrete(3)), Ok(()), "{changes}");
-        }
-        let untied = r#"algorithm: "sac", score: (penalty: LegacyCoinrun)"#;
-        assert_eq!(check(untied, ActionSpace::Continuous(8)), Ok(()));
     }
 
     #[test]

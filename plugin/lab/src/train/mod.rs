@@ -16,6 +16,7 @@ mod cut_episodes;
 pub mod default_experiment;
 mod experiment_checks;
 mod experiment_error;
+mod experiment_fit;
 pub mod json_lines;
 pub mod learner;
 mod memory;

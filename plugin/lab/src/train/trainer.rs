@@ -247,7 +247,7 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
         return Err(Fault(problem).into());
     }
     experiment.check()?;
-    experiment.check_levels(game)?;
+    experiment.check_game(game)?;
     experiment.observation_config().check(game)?;
     Ok(experiment.check_memory(game)?)
 }

@@ -25,16 +25,30 @@ impl SacLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
-        update_on(&self.base.device.plain(), || self.update_here(rollout))
+        update_on(&self.base.device.plain(), || {
+            self.check_rollout(rollout)?;
+            if let Some(normalizer) = &mut self.base.rewards {
+                normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
+            }
+            self.update_here(rollout)
+        })
+    }
+
+    /// [`Self::update`] from rewards whose spread is known already: those of skills were taken in tick by tick.
+    pub(crate) fn update_of_known_spread(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
+        update_on(&self.base.device.plain(), || {
+            self.check_rollout(rollout)?;
+            self.update_here(rollout)
+        })
+    }
+
+    fn check_rollout(&self, rollout: &Rollout) -> Result<(), LearnError> {
+        rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
+        check_ends(rollout)
     }
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
         let base = &mut self.base;
-        rollout.check_for(&base.spec, base.rollout_latent())?;
-        check_ends(rollout)?;
-        if let Some(normalizer) = &mut base.rewards {
-            normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
-        }
         if let Some(normalizer) = &mut base.observations {
             normalizer.update(rollout.obs.as_slice().vectors("SAC")?);
         }

@@ -22,6 +22,8 @@ pub struct Dataset {
     pub(super) observation: ObsKind,
     pub(super) space: ActionSpace,
     pub(super) episodes: Arc<[DemoEpisode]>,
+    /// The level of each episode.
+    pub(super) levels: Arc<[usize]>,
 }
 
 impl Dataset {
@@ -45,7 +47,19 @@ impl Dataset {
             episode.observations.as_slice().check(&what, &observation, episode.actions.len())?;
             space.check(&episode.actions)?;
         }
-        Ok(Self { observation, space, episodes: episodes.into() })
+        let levels = (0..episodes.len()).collect();
+        Ok(Self { observation, space, episodes: episodes.into(), levels })
+    }
+
+    /// Says which episodes were played on the same level, by any number that is the same for them: what
+    /// [`SkillConfig::held_out`](super::SkillConfig::held_out) keeps apart are whole levels then. Without it each episode counts
+    /// as a level.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] unless there is a number for each episode.
+    pub fn with_levels(self, levels: Vec<usize>) -> Result<Self, LearnError> {
+        LearnError::check("levels of episodes", self.episodes.len(), levels.len())?;
+        Ok(Self { levels: levels.into(), ..self })
     }
 
     /// What an observation is.

@@ -5,6 +5,7 @@ use crate::LearnError;
 use crate::nn::{host, tracked};
 use crate::rng::{Streams, shuffle};
 use burn::tensor::Tensor;
+use std::collections::BTreeSet;
 
 /// What a skill model makes of demonstrations that it has not learned from: means over their windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,7 +36,8 @@ pub(super) struct Best {
 }
 
 impl Dataset {
-    /// The episodes to learn from and those to keep apart, a share of all that is drawn from `streams`: at least one.
+    /// The episodes to learn from and those to keep apart: all episodes of a share of the levels, which is drawn from `streams`,
+    /// at least one. Episodes of the same level know much of each other, so that one learned from would tell of one kept apart.
     ///
     /// # Errors
     /// [`LearnError::Config`] if none would be left to learn from.
@@ -47,25 +49,30 @@ impl Dataset {
         if config.held_out == 0.0 {
             return Ok((self, None));
         }
-        let all = self.episodes.len();
+        let distinct: BTreeSet<usize> = self.levels.iter().copied().collect();
+        // Of a single level, episodes are all there is to choose from.
+        let groups = if distinct.len() > 1 { self.levels.to_vec() } else { (0..self.episodes.len()).collect() };
+        let mut order: Vec<usize> = groups.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
+        let (all, what) = (order.len(), if distinct.len() > 1 { "levels" } else { "episodes" });
         let count = ((config.held_out * all as f64).round() as usize).max(1);
         if count >= all {
             let text = format!(
-                "skill held_out keeps {count} of {all} episodes apart, so that none is left to learn from: record more, or \
-                 set it to 0"
+                "skill held_out keeps {count} of {all} {what} apart, so that none is left to learn from: record more, or set \
+                 it to 0"
             );
             return Err(LearnError::Config(text));
         }
-        let mut order: Vec<usize> = (0..all).collect();
         shuffle(&mut order, &mut streams.stream("skill.held_out", 0));
-        let some = |numbers: &[usize]| {
-            let mut numbers = numbers.to_vec();
-            numbers.sort_unstable();
-            Self { episodes: numbers.into_iter().map(|i| self.episodes[i].clone()).collect(), ..self.clone() }
+        let apart: BTreeSet<usize> = order[..count].iter().copied().collect();
+        let some = |is_apart: bool| {
+            let numbers = (0..groups.len()).filter(|&episode| apart.contains(&groups[episode]) == is_apart);
+            let (episodes, levels) =
+                numbers.map(|i| (self.episodes[i].clone(), self.levels[i])).unzip::<_, _, Vec<_>, Vec<_>>();
+            Self { episodes: episodes.into(), levels: levels.into(), ..self.clone() }
         };
-        let dataset = some(&order[..count]);
+        let dataset = some(true);
         let windows = dataset.windows(config.window, config.windows, streams, 0)?;
-        Ok((some(&order[count..]), Some(HeldOut { dataset, windows })))
+        Ok((some(false), Some(HeldOut { dataset, windows })))
     }
 }
 
@@ -84,6 +91,12 @@ impl SkillTrainer {
             sums.iter_mut().zip(numbers).for_each(|(sum, x)| *sum += f64::from(x) * windows.len() as f64);
         }
         let [loss, nll, kl] = sums.map(|sum| (sum / held_out.windows.len() as f64) as f32);
+        if !loss.is_finite() {
+            return Err(LearnError::NotFinite {
+                tensor: "the loss on demonstrations kept apart".to_owned(),
+                steps: None,
+            });
+        }
         if self.config.patience.is_some() && self.best.as_ref().is_none_or(|best| loss < best.loss) {
             self.best = Some(Best { epoch: self.epoch, loss, nets: crate::nn::frozen(&self.nets) });
         }

@@ -7,7 +7,7 @@ use crate::{DeviceKind, FileError, PpoLearner, SacLearner};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-const FILE: FileKind = FileKind { name: "spirl checkpoint", version: 1 };
+const FILE: FileKind = FileKind { name: "spirl checkpoint", version: 2 };
 
 /// The description in its header.
 #[derive(Serialize, Deserialize)]

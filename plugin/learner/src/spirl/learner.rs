@@ -2,7 +2,6 @@
 
 use super::SpirlConfig;
 use super::over_skills::{OverSkills, of_prior, tag_of_skills};
-use super::skill_steps::skill_rollout;
 use crate::learner::{Learner, LearnerBase, LearnerMetrics};
 use crate::policy::Policy;
 use crate::ppo::PpoConfig;
@@ -26,8 +25,8 @@ pub struct SpirlLearner {
 }
 
 impl SpirlLearner {
-    /// Learns skills of `model` by PPO. Of `score` counts how long they are held; `ppo.gamma` is per tick. There is no bonus
-    /// for entropy.
+    /// Learns skills of `model` by PPO. Of `score` counts how long they are held; `ppo.gamma` is per tick, and so is the discount
+    /// of the return by which rewards are scaled, whatever `ppo.reward_gamma` says. There is no bonus for entropy.
     ///
     /// # Errors
     /// [`LearnError::Config`] for settings that cannot work.
@@ -149,9 +148,8 @@ impl Learner for SpirlLearner {
     fn learn(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError> {
         let spec = self.spec();
         rollout.check_for(&spec, self.rollout_latent())?;
-        let skills = skill_rollout(rollout, self.over_skills.discount_of_tick())?;
         let kl_coef = self.kl_coef()?;
-        let of_skills = self.over_skills.learn(&self.config, skills)?;
+        let of_skills = self.over_skills.learn(&self.config, rollout)?;
         let of_skills = of_skills.into_iter().filter_map(|(tag, value)| Some((tag_of_skills(tag)?, value)));
         let mut scalars: Vec<_> = of_skills.chain([("spirl/kl_coef", kl_coef)]).collect();
         if let Some(below) = &mut self.below {

@@ -1,9 +1,11 @@
 //! What learns π(z | s): PPO or SAC, tied to the prior.
 
 use super::SpirlConfig;
+use super::skill_steps::{SkillRollout, skill_rollout};
 use crate::file::TensorFile;
 use crate::learner::Learner;
 use crate::nn::unsquashed_action;
+use crate::norm::RewardNormalizer;
 use crate::policy::Policy;
 use crate::score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig, Teacher};
 use crate::skill::{Prior, SkillDraw};
@@ -55,28 +57,64 @@ impl OverSkills {
         gamma.powf(1.0 / self.teacher().config.horizon as f64)
     }
 
-    /// Learns π(z | s) from a rollout of skills; gives what there is to report, by other names than what acts reports.
+    /// Learns π(z | s) from a rollout of ticks; gives what there is to report, by other names than what acts reports.
     pub(super) fn learn(
         &mut self,
         config: &SpirlConfig,
-        mut skills: Rollout,
+        rollout: &Rollout,
     ) -> Result<Vec<(&'static str, f64)>, LearnError> {
+        let (gamma, horizon) = (self.discount_of_tick(), self.teacher().config.horizon);
         let tanh = self.teacher().description.config.tanh_latent;
         match self {
-            Self::Sac(learner) => Ok(learner.update(&skills)?.scalars()),
+            Self::Sac(learner) => {
+                // Its buffer keeps rewards as they were: they are scaled when they are read.
+                scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
+                let skills = skill_rollout(rollout, &rollout.rewards, gamma, horizon)?;
+                Ok(learner.update_of_known_spread(&skills.rows)?.scalars())
+            }
             Self::Ppo(learner) => {
+                let rewards = scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
+                let SkillRollout { rows: mut skills, discounts } = skill_rollout(rollout, &rewards, gamma, horizon)?;
                 if let (true, Actions::Continuous { values, .. }) = (tanh, &mut skills.actions) {
                     // PPO knows no squashing: its actions are the normal numbers whose tanh the decoder reads.
                     values.iter_mut().for_each(|z| *z = unsquashed_action(*z));
                 }
                 score_rows(&mut skills, &learner.policy())?;
-                let metrics = learner.update(&skills)?;
-                if let (Some(kl), Some(teacher)) = (metrics.decoder_kl, &mut learner.base.teacher) {
+                discount_cuts(&mut skills, &discounts, learner.config().gamma);
+                let is_warming_up = learner.updates() < learner.config().critic_warmup;
+                let normalizer = learner.base.rewards.take();
+                let metrics = learner.update(&skills);
+                learner.base.rewards = normalizer;
+                let metrics = metrics?;
+                // While only the critic learns, the policy stays where it is whatever that costs.
+                if let (Some(kl), Some(teacher), false) = (metrics.decoder_kl, &mut learner.base.teacher, is_warming_up)
+                {
                     teacher.config.kl_coef = config.tuned(teacher.config.kl_coef, f64::from(kl));
                 }
                 Ok(metrics.scalars())
             }
         }
+    }
+}
+
+/// The rewards of all ticks by the spread of the return, whose discount is per tick: that of an environment goes on from rollout
+/// to rollout. As they are without a normaliser.
+fn scaled(normalizer: Option<&mut RewardNormalizer>, gamma: f64, rollout: &Rollout) -> Result<Vec<f32>, LearnError> {
+    match normalizer {
+        Some(normalizer) => {
+            normalizer.gamma = gamma;
+            normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)
+        }
+        None => Ok(rollout.rewards.clone()),
+    }
+}
+
+/// Makes up for a discount that is the same for every skill: what comes behind one that was cut off after k ticks is discounted
+/// by γᵏ, not by `gamma`, that of a whole one.
+fn discount_cuts(skills: &mut Rollout, discounts: &[f64], gamma: f64) {
+    for &row in &skills.ends.cut_rows {
+        let value = f64::from(skills.final_values[row]);
+        skills.rewards[row] += ((discounts[row] - gamma) * value) as f32;
     }
 }
 
@@ -131,4 +169,45 @@ pub(super) fn tag_of_skills(tag: &'static str) -> Option<&'static str> {
         "score/decoder_kl" => "spirl/prior_kl",
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ActionSpace;
+
+    #[test]
+    fn returns_go_on_from_rollout_to_rollout() {
+        let rollout = Rollout {
+            steps: 3,
+            rewards: vec![1.0, 0.0, 2.0, -1.0, 0.5, 3.0],
+            terminated: vec![false, false, false, true, false, false],
+            truncated: vec![false; 6],
+            ..Rollout::new(2, 1, 1, &ActionSpace::Discrete(2))
+        };
+        // As if both had been one.
+        let mut whole = RewardNormalizer::new(0.9);
+        whole.normalize(&rollout.rewards.repeat(2), &rollout.done().repeat(2), 2).expect("it fits");
+        // Whatever discount the learner of skills has made it with.
+        let mut normalizer = RewardNormalizer::new(0.9f64.powi(8));
+        for _ in 0..2 {
+            scaled(Some(&mut normalizer), 0.9, &rollout).expect("it fits");
+        }
+        assert_eq!(normalizer, whole);
+        assert!(normalizer.returns.iter().all(|g| *g != 0.0), "nothing ended with the rollout");
+        assert_eq!(scaled(None, 0.9, &rollout).expect("as they are"), rollout.rewards);
+    }
+
+    #[test]
+    fn what_was_cut_early_is_discounted_less() {
+        let mut skills = Rollout {
+            rewards: vec![1.0; 3],
+            final_values: vec![0.0, 4.0, 4.0],
+            ..Rollout::new(1, 1, 1, &ActionSpace::Continuous(1))
+        };
+        skills.ends.cut_rows = vec![1, 2];
+        discount_cuts(&mut skills, &[0.25, 0.5, 0.25], 0.25);
+        // Each row's target is reward + 0.25 times the value behind it: 1 + 0.5 * 4 in the middle, 1 + 0.25 * 4 in the last.
+        assert_eq!(skills.rewards, [1.0, 2.0, 1.0]);
+    }
 }

@@ -23,33 +23,52 @@ struct SkillStep {
     row: usize,
     /// Σ γᵗ r over its ticks.
     reward: f64,
+    /// γᵏ with k the ticks that it was played: what the state behind it is worth less.
+    discount: f64,
     after: After,
 }
 
+/// What a policy over skills learns from.
+#[derive(Debug)]
+pub(super) struct SkillRollout {
+    /// Each row is a skill.
+    pub(super) rows: Rollout,
+    /// γᵏ of each row with k the ticks that the skill was played: fewer than it is held where an episode ended.
+    pub(super) discounts: Vec<f64>,
+}
+
 /// The rollout as skills see it, in one environment: each row is a state in which a skill was drawn, the action is that skill
-/// (`Actions::Continuous`, as the decoder read it), and its reward what its ticks earned, discounted by `gamma`.
+/// (`Actions::Continuous`, as the decoder read it), and its reward what its ticks earned of `rewards`, discounted by `gamma`.
 ///
 /// The skills of an environment follow one another; behind its last one, and wherever an episode was cut off, the row counts as
-/// truncated with the state that came after among the ends. Skills that the beginning or the end of the rollout has cut are
-/// left out: the state in which the last one was drawn is the one after its predecessor. Log-probabilities and values are left
+/// truncated with the state that came after among the ends. What was drawn fewer than `horizon` ticks before the end of the
+/// rollout is left out however it ended, or else skills that end an episode would be learned from more often than those that do
+/// not: the state in which the first of them was drawn is the one after its predecessor. Log-probabilities and values are left
 /// at 0.
 ///
 /// # Errors
 /// [`LearnError::Shape`] or [`LearnError::Config`] if the rollout does not say when skills were drawn, or in none of its environments one was drawn and
 /// played to its end.
-pub(super) fn skill_rollout(rollout: &Rollout, gamma: f64) -> Result<Rollout, LearnError> {
+pub(super) fn skill_rollout(
+    rollout: &Rollout,
+    rewards: &[f32],
+    gamma: f64,
+    horizon: usize,
+) -> Result<SkillRollout, LearnError> {
     check_ends(rollout)?;
     LearnError::check("rollout left", rollout.rows(), rollout.left.len())?;
     LearnError::check("rollout ends next_left", rollout.envs, rollout.ends.next_left.len())?;
+    LearnError::check("rewards of skills", rollout.rows(), rewards.len())?;
     let latent = rollout.latent;
     let mut skills = Rollout { envs: 1, ..Rollout::new(1, rollout.obs_kind, 0, &ActionSpace::Continuous(latent)) };
-    let mut drawn = Vec::new();
+    let (mut drawn, mut discounts) = (Vec::new(), Vec::new());
     for env in 0..rollout.envs {
-        let steps = skill_steps(rollout, env, gamma);
+        let steps = skill_steps(rollout, rewards, env, gamma, horizon);
         for (i, step) in steps.iter().enumerate() {
             let next = steps.get(i + 1).map(|next| next.row);
             push(&mut skills, rollout, step, next)?;
             drawn.extend_from_slice(&rollout.z[step.row * latent..(step.row + 1) * latent]);
+            discounts.push(step.discount);
         }
     }
     if skills.steps == 0 {
@@ -61,24 +80,27 @@ pub(super) fn skill_rollout(rollout: &Rollout, gamma: f64) -> Result<Rollout, Le
     (skills.log_probs, skills.values, skills.final_values) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     skills.next_values = vec![0.0];
     skills.ends.next_obs.push(rollout.obs.row(0, rollout.obs_kind.numbers()))?;
-    Ok(skills)
+    Ok(SkillRollout { rows: skills, discounts })
 }
 
-/// The skills that an environment has played to their ends.
-fn skill_steps(rollout: &Rollout, env: usize, gamma: f64) -> Vec<SkillStep> {
-    let (mut steps, mut open): (Vec<SkillStep>, Option<(SkillStep, f64)>) = (Vec::new(), None);
-    let mut close = |open: &mut Option<(SkillStep, f64)>, after| {
-        steps.extend(open.take().map(|(step, _)| SkillStep { after, ..step }));
+/// The skills that an environment has played to their ends, of those that had the time for it.
+fn skill_steps(rollout: &Rollout, rewards: &[f32], env: usize, gamma: f64, horizon: usize) -> Vec<SkillStep> {
+    let (mut steps, mut open): (Vec<SkillStep>, Option<SkillStep>) = (Vec::new(), None);
+    let mut close = |open: &mut Option<SkillStep>, after| {
+        steps.extend(open.take().map(|step| SkillStep { after, ..step }));
     };
-    for row in (env..rollout.rows()).step_by(rollout.envs) {
+    for (tick, row) in (env..rollout.rows()).step_by(rollout.envs).enumerate() {
         // A skill that was drawn just now has all of its ticks left.
         if rollout.left[row] >= 1.0 {
             close(&mut open, After::Row(row));
-            open = Some((SkillStep { row, reward: 0.0, after: After::Nothing }, 1.0));
+            if tick + horizon > rollout.steps {
+                return steps;
+            }
+            open = Some(SkillStep { row, reward: 0.0, discount: 1.0, after: After::Nothing });
         }
-        if let Some((step, discount)) = &mut open {
-            step.reward += *discount * f64::from(rollout.rewards[row]);
-            *discount *= gamma;
+        if let Some(step) = &mut open {
+            step.reward += step.discount * f64::from(rewards[row]);
+            step.discount *= gamma;
         }
         if rollout.terminated[row] {
             close(&mut open, After::Nothing);
@@ -146,9 +168,14 @@ mod tests {
         rollout
     }
 
+    fn skills_of(rollout: &Rollout, horizon: usize) -> Result<SkillRollout, LearnError> {
+        skill_rollout(rollout, &rollout.rewards, 0.5, horizon)
+    }
+
     #[test]
     fn by_hand() {
-        let skills = skill_rollout(&rollout(1.0), 0.5).expect("there are some");
+        let SkillRollout { rows: skills, discounts } = skills_of(&rollout(1.0), 2).expect("there are some");
+        assert_eq!(discounts, [0.25, 0.5, 0.25, 0.5, 0.25], "the second and the fourth were played for one tick");
         skills.check().expect("it fits");
         assert_eq!(skills.obs, vec![1.0, 3.0, 4.0, 6.0, 7.0].into());
         assert_eq!(skills.rewards, [1.5, 1.0, 1.5, 1.0, 1.5]);
@@ -165,17 +192,33 @@ mod tests {
         (rollout.truncated[6], rollout.ends.cut_rows) = (false, Vec::new());
         rollout.ends.cut_obs.clear();
         rollout.ends.cut_z.clear();
-        let skills = skill_rollout(&rollout, 0.5).expect("there are some");
+        let skills = skills_of(&rollout, 2).expect("there are some").rows;
         assert_eq!(skills.obs, vec![1.0, 3.0, 4.0, 6.0].into());
         assert_eq!((skills.ends.cut_rows, skills.ends.cut_obs), (vec![3], vec![7.0].into()));
+    }
+
+    #[test]
+    fn skills_that_end_early_are_not_counted_more_often() {
+        let mut rollout = rollout(0.5);
+        // The last skill is drawn a tick before the end; a termination is all that could have ended it.
+        rollout.left = vec![0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5, 1.0];
+        (rollout.truncated[6], rollout.ends.cut_rows) = (false, Vec::new());
+        rollout.ends.cut_obs.clear();
+        rollout.ends.cut_z.clear();
+        for is_over in [false, true] {
+            rollout.terminated[8] = is_over;
+            let skills = skills_of(&rollout, 2).expect("there are some").rows;
+            assert_eq!(skills.obs, vec![1.0, 3.0, 4.0, 6.0].into());
+            assert_eq!((skills.ends.cut_rows, skills.ends.cut_obs), (vec![3], vec![8.0].into()), "what it might earn");
+        }
     }
 
     #[test]
     fn rollouts_without_a_whole_skill_are_refused() {
         let mut rollout = rollout(0.5);
         rollout.left = vec![0.5; 9];
-        assert!(skill_rollout(&rollout, 0.5).expect_err("none").to_string().contains("twice as long"));
+        assert!(skills_of(&rollout, 2).expect_err("none").to_string().contains("twice as long"));
         rollout.left.clear();
-        assert!(skill_rollout(&rollout, 0.5).expect_err("who knows").to_string().contains("left"));
+        assert!(skills_of(&rollout, 2).expect_err("who knows").to_string().contains("left"));
     }
 }

@@ -46,6 +46,31 @@ fn what_is_kept_apart_tells_learning_from_knowing_by_heart() {
 }
 
 #[test]
+fn whole_levels_are_kept_apart() {
+    // Each level is played ten times over, with the same random actions: whoever has seen one episode knows the others.
+    let mut rng = Streams::new(3).stream("coins", 0);
+    let mut once = || DemoEpisode {
+        observations: (0..30 * 6).map(|_| normal(&mut rng)).collect::<Vec<f32>>().into(),
+        actions: Actions::Discrete((0..30).map(|_| below(&mut rng, 3) as u32).collect()),
+    };
+    let levels: Vec<DemoEpisode> = (0..8).map(|_| once()).collect();
+    let episodes: Vec<DemoEpisode> = (0..80).map(|i| levels[i % 8].clone()).collect();
+    let demos = || Dataset::new(6, ActionSpace::Discrete(3), episodes.clone()).expect("consistent");
+    let last = |demos: Dataset| {
+        let mut trainer = trainer(SkillConfig { beta: 1.0, ..config() }, demos);
+        let metrics = (0..20).map(|_| epoch(&mut trainer)).last().expect("some");
+        metrics.held_out.expect("some are kept apart").loss - metrics.loss
+    };
+    let by_episode = last(demos());
+    assert!(by_episode < 0.3, "what is kept apart was learned: {by_episode}");
+    let by_level = last(demos().with_levels((0..80).map(|i| i % 8).collect()).expect("one each"));
+    assert!(by_level > 1.0, "what is kept apart is new: {by_level}");
+    // A single level has only episodes to choose from.
+    assert!(last(demos().with_levels(vec![7; 80]).expect("one each")) < 0.3);
+    assert!(demos().with_levels(vec![0; 79]).is_err());
+}
+
+#[test]
 fn learning_stops_in_time_and_the_best_model_is_kept() {
     let patient = SkillConfig { beta: 1.0, patience: Some(4), ..config() };
     let mut trainer = trainer(patient, coins());

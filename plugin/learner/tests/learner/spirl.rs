@@ -108,6 +108,17 @@ fn the_price_is_tuned_for_the_divergence_that_is_wanted() {
 }
 
 #[test]
+fn the_price_waits_until_the_policy_moves() {
+    let config = PpoConfig { critic_warmup: 3, ..ppo_config() };
+    let mut learner = SpirlLearner::ppo(SpirlConfig::default(), config, &score(), &MODEL, 1, DeviceKind::Flex)
+        .expect("good settings");
+    train(&mut learner, 3, 64);
+    assert_eq!(learner.kl_coef().expect("readable"), SpirlConfig::default().kl_coef);
+    train(&mut learner, 1, 64);
+    assert_ne!(learner.kl_coef().expect("readable"), SpirlConfig::default().kl_coef, "the first step is a short one");
+}
+
+#[test]
 fn the_decoder_learns_only_if_it_shall() {
     let obs = [0.1, 0.2, 0.3, 0.4];
     let head = |learner: &SpirlLearner| learner.policy().forward(&[0.5, -0.5], &obs, 1).expect("finite").head;

@@ -1,0 +1,139 @@
+//! Whether an experiment fits its game: levels, actions and observations.
+
+use playbot_learner::ActionSpace;
+
+use super::{
+    Algorithm,
+    config::{Experiment, LearnerKind},
+    experiment_error::{ExperimentError, refuse, settings},
+};
+use crate::{game::Game, held_out::HeldOut, sensors::GameSensors, split::LevelSplit};
+
+impl Experiment {
+    /// Checks what goes with the game's levels, actions and observations, before hours are spent on skills.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the key to change.
+    pub fn check_game(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        self.check_levels(game)?;
+        self.check_actions(game.actions())?;
+        self.check_observation(game)
+    }
+
+    /// Checks that the game has the modes, and that no held-out level is trained on, be it by another name
+    /// ([`Game::family`], [`Game::fingerprint`]).
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the levels.
+    pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        self.check_train(game)?;
+        self.check_test(game)?;
+        match HeldOut::new(game, &self.test).first_of(&self.train) {
+            Some(level) => {
+                let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
+                Err(ExperimentError::Leak { train, level, test })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that the game has the mode of the training levels.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Mode`].
+    pub fn check_train(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_mode("train", &self.train, game)
+    }
+
+    /// Checks that the game has the mode of the held-out levels.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Mode`].
+    pub fn check_test(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_mode("test", &self.test, game)
+    }
+
+    /// Whether the observations can be changed as `skills.augment` and `ppo.augment` say.
+    fn check_observation(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        let kind = self.observation_config().obs_kind(game);
+        if self.algorithm.needs_skills() {
+            self.skills.check_observation(kind).map_err(settings)?;
+        }
+        match self.algorithm.learner() {
+            LearnerKind::Ppo if self.algorithm.is_trained() => self.ppo.check_observation(&kind).map_err(settings),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks what goes with the game's actions.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the key to change.
+    pub fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
+        self.skills.check_space(space).map_err(settings)?;
+        if !(self.algorithm.needs_skills() && self.algorithm.is_trained()) {
+            return Ok(());
+        }
+        self.score.check_space(space).map_err(settings)?;
+        let squashed = match self.algorithm.learner() {
+            LearnerKind::Ppo => false,
+            LearnerKind::Sac => matches!(space, ActionSpace::Continuous(_)) && !self.algorithm.learns_prior(),
+        };
+        if squashed && self.score.init_from_decoder {
+            let why = "SAC squashes continuous actions, so its policy cannot start as a copy of the decoder; set it to \
+                       false (the penalty still ties the two together)";
+            return refuse("score.init_from_decoder", true, why);
+        }
+        if self.algorithm == Algorithm::SpirlSac && !self.skills.tanh_latent {
+            return refuse(
+                "skills.tanh_latent",
+                false,
+                "SAC squashes the skills that it draws: they must lie in -1..1",
+            );
+        }
+        Ok(())
+    }
+}
+
+fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result<(), ExperimentError> {
+    let example = game.modes().first().copied().unwrap_or_default();
+    levels.check(game).map_err(|source| ExperimentError::Mode {
+        key,
+        levels: Box::new(levels.clone()),
+        source: Box::new(source),
+        example,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::train::config_file::parse_experiment;
+
+    #[test]
+    fn actions_are_checked_before_skills_are_learned() {
+        let check = |changes: &str, space| {
+            let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, demos: "d", {changes})"#);
+            let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
+            experiment.check_actions(space).map_err(|error| error.to_string())
+        };
+        for (changes, words) in [
+            ("skills: (action_noise: 0.2)", "action_noise"),
+            ("score: (penalty: LegacyCoinrun)", "LegacyCoinrun is for discrete actions only"),
+            (r#"algorithm: "score-sac""#, "`score.init_from_decoder` is true: SAC squashes"),
+        ] {
+            let text = check(changes, ActionSpace::Continuous(8)).expect_err(changes);
+            assert!(text.contains(words), "{text}");
+            assert_eq!(check(changes, ActionSpace::Discrete(3)), Ok(()), "{changes}");
+        }
+        let untied = r#"algorithm: "sac", score: (penalty: LegacyCoinrun)"#;
+        assert_eq!(check(untied, ActionSpace::Continuous(8)), Ok(()));
+    }
+}
