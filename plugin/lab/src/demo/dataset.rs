@@ -38,14 +38,10 @@ pub(super) struct Demonstration {
 }
 
 impl Demonstration {
-    /// What is the same for all episodes of a level: mode and seed, or mode and the hash of the file that it is from, whose
-    /// number differs from recording to recording.
+    /// Mode and seed, or the hash of the file that it is from, whose number differs from recording to recording.
     fn level(&self) -> (Arc<str>, Result<u64, u64>) {
-        let level = match &self.episode.level_file {
-            Some(file) => Err(file.hash),
-            None => Ok(self.episode.level_seed),
-        };
-        (self.mode.clone(), level)
+        let Some(file) = &self.episode.level_file else { return (self.mode.clone(), Ok(self.episode.level_seed)) };
+        (self.mode.clone(), Err(file.hash))
     }
 }
 
@@ -256,44 +252,39 @@ mod tests {
     use super::*;
     use bevy_playbot::{demo::file::DemoActions, level_files::LevelFile};
 
-    #[test]
-    fn levels_from_files_are_told_apart_by_what_is_in_them() {
-        let demo = |index, level_seed, hash: Option<u64>| Demonstration {
+    fn all(episodes: impl Iterator<Item = DemoEpisode>) -> Demonstrations {
+        let demo = |(index, episode)| Demonstration {
             file: Path::new("a.demo").into(),
             index,
             mode: "plain".into(),
-            episode: Arc::new(DemoEpisode {
-                level_file: hash.map(|hash| LevelFile { path: "a.json".to_owned(), hash }),
-                ..DemoEpisode::new(level_seed, DemoActions::Discrete(2))
-            }),
+            episode: Arc::new(episode),
             is_seen: false,
         };
+        Demonstrations {
+            observation_config: ObservationConfig::default(),
+            episodes: episodes.enumerate().map(demo).collect(),
+        }
+    }
+
+    #[test]
+    fn levels_from_files_are_told_apart_by_what_is_in_them() {
         // Each recording counts its files from 0.
         let levels = [(0, None), (1, None), (0, None), (0, Some(5)), (0, Some(6)), (3, Some(5))];
-        let episodes = levels.into_iter().enumerate().map(|(i, (seed, hash))| demo(i, seed, hash)).collect();
-        let all = Demonstrations { observation_config: ObservationConfig::default(), episodes };
-        assert_eq!(all.levels(), [0, 1, 0, 3, 4, 3]);
-        assert_eq!(all.originals(), [0, 1, 0, 3, 4, 3], "all of them were left before their first action");
+        let demos = all(levels.into_iter().map(|(seed, hash)| DemoEpisode {
+            level_file: hash.map(|hash| LevelFile { path: "a.json".to_owned(), hash }),
+            ..DemoEpisode::new(seed, DemoActions::Discrete(2))
+        }));
+        assert_eq!(demos.levels(), [0, 1, 0, 3, 4, 3]);
+        assert_eq!(demos.originals(), [0, 1, 0, 3, 4, 3], "all of them were left before their first action");
     }
 
     #[test]
     fn what_is_kept_is_drawn_from_all_episodes_and_levels() {
-        let episode = |index: usize| {
-            let mut episode = DemoEpisode::new(index as u64 % 8, DemoActions::Discrete(2));
-            episode.state_hashes = vec![0; 10];
-            episode
-        };
-        let all = || Demonstrations {
-            observation_config: ObservationConfig::default(),
-            episodes: (0..80)
-                .map(|index| Demonstration {
-                    file: Path::new("a.demo").into(),
-                    index,
-                    mode: "plain".into(),
-                    episode: Arc::new(episode(index)),
-                    is_seen: false,
-                })
-                .collect(),
+        let all = || {
+            all((0..80).map(|index| DemoEpisode {
+                state_hashes: vec![0; 10],
+                ..DemoEpisode::new(index % 8, DemoActions::Discrete(2))
+            }))
         };
         let kept = |steps| all().at_most(steps).episodes.iter().map(|demo| demo.index).collect::<Vec<_>>();
         let part = kept(209);
