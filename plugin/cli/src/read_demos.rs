@@ -17,10 +17,10 @@ use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::
 ///
 /// # Errors
 ///
-/// The experiment does not go with the game's actions, a recording cannot be read, belongs to another game, shows a
+/// The experiment does not go with the game's actions or observations, a recording cannot be read, belongs to another game, shows a
 /// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
-    experiment.check_game(game)?;
+    experiment.check_agent(game)?;
     let demos = demonstrations(game, experiment, path)?;
     let observation_config = experiment.observation_config();
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));

@@ -40,18 +40,24 @@ impl<'a> StudyDemos<'a> {
         Self { games, from, threads, checked: Vec::new(), last: None }
     }
 
-    /// Whether the recordings of an experiment can be read; those that were looked at already are not opened again.
+    /// Whether the recordings of an experiment can be read and, with `replays`, replayed; those that were looked at already are
+    /// not opened again.
     ///
     /// # Errors
     ///
-    /// They cannot be read, belong to another game, or show held-out levels.
-    pub fn check(&mut self, experiment: &Experiment) -> Result<(), CliError> {
+    /// They cannot be read, belong to another game, show held-out levels, or do not replay.
+    pub fn check(&mut self, experiment: &Experiment, replays: bool) -> Result<(), CliError> {
         let key = self.key(experiment)?;
-        if !self.checked.contains(&key) {
-            let path = self.from.recordings(experiment, self.games)?;
-            check_demos(self.games.get(&experiment.game)?, experiment, &path)?;
-            self.checked.push(key);
+        if self.checked.contains(&key) {
+            return Ok(());
         }
+        let game = self.games.get(&experiment.game)?;
+        if replays {
+            self.read(game, experiment)?;
+        } else {
+            check_demos(game, experiment, &self.from.recordings(experiment, self.games)?)?;
+        }
+        self.checked.push(key);
         Ok(())
     }
 

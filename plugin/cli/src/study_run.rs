@@ -125,8 +125,8 @@ impl<'a> Runner<'a> {
         Ok(Some((result, curve)))
     }
 
-    /// Opens the demonstrations of all runs that have yet to learn from some, so that nothing is begun, let alone replaced, if
-    /// those of another cannot be read.
+    /// Opens the demonstrations of all runs that have yet to learn from some, so that nothing is begun if those of another cannot
+    /// be read; where runs are to be replaced, they are replayed, too.
     ///
     /// # Errors
     ///
@@ -134,7 +134,7 @@ impl<'a> Runner<'a> {
     pub fn check_demos(&mut self, runs: &[StudyRun]) -> Result<(), CliError> {
         for run in runs {
             if self.wants_demos(run)? {
-                self.demos.check(&run.experiment)?;
+                self.demos.check(&run.experiment, self.force)?;
             }
         }
         Ok(())

@@ -112,7 +112,7 @@ pub fn learn_skills(
     device: DeviceKind,
     threads: usize,
 ) -> Result<SkillModel, PipelineError> {
-    experiment.check_game(game)?;
+    experiment.check_agent(game)?;
     let dataset = Demonstrations::of(game, experiment, experiment.recordings()?)?.dataset(game, threads, |_| {})?;
     let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?;
     while trainer.epochs_done() < experiment.skills.epochs as u64 && !trainer.is_over() {

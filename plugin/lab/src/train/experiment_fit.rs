@@ -17,6 +17,15 @@ impl Experiment {
     /// [`ExperimentError`] with the key to change.
     pub fn check_game(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         self.check_levels(game)?;
+        self.check_agent(game)
+    }
+
+    /// Checks what goes with the game's actions and observations: all that matters where no level is played.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] with the key to change.
+    pub fn check_agent(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         self.check_actions(game.actions())?;
         self.check_observation(game)
     }
@@ -74,7 +83,7 @@ impl Experiment {
     /// # Errors
     ///
     /// [`ExperimentError`] with the key to change.
-    pub fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
+    fn check_actions(&self, space: ActionSpace) -> Result<(), ExperimentError> {
         self.skills.check_space(space).map_err(settings)?;
         if !(self.algorithm.needs_skills() && self.algorithm.is_trained()) {
             return Ok(());
