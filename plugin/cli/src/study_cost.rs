@@ -8,10 +8,12 @@ use std::{
 
 use playbot_lab::{
     report::markdown_table,
-    train::{run_dir::write_atomically, study::StudyRun},
+    train::{
+        sealed_file::{read_sealed, write_sealed},
+        study::StudyRun,
+    },
 };
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 use super::error::CliError;
 
@@ -53,14 +55,20 @@ impl CostClock {
             },
             wall_s: before.unwrap_or_default().wall_s + self.begun.elapsed().as_secs_f64(),
         };
-        Ok(write_atomically(&folder.join(COST), json!(cost).to_string().as_bytes())?)
+        Ok(write_sealed(&folder.join(COST), &cost)?)
     }
 }
 
 impl Cost {
-    /// What the run in `folder` has cost so far; `None` if nobody has noted it.
+    /// What the run in `folder` has cost so far; `None` if nobody has noted it, or the note is damaged.
     fn of(folder: &Path) -> Option<Self> {
-        serde_json::from_str(&fs::read_to_string(folder.join(COST)).ok()?).ok()
+        let file = folder.join(COST);
+        if !file.exists() {
+            return None;
+        }
+        read_sealed(&file)
+            .inspect_err(|error| tracing::warn!("{error}; what the run has cost before is not known"))
+            .map_or(None, |(cost, _)| Some(cost))
     }
 }
 

@@ -17,13 +17,13 @@ use playbot_lab::{
         Experiment, Trainer,
         checkpoint::CheckpointChoice,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
-        run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, is_unstarted, write_atomically},
+        run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, is_unstarted},
         run_lock::RunLock,
+        sealed_file::{read_sealed, write_sealed},
         study::StudyRun,
     },
 };
 use playbot_learner::{DeviceKind, SkillModel};
-use serde_json::json;
 
 use super::{
     cloning::cloning,
@@ -100,8 +100,8 @@ impl<'a> Runner<'a> {
         let game = self.games.get(&run.experiment.game)?;
         let folder = self.folder.join(run.id());
         let is_saved = self.is_saved(run, &folder)?;
-        if is_saved && folder.join(RESULT).exists() {
-            return Ok(Some((read_result(&folder.join(RESULT))?, success_curve(&folder)?)));
+        if is_saved && let Some(result) = known_result(&folder.join(RESULT)) {
+            return Ok(Some((result, success_curve(&folder)?)));
         }
         fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
         let lock = RunLock::take(&folder)?;
@@ -121,7 +121,7 @@ impl<'a> Runner<'a> {
             training,
             test: TestResult::from(&measured.summary),
         };
-        write_atomically(&folder.join(RESULT), json!(result).to_string().as_bytes())?;
+        write_sealed(&folder.join(RESULT), &result)?;
         Ok(Some((result, curve)))
     }
 
@@ -289,9 +289,13 @@ fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
     Ok(RunCurves::read(run)?.curve(SUCCESS_RATE).to_vec())
 }
 
-fn read_result(path: &Path) -> Result<StudyResult, CliError> {
-    let text = fs::read_to_string(path).map_err(|error| io_error("read", path, &error))?;
-    serde_json::from_str(&text).map_err(|error| io_error("read", path, &error))
+/// The result of a run that was measured. A damaged one is measured again.
+fn known_result(path: &Path) -> Option<StudyResult> {
+    if !path.exists() {
+        return None;
+    }
+    let read = read_sealed(path).inspect_err(|error| tracing::warn!("{error}; the run is measured again"));
+    read.ok().map(|(result, _)| result)
 }
 
 fn io_error(action: &str, path: &Path, error: &impl ToString) -> CliError {

@@ -152,6 +152,14 @@ pub enum FileError {
         /// How it can be had again, if that is known, behind a colon.
         advice: &'static str,
     },
+    /// The checksum in the file is not that of its contents.
+    #[error("{path}: the file is damaged: its checksum is not that of its contents{advice}")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// How it can be had again, if that is known, behind a colon.
+        advice: &'static str,
+    },
     /// The file was written by a newer version of this program.
     #[error(
         "{path}: was written by a newer version of playbot ({kind} format {found}, this one reads {readable}): update \
@@ -223,10 +231,11 @@ pub enum FileError {
 }
 
 impl FileError {
-    /// This error, with how the file can be had again if it is cut off.
+    /// This error, with how the file can be had again if it is cut off or damaged.
     pub(crate) fn or_again(self, advice: &'static str) -> Self {
         match self {
             Self::CutOff { path, .. } => Self::CutOff { path, advice },
+            Self::Damaged { path, .. } => Self::Damaged { path, advice },
             other => other,
         }
     }

@@ -58,7 +58,9 @@ pub(crate) use among_workers::are_awake;
 pub use among_workers::{among_awake_workers, among_workers, waited};
 pub use device::{DeviceKind, UnknownDevice};
 pub use error::{FileError, LearnError};
-pub use file::{write_atomically, write_atomically_with};
+pub use file::{
+    BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text, write_atomically, write_atomically_with,
+};
 pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;
 pub use observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureCard};

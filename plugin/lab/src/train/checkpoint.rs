@@ -15,10 +15,12 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 pub use super::checkpoint_choice::CheckpointChoice;
-use super::run_dir::{RunError, damaged, io_error, write_atomically};
+use super::{
+    run_dir::{RunError, io_error},
+    sealed_file::{read_sealed, write_sealed},
+};
 
 const PREFIX: &str = "step-";
 const SUMMARY: &str = "summary.json";
@@ -135,8 +137,7 @@ pub(super) fn write(
     let path = folder.join(format!("{PREFIX}{:012}", summary.step));
     remove_if_there(&fresh.path)?;
     fs::create_dir_all(&fresh.path).map_err(io_error("create", &fresh.path))?;
-    let filled =
-        fill(&fresh).and_then(|()| write_atomically(&fresh.path.join(SUMMARY), json!(summary).to_string().as_bytes()));
+    let filled = fill(&fresh).and_then(|()| write_sealed(&fresh.path.join(SUMMARY), &summary));
     if filled.is_err() {
         // Gives back the space; the first error is the one to report.
         let _ = remove_if_there(&fresh.path);
@@ -194,8 +195,7 @@ fn folder(run: &Path) -> PathBuf {
 }
 
 fn read_summary(path: &Path) -> Result<CheckpointSummary, RunError> {
-    let text = fs::read_to_string(path).map_err(io_error("read", path))?;
-    serde_json::from_str(&text).map_err(|error| damaged(path, &error))
+    read_sealed(path).map(|(summary, _)| summary)
 }
 
 fn remove_if_there(folder: &Path) -> Result<(), RunError> {
@@ -207,7 +207,7 @@ fn remove_if_there(folder: &Path) -> Result<(), RunError> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::run_dir::write_atomically, *};
 
     fn save(run: &Path, step: u64, episodic_return: f64, keep: usize) -> Result<(), RunError> {
         let summary = CheckpointSummary { step, episodic_return: Some(episodic_return), success_rate: None };

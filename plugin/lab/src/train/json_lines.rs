@@ -6,17 +6,20 @@ use std::{
     path::Path,
 };
 
+use playbot_learner::{seal_json, unseal_json};
 use serde_json::Value;
 
 /// One line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JsonLine {
-    /// Its text, without the line feed.
+    /// Its text as it is written, with its checksum, if it has one, and without the line feed.
     pub text: String,
     /// Its `step`.
     pub step: u64,
     /// What it says.
     pub value: Value,
+    /// Whether it has a checksum. Older versions wrote none.
+    pub had_seal: bool,
 }
 
 /// What a file of JSON lines holds.
@@ -24,8 +27,10 @@ pub struct JsonLine {
 pub struct JsonLines {
     /// The whole lines, in their order.
     pub lines: Vec<JsonLine>,
-    /// Numbers, from 1, of the lines that are no JSON or have no step: the last one after a crash.
+    /// Numbers, from 1, of the lines that are no JSON, have no step or another checksum.
     pub damaged: Vec<usize>,
+    /// Whether the last line has no end, as after a crash.
+    pub is_torn: bool,
 }
 
 impl JsonLines {
@@ -39,7 +44,7 @@ impl JsonLines {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             other => other?,
         };
-        let mut found = Self::default();
+        let mut found = Self { is_torn: bytes.last().is_some_and(|byte| *byte != b'\n'), ..Self::default() };
         for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
             match parse(line) {
                 Some(line) => found.lines.push(line),
@@ -52,18 +57,19 @@ impl JsonLines {
 
 fn parse(line: &[u8]) -> Option<JsonLine> {
     let text = String::from_utf8(line.to_vec()).ok()?;
-    let value: Value = serde_json::from_str(&text).ok()?;
-    Some(JsonLine { step: value["step"].as_u64()?, text, value })
+    let unsealed = unseal_json(&text).ok()?;
+    let value: Value = serde_json::from_str(&unsealed.text).ok()?;
+    Some(JsonLine { step: value["step"].as_u64()?, text, value, had_seal: unsealed.had_seal })
 }
 
-/// Appends one line with one write.
+/// Appends one line with its checksum, with one write.
 ///
 /// # Errors
 ///
 /// The operating system refuses.
 pub fn append_json_line(path: &Path, line: &Value) -> io::Result<()> {
     let mut file = OpenOptions::new().create(true).append(true).open(path)?;
-    file.write_all(format!("{line}\n").as_bytes())
+    file.write_all(format!("{}\n", seal_json(&line.to_string())).as_bytes())
 }
 
 #[cfg(test)]
@@ -83,7 +89,25 @@ mod tests {
         fs::write(&path, bytes).expect("writable");
         let read = JsonLines::read(&path).expect("readable");
         assert_eq!(read.lines.iter().map(|line| line.step).collect::<Vec<_>>(), [8, 16]);
-        assert_eq!(read.lines[0].text, r#"{"a":0.1,"step":8}"#);
+        assert_eq!((&read.lines[0].value, read.lines[0].had_seal), (&json!({ "step": 8, "a": 0.1 }), true));
+        assert!(!read.lines[1].had_seal && read.is_torn);
         assert_eq!(read.damaged, [3, 4], "without a step; torn within a character");
+    }
+    #[test]
+    fn no_flipped_bit_is_accepted() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.jsonl");
+        for step in [8, 16] {
+            append_json_line(&path, &json!({ "step": step, "charts/a": 0.25 })).expect("writable");
+        }
+        let whole = fs::read(&path).expect("written");
+        let lines = JsonLines::read(&path).expect("readable").lines;
+        for at in 0..(whole.len() - 1) * 8 {
+            let mut bytes = whole.clone();
+            bytes[at / 8] ^= 1 << (at % 8);
+            fs::write(&path, bytes).expect("writable");
+            let read = JsonLines::read(&path).expect("readable");
+            assert!(read.lines.iter().all(|line| lines.contains(line)) && !read.damaged.is_empty(), "bit {at}");
+        }
     }
 }

@@ -131,11 +131,25 @@ fn event(step: u64, metrics: &Value, timing: Option<&Value>) -> Event {
 
 /// Cuts a file behind `step`, and returns what is left.
 fn keep_until(path: &Path, step: u64) -> Result<Vec<(u64, Value)>, RunError> {
-    let mut lines = JsonLines::read(path).map_err(io_error("read", path))?.lines;
-    lines.retain(|line| line.step <= step);
+    let mut read = JsonLines::read(path).map_err(io_error("read", path))?;
+    read.lines.retain(|line| line.step <= step);
+    warn_of_damage(path, &read, step);
+    let lines = read.lines;
     let text: String = lines.iter().flat_map(|line| [&line.text, "\n"]).collect();
     write_atomically(path, text.as_bytes())?;
     Ok(lines.into_iter().map(|line| (line.step, line.value)).collect())
+}
+
+/// Names the damaged lines, which are left out, but for one that a kill tore behind `step`: that is written anew.
+fn warn_of_damage(path: &Path, read: &JsonLines, step: u64) {
+    let is_whole_until = read.lines.last().map_or(0, |line| line.step) == step;
+    let harmless = usize::from(read.is_torn && is_whole_until);
+    let damaged = &read.damaged[..read.damaged.len().saturating_sub(harmless)];
+    if !damaged.is_empty() {
+        let numbers: Vec<String> = damaged.iter().map(usize::to_string).collect();
+        let (lines, are) = if damaged.len() == 1 { ("line", "is") } else { ("lines", "are") };
+        tracing::warn!("{}: {lines} {} {are} damaged and left out", path.display(), numbers.join(", "));
+    }
 }
 
 #[cfg(test)]

@@ -31,6 +31,7 @@ mod ron_keys;
 pub mod run_dir;
 mod run_error;
 pub mod run_lock;
+pub mod sealed_file;
 pub mod study;
 pub mod tensorboard;
 mod train_error;

@@ -15,9 +15,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::DeviceKind;
+use playbot_learner::{DeviceKind, seal_text, unseal_text};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 use super::{
     arena_state::{ArenaState, restore_arenas, save_arenas},
@@ -30,19 +29,23 @@ use super::{
     passed_over::passed_over,
     progress::Progress,
     replaced_run::{ReplacedRun, is_free},
-    run_error::FOLDER,
+    run_error::{FOLDER, edited, unreadable},
     run_lock::RunLock,
+    sealed_file::{read_sealed, unsealed, warn_of_no_seal, write_sealed},
     train_error::TrainError,
     trainer::{self, Trainer},
     update_report::UpdateReport,
 };
 use crate::game::Game;
 
-pub(super) use super::run_error::{damaged, io_error, unreadable};
+pub(super) use super::run_error::{damaged, io_error};
 pub use super::{
     replaced_run::{check_replaceable, is_unstarted},
     run_error::RunError,
 };
+
+/// What a run trains.
+const EXPERIMENT: &str = "experiment.ron";
 
 /// Writes a file under a temporary name, flushes it to the disk and renames it: the old content or the new, never half.
 ///
@@ -129,10 +132,7 @@ impl RunDir {
         check_replaceable(&path)?;
         let run = Self { path: path.clone(), _lock: Some(lock) };
         let aside = ReplacedRun::put_aside(&path)?;
-        let written = run.write_experiment(experiment).and_then(|()| {
-            let text = json!(info).to_string();
-            write_atomically(&path.join("run.json"), text.as_bytes())
-        });
+        let written = run.write_experiment(experiment).and_then(|()| write_sealed(&path.join("run.json"), info));
         match written {
             Ok(()) => aside.remove(),
             Err(error) => {
@@ -150,10 +150,16 @@ impl RunDir {
     /// [`RunError::NoRun`] if there is none; another [`RunError`] if its files are damaged.
     pub fn open(path: &Path) -> Result<OpenedRun, RunError> {
         check_is_run(path)?;
-        let experiment = read_experiment(&path.join("experiment.ron"))?;
+        check_experiment_seal(&path.join(EXPERIMENT))?;
+        let experiment = read_experiment(&path.join(EXPERIMENT))?;
         let info_path = path.join("run.json");
-        let text = fs::read_to_string(&info_path).map_err(io_error("read", &info_path))?;
-        let info = serde_json::from_str(&text).map_err(|error| unreadable(&info_path, &error))?;
+        let (info, had_seal) = read_sealed(&info_path).map_err(|error| match error {
+            RunError::Damaged { path, message } => unreadable(&path, &message),
+            other => other,
+        })?;
+        if !had_seal {
+            warn_of_no_seal(&info_path);
+        }
         Ok(OpenedRun { run: Self { path: path.into(), _lock: None }, experiment, info })
     }
 
@@ -185,7 +191,7 @@ impl RunDir {
     /// [`RunError::Io`].
     pub fn write_experiment(&self, experiment: &Experiment) -> Result<(), RunError> {
         let text = experiment.to_ron().map_err(|error| damaged(&self.path, &error))?;
-        write_atomically(&self.path.join("experiment.ron"), text.as_bytes())
+        write_atomically(&self.path.join(EXPERIMENT), seal_text(&text).as_bytes())
     }
 
     /// The folder.
@@ -229,7 +235,7 @@ impl RunDir {
                 progress: trainer.progress.clone(),
                 arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
             };
-            write_atomically(&fresh.arenas_file(), json!(state).to_string().as_bytes())
+            write_sealed(&fresh.arenas_file(), &state)
         })
     }
 
@@ -288,8 +294,13 @@ fn read_checkpoint(
     device: DeviceKind,
 ) -> Result<(TrainedLearner, TrainState), RunError> {
     let learner = TrainedLearner::load(algorithm, &checkpoint.learner_file(), device)?;
-    let path = checkpoint.arenas_file();
-    let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
-    let state = serde_json::from_str(&text).map_err(|error| damaged(&path, &error))?;
+    let (state, _) = read_sealed(&checkpoint.arenas_file())?;
     Ok((learner, state))
+}
+
+/// Checks that the experiment of a run is the one that was written.
+fn check_experiment_seal(path: &Path) -> Result<(), RunError> {
+    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let read = unsealed(bytes, |text| unseal_text(text).map_err(|error| error.to_string()));
+    read.map(drop).map_err(|message| edited(path, &message))
 }

@@ -98,7 +98,18 @@ pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Err
 
 /// A file without which a run is none.
 pub(super) fn unreadable(path: &Path, error: &impl ToString) -> RunError {
-    RunError::Damaged { path: path.into(), message: format!("the file is damaged ({}): {MEND}", error.to_string()) }
+    let error = error.to_string();
+    let known = error.strip_prefix("the file is damaged: ").unwrap_or(&error);
+    RunError::Damaged { path: path.into(), message: format!("the file is damaged ({known}): {MEND}") }
+}
+
+/// The experiment of a run, which is not as it was written.
+pub(super) fn edited(path: &Path, message: &str) -> RunError {
+    let message = format!(
+        "{message}; the file is part of a run: {MEND}. If you have edited it, write the change as --set in a training of its \
+         own instead"
+    );
+    RunError::Damaged { path: path.into(), message }
 }
 
 pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {

@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::write_atomically_with;
+use playbot_learner::{seal_json, unseal_json, write_atomically, write_atomically_with};
 
 use super::{
     error::{TestError, io_error, json_fault},
@@ -75,7 +75,7 @@ impl TestFolder {
             clear_findings(path)?;
             journal.clear()?;
             let text = serde_json::to_string(record).map_err(io::Error::from);
-            let written = text.and_then(|text| write_atomically_with(&record_file, |file| write_line(file, &text)));
+            let written = text.and_then(|text| write_atomically(&record_file, seal_json(&text).as_bytes()));
             written.map_err(io_error("write", &record_file))?;
         }
         let message = (goes_on && cut > 0).then(|| {
@@ -114,10 +114,6 @@ impl TestFolder {
     }
 }
 
-fn write_line(out: &mut impl io::Write, text: &str) -> io::Result<()> {
-    writeln!(out, "{text}")
-}
-
 fn remove(file: &Path) -> Result<(), TestError> {
     match fs::remove_file(file) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", file)(error)),
@@ -127,11 +123,9 @@ fn remove(file: &Path) -> Result<(), TestError> {
 
 fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), TestError> {
     let text = fs::read_to_string(file).map_err(io_error("read", file))?;
-    let known: TestRecord = serde_json::from_str(&text).map_err(|error| TestError::Damaged {
-        path: file.into(),
-        line: error.line(),
-        message: json_fault(&error),
-    })?;
+    let damaged = |line, message| TestError::Damaged { path: file.into(), line, message };
+    let text = unseal_json(&text).map_err(|error| damaged(1, error.to_string()))?.text;
+    let known: TestRecord = serde_json::from_str(&text).map_err(|error| damaged(error.line(), json_fault(&error)))?;
     let mut differences = known.differences(record);
     if known.shard != record.shard {
         let words =

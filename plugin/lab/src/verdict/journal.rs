@@ -1,4 +1,4 @@
-//! `levels.jsonl`: finished levels as they come in.
+//! `levels.jsonl`: finished levels as they come in, each with a checksum.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -7,6 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_learner::{seal_json, unseal_json};
 use serde::Deserialize;
 
 use super::{
@@ -87,6 +88,7 @@ impl Journal {
     /// [`TestError::NotKept`].
     pub fn push(&mut self, verdict: &LevelVerdict) -> Result<(), TestError> {
         let written = serde_json::to_string(verdict).map_err(io::Error::from).and_then(|line| {
+            let line = seal_json(&line);
             self.file.write_all(format!("{line}\n").as_bytes())?;
             Ok(line.len())
         });
@@ -114,7 +116,7 @@ impl Journal {
             let mut line = vec![0; bytes];
             self.file.seek(SeekFrom::Start(start))?;
             self.file.read_exact(&mut line)?;
-            take(std::str::from_utf8(&line).map_err(io::Error::other)?)?;
+            take(&unsealed(&line).ok_or(io::ErrorKind::InvalidData)?)?;
         }
         self.file.seek(SeekFrom::Start(self.length)).map(drop)
     }
@@ -129,11 +131,16 @@ fn whole_lines(file: &mut File) -> io::Result<(BTreeMap<u64, (u64, usize)>, u64)
         line.clear();
         reader.read_until(b'\n', &mut line)?;
         let Some(text) = line.strip_suffix(b"\n") else { break };
-        let Ok(place) = serde_json::from_slice::<Place>(text) else { break };
+        let Some(place) = unsealed(text).and_then(|line| serde_json::from_str::<Place>(&line).ok()) else { break };
         lines.entry(place.index).or_insert((length, text.len()));
         length += line.len() as u64;
     }
     Ok((lines, length))
+}
+
+/// A line without its checksum; `None` if that is not the right one. Older versions wrote none.
+fn unsealed(line: &[u8]) -> Option<String> {
+    unseal_json(std::str::from_utf8(line).ok()?).ok().map(|line| line.text)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use crc32fast::Hasher;
 use serde_json::Value;
 
 use super::{
@@ -21,8 +22,13 @@ use super::{
 pub const RESULTS: &str = "results.json";
 /// Between what was tested and the first level.
 const LEVELS: &str = ",\"levels\":[";
-/// After the last level.
+/// After the last level, in files of older versions.
 const END: &str = "]}";
+
+/// After the last level, with the checksum of all bytes of the lines before.
+fn end(hasher: &Hasher) -> String {
+    format!("],\"crc32\":\"{:08x}\"}}", hasher.clone().finalize())
+}
 
 /// The folder of results that are named by it, or by the file in it.
 pub fn results_folder(named: &Path) -> &Path {
@@ -38,28 +44,37 @@ pub fn results_folder(named: &Path) -> &Path {
 pub(super) struct ResultWriter<W> {
     out: W,
     is_first: bool,
+    hasher: Hasher,
 }
 
 impl<W: Write> ResultWriter<W> {
     /// Begins with what was tested.
-    pub fn begin(mut out: W, record: &TestRecord) -> io::Result<Self> {
+    pub fn begin(out: W, record: &TestRecord) -> io::Result<Self> {
         let head = serde_json::to_string(record)?;
+        let mut results = Self { out, is_first: true, hasher: Hasher::new() };
         // The record is an object that is not empty, and goes on.
-        writeln!(out, "{}{LEVELS}", head.strip_suffix('}').unwrap_or(&head))?;
-        Ok(Self { out, is_first: true })
+        results.write(&format!("{}{LEVELS}\n", head.strip_suffix('}').unwrap_or(&head)))?;
+        Ok(results)
     }
 
     /// Adds a level, as a line of JSON without line feed.
     pub fn push(&mut self, line: &str) -> io::Result<()> {
         let separator = if self.is_first { "" } else { ",\n" };
         self.is_first = false;
-        write!(self.out, "{separator}{line}")
+        self.write(&format!("{separator}{line}"))
     }
 
     /// Ends the file.
     pub fn end(mut self) -> io::Result<()> {
         let line_feed = if self.is_first { "" } else { "\n" };
-        writeln!(self.out, "{line_feed}{END}")
+        self.write(line_feed)?;
+        let end = end(&self.hasher);
+        writeln!(self.out, "{end}")
+    }
+
+    fn write(&mut self, text: &str) -> io::Result<()> {
+        self.hasher.update(text.as_bytes());
+        self.out.write_all(text.as_bytes())
     }
 }
 
@@ -71,6 +86,8 @@ pub struct ResultLines {
     /// Lines read so far.
     number: usize,
     is_over: bool,
+    /// Of the lines read so far.
+    hasher: Hasher,
 }
 
 impl ResultLines {
@@ -88,6 +105,8 @@ impl ResultLines {
         })?;
         let mut lines = BufReader::new(file).lines();
         let head = lines.next().transpose().map_err(io_error("read", &path))?.unwrap_or_default();
+        let mut hasher = Hasher::new();
+        hash_line(&mut hasher, &head);
         let record = head.strip_suffix(LEVELS).map(|record| serde_json::from_str(&format!("{record}}}")));
         let record = match record {
             Some(Ok(record)) => record,
@@ -97,7 +116,7 @@ impl ResultLines {
                 return Err(TestError::Damaged { path, line: 1, message });
             }
         };
-        Ok(Self { path, record, lines, number: 1, is_over: false })
+        Ok(Self { path, record, lines, number: 1, is_over: false, hasher })
     }
 
     /// What was tested.
@@ -117,11 +136,18 @@ impl ResultLines {
         let line = self.lines.next().transpose().map_err(io_error("read", &self.path))?;
         self.number += 1;
         match line {
-            Some(line) if line == END => {
+            Some(line) if line == END || line == end(&self.hasher) => {
                 self.is_over = true;
                 Ok(None)
             }
-            Some(line) => Ok(Some(line.strip_suffix(',').unwrap_or(&line).to_owned())),
+            Some(line) if line.starts_with(']') => {
+                let message = "the file is damaged: its checksum is not that of its contents";
+                Err(self.damaged(message))
+            }
+            Some(line) => {
+                hash_line(&mut self.hasher, &line);
+                Ok(Some(line.strip_suffix(',').unwrap_or(&line).to_owned()))
+            }
             None => Err(self.damaged("the file ends in the middle")),
         }
     }
@@ -153,6 +179,11 @@ impl ResultLines {
     fn damaged(&self, message: &str) -> TestError {
         TestError::Damaged { path: self.path.clone(), line: self.number, message: message.to_owned() }
     }
+}
+
+fn hash_line(hasher: &mut Hasher, line: &str) {
+    hasher.update(line.as_bytes());
+    hasher.update(b"\n");
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The JSON in the header of a file: what kind of file it is, its version, and what else its reader needs.
 
 use super::TensorFile;
+use super::tensor_file::SEAL;
 use crate::FileError;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
@@ -37,8 +38,10 @@ impl TensorFile {
     /// The header without `kind` and `version`, if the file calls itself of this kind. That is looked at first, so that
     /// what a newer version added is not taken for a fault.
     pub(crate) fn header<T: DeserializeOwned>(&self, kind: FileKind) -> Result<T, FileError> {
-        let parse = |e: serde_json::Error| self.format(format!("description in the header: {e}"));
+        let parse = |e: serde_json::Error| self.format(format!("the description in its header cannot be used: {e}"));
         let mut header: serde_json::Map<String, Value> = serde_json::from_str(&self.description).map_err(parse)?;
+        // It was looked at when the file was read.
+        header.remove(SEAL);
         let identity =
             Value::Object(["kind", "version"].into_iter().filter_map(|key| header.remove_entry(key)).collect());
         self.check_kind(kind, &Identity::deserialize(&identity).map_err(parse)?)?;

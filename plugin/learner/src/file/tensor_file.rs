@@ -1,5 +1,6 @@
 //! Self-describing safetensors files: tensors by name, and a JSON description in the header.
 
+use super::seal::{Form, digits_of};
 use super::write_atomically;
 use crate::{FileError, LearnError};
 use safetensors::{Dtype, SafeTensorError, SafeTensors, tensor::TensorView};
@@ -9,6 +10,18 @@ use std::path::{Path, PathBuf};
 
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";
+
+/// The entry of the description that holds the checksum of the whole file, where its digits are zeros.
+pub(super) const SEAL: &str = "crc32";
+
+/// A file with a checksum begins so, behind the eight bytes that say how long the header is.
+const FORM: Form = Form { prefix: br#"{"__metadata__":{"playbot":"{\"crc32\":\""#, suffix: br#"\","# };
+
+/// What stands for a checksum that is not known yet.
+const NO_SUM: &[u8; 8] = b"00000000";
+
+/// Bytes that say how long the header is.
+const LENGTH: usize = 8;
 
 /// What to do with a file that something else has written.
 const FOREIGN: &str = "it is another file; name one that playbot has written";
@@ -83,9 +96,13 @@ impl TensorFile {
             .iter()
             .map(|(name, t)| TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|view| (name, view)))
             .collect();
-        let header = HashMap::from([(DESCRIPTION.to_owned(), self.description.clone())]);
+        let entries = self.description.trim_start_matches('{');
+        let header = HashMap::from([(DESCRIPTION.to_owned(), format!(r#"{{"{SEAL}":"00000000",{entries}"#))]);
         let bytes = views.and_then(|views| safetensors::serialize(views, Some(header)));
-        bytes.map_err(|e| self.format(e.to_string()))
+        let mut bytes = bytes.map_err(|e| self.format(e.to_string()))?;
+        let sum = digits_of(&bytes);
+        bytes[LENGTH..][FORM.place()].copy_from_slice(sum.as_bytes());
+        Ok(bytes)
     }
 
     /// Reads a whole file.
@@ -94,8 +111,10 @@ impl TensorFile {
         Self::parse(path, &bytes)
     }
 
-    /// Takes a whole file from memory; `path` is for messages.
+    /// Takes a whole file from memory; `path` is for messages. Its checksum is looked at before anything else, if it has one:
+    /// those that older versions wrote have none.
     pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
+        let is_whole = is_whole(bytes);
         let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
         let foreign = |error: SafeTensorError| match error {
             SafeTensorError::HeaderTooSmall
@@ -109,12 +128,26 @@ impl TensorFile {
             }
             error => format(format!("not safetensors ({error}): {FOREIGN}")),
         };
-        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(foreign)?;
+        let damaged = || FileError::Damaged { path: path.to_owned(), advice: "" };
+        let metadata = match SafeTensors::read_metadata(bytes).map_err(foreign) {
+            Err(FileError::CutOff { path, advice }) => return Err(FileError::CutOff { path, advice }),
+            _ if is_whole == Some(false) => return Err(damaged()),
+            metadata => metadata?.1,
+        };
         let description = metadata
             .metadata()
             .as_ref()
             .and_then(|map| map.get(DESCRIPTION).cloned())
             .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry: {FOREIGN}")))?;
+        if is_whole.is_none() {
+            if description.starts_with(r#"{"crc32"#) {
+                return Err(damaged());
+            }
+            tracing::warn!(
+                "{} was written by an older version and has no checksum: damage to it would not be seen",
+                path.display()
+            );
+        }
         let views = SafeTensors::deserialize(bytes).map_err(foreign)?;
         let tensors = views
             .iter()
@@ -223,5 +256,22 @@ impl TensorFile {
             return Err(self.format(detail));
         }
         Ok(stored.bytes)
+    }
+}
+
+/// Whether the checksum of a file is that of its bytes; `None` if it has none.
+fn is_whole(bytes: &[u8]) -> Option<bool> {
+    let header = bytes.get(LENGTH..).unwrap_or_default();
+    match FORM.digits(header) {
+        Ok(None) => None,
+        Err(_) => Some(false),
+        Ok(Some(sum)) => {
+            let place = FORM.place();
+            let mut hasher = crc32fast::Hasher::new();
+            for part in [&bytes[..LENGTH + place.start], NO_SUM, &header[place.end..]] {
+                hasher.update(part);
+            }
+            Some(hasher.finalize() == sum)
+        }
     }
 }

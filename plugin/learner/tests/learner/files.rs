@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 pub type Load = fn(&Path) -> Result<(), FileError>;
 
 /// A file of each kind, what reads it, and the name of a tensor in it.
-fn files(folder: &Path) -> Vec<(PathBuf, Load, &'static str)> {
+pub fn files(folder: &Path) -> Vec<(PathBuf, Load, &'static str)> {
     let paths = ["skill", "trainer", "ppo"].map(|name| folder.join(name));
     let model = model(1);
     model.save(&paths[0]).expect("written");
@@ -47,7 +47,10 @@ impl Contents {
     pub fn read(path: &Path) -> Self {
         let bytes = std::fs::read(path).expect("readable");
         let (_, header) = SafeTensors::read_metadata(&bytes).expect("safetensors");
-        let description = header.metadata().as_ref().expect("a description")["playbot"].clone();
+        let description = header.metadata().as_ref().expect("a description")["playbot"].as_str();
+        // A changed file is written as older versions wrote theirs, without a checksum.
+        let (_, rest) = description.split_once("\",").expect("a checksum first");
+        let description = format!("{{{rest}");
         let file = SafeTensors::deserialize(&bytes).expect("safetensors");
         let tensors = file
             .iter()

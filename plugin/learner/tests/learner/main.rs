@@ -5,6 +5,7 @@ mod augmentation;
 mod checkpoint;
 mod clock;
 mod corridor;
+mod damaged_files;
 mod determinism;
 mod errors;
 mod field;

@@ -1,12 +1,8 @@
 //! Files of scores.
 
-use std::{
-    fs,
-    io::{self, Write},
-    path::Path,
-};
+use std::{fs, io, path::Path};
 
-use playbot_learner::write_atomically_with;
+use playbot_learner::{seal_json, unseal_json, write_atomically};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -43,17 +39,16 @@ impl Score {
     ///
     /// The system refuses.
     pub fn write(&self, path: &Path) -> Result<(), ScoreError> {
-        let written = write_atomically_with(path, |file| {
-            let head = serde_json::to_string(&self.record)?;
-            let command = serde_json::to_string(&self.command)?;
-            let head = head.strip_suffix('}').unwrap_or(&head);
-            write!(file, "{head},\"command\":{command},\n\"subjects\":[")?;
-            write_lines(file, &self.subjects)?;
-            write!(file, "],\n\"jobs\":[")?;
-            write_lines(file, &self.jobs)?;
-            file.write_all(b"]}\n")
-        });
+        let written = self.text().and_then(|text| write_atomically(path, seal_json(&text).as_bytes()));
         written.map_err(io_error("write", path))
+    }
+
+    fn text(&self) -> io::Result<String> {
+        let head = serde_json::to_string(&self.record)?;
+        let head = head.strip_suffix('}').unwrap_or(&head);
+        let (subjects, jobs) = (lines(&self.subjects)?, lines(&self.jobs)?);
+        let command = serde_json::to_string(&self.command)?;
+        Ok(format!("{head},\"command\":{command},\n\"subjects\":[{subjects}],\n\"jobs\":[{jobs}]}}\n"))
     }
 
     /// Reads one.
@@ -65,6 +60,7 @@ impl Score {
         let text = fs::read_to_string(path).map_err(io_error("read", path))?;
         let no_score = |why: String| ScoreError::NoScore { path: path.into(), why };
         let of_json = |error: serde_json::Error| no_score(format!("line {}: {error}", error.line()));
+        let text = unseal_json(&text).map_err(|error| no_score(error.to_string()))?.text;
         let FormOnly { format } = serde_json::from_str(&text).map_err(of_json)?;
         if format != SCORE_FORMAT {
             return Err(no_score(format!("a score in form {format}, but this program reads form {SCORE_FORMAT}")));
@@ -73,12 +69,14 @@ impl Score {
     }
 }
 
-fn write_lines(file: &mut impl Write, items: &[impl Serialize]) -> io::Result<()> {
+/// JSON of some items, a line each.
+fn lines(items: &[impl Serialize]) -> serde_json::Result<String> {
+    let mut text = String::new();
     for (index, item) in items.iter().enumerate() {
-        let text = serde_json::to_string(item)?;
-        write!(file, "{}{text}", if index == 0 { "\n" } else { ",\n" })?;
+        text.push_str(if index == 0 { "\n" } else { ",\n" });
+        text.push_str(&serde_json::to_string(item)?);
     }
-    Ok(())
+    Ok(text)
 }
 
 #[cfg(test)]

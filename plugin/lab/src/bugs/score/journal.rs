@@ -7,6 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_learner::{Unsealed, seal_json, unseal_json};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -110,6 +111,7 @@ impl ScoreJournal {
 
     fn write(&mut self, line: &impl Serialize) -> Result<(), ScoreError> {
         let written = serde_json::to_string(line).map_err(io::Error::from).and_then(|line| {
+            let line = seal_json(&line);
             self.file.write_all(format!("{line}\n").as_bytes())?;
             Ok(line.len() as u64 + 1)
         });
@@ -133,16 +135,17 @@ impl ScoreJournal {
         loop {
             line.clear();
             reader.read_until(b'\n', &mut line).map_err(io_error("read", &self.path))?;
-            let Some(text) = line.strip_suffix(b"\n") else { break };
+            let Some(text) = line.strip_suffix(b"\n").and_then(|line| std::str::from_utf8(line).ok()) else { break };
+            let Ok(Unsealed { text, .. }) = unseal_json(text) else { break };
             if self.length == 0 {
-                let Ok(head) = serde_json::from_slice::<Head>(text) else { break };
+                let Ok(head) = serde_json::from_str::<Head>(&text) else { break };
                 let differences = head.record.differences(record);
                 if !differences.is_empty() {
                     return Err(ScoreError::OtherScore { path: score.into(), differences });
                 }
                 self.command = head.command;
             } else {
-                let Ok(result) = serde_json::from_slice::<JobResult>(text) else { break };
+                let Ok(result) = serde_json::from_str::<JobResult>(&text) else { break };
                 self.finished.insert((result.subject.clone(), result.tester.clone()), result);
             }
             self.length += line.len() as u64;

@@ -1,0 +1,74 @@
+//! Files with a checksum over what they say, see [`playbot_learner::seal_json`].
+
+use std::{fs, path::Path};
+
+use playbot_learner::{Unsealed, seal_json, unseal_json};
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::json;
+
+use super::run_error::{RunError, damaged, io_error};
+
+/// Writes a value, which must become a JSON object with an entry, and its checksum: whole or not at all.
+///
+/// # Errors
+///
+/// [`RunError::Io`].
+pub fn write_sealed(path: &Path, value: &impl Serialize) -> Result<(), RunError> {
+    let text = seal_json(&json!(value).to_string());
+    playbot_learner::write_atomically(path, text.as_bytes()).map_err(io_error("write", path))
+}
+
+/// Reads what [`write_sealed`] wrote, and whether it had a checksum: older versions wrote none.
+///
+/// # Errors
+///
+/// [`RunError::Io`], or [`RunError::Damaged`] with the line if it is no JSON of this kind.
+pub fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<(T, bool), RunError> {
+    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let Unsealed { text, had_seal } = unsealed(bytes, |text| unseal_json(text).map_err(|error| error.to_string()))
+        .map_err(|message| damaged(path, &message))?;
+    let value = serde_json::from_str(&text).map_err(|error| damaged(path, &error))?;
+    Ok((value, had_seal))
+}
+
+/// The text of a file, whose bytes may be no text any more.
+pub(super) fn unsealed(
+    bytes: Vec<u8>,
+    unseal: impl FnOnce(&str) -> Result<Unsealed, String>,
+) -> Result<Unsealed, String> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        format!("the file is damaged: it is no text from byte {} on", error.utf8_error().valid_up_to())
+    })?;
+    unseal(&text)
+}
+
+/// Says once of a run that nobody can tell whether its files are damaged.
+pub(super) fn warn_of_no_seal(path: &Path) {
+    tracing::warn!(
+        "{} was written by an older version and has no checksum: damage to it would not be seen",
+        path.display()
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damage_is_seen_and_older_files_are_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.json");
+        write_sealed(&path, &json!({ "step": 8 })).expect("writable");
+        let whole = fs::read(&path).expect("written");
+        assert_eq!(read_sealed::<serde_json::Value>(&path).expect("whole"), (json!({ "step": 8 }), true));
+        for at in 0..whole.len() * 8 {
+            let mut bytes = whole.clone();
+            bytes[at / 8] ^= 1 << (at % 8);
+            fs::write(&path, bytes).expect("writable");
+            let error = read_sealed::<serde_json::Value>(&path).expect_err("damaged").to_string();
+            assert!(error.contains("a.json: the file is damaged"), "{at}: {error}");
+        }
+        fs::write(&path, r#"{"step":9}"#).expect("writable");
+        assert_eq!(read_sealed::<serde_json::Value>(&path).expect("older"), (json!({ "step": 9 }), false));
+    }
+}
