@@ -78,7 +78,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["eval", "--bot", "random", "--levels", "easy:9..3"], "first level 9 is after last level 3; write easy:3..9"),
         (&["config", "show", "--set", "ppo.minibatches=7"], "64 × 128 = 8192; 8 does"),
         (&["config", "show", "--set", "arenas=0"], "`arenas=0`: must be at least 1"),
-        (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: ppo lr must be"),
+        (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: `ppo.lr` must be"),
         (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
         (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
         (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..127: unknown map `hard`"),

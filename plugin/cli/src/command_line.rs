@@ -120,7 +120,13 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             match usage_error::in_plain_words(&error) {
                 Some(words) => begin_to_tell!("{words}"),
                 None => {
-                    let _ = error.print();
+                    if let Err(refused) = error.print()
+                        && code == 0
+                        && refused.kind() != std::io::ErrorKind::BrokenPipe
+                    {
+                        tell!("error: cannot write to standard output: {refused}");
+                        return ExitCode::from(2);
+                    }
                 }
             }
             return ExitCode::from(code);

@@ -44,7 +44,9 @@ enum Verb {
 
 /// Checks what an experiment says of its game. Recordings may still be made.
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
-    experiment.check_game(open::game(games, from, experiment)?)?;
+    let game = open::game(games, from, experiment)?;
+    let checked = experiment.check_game(game).and_then(|()| experiment.check_memory(game));
+    checked.map_err(|error| from.locate(games, [], error))?;
     let algorithm = experiment.algorithm;
     let demos = experiment.demos.as_deref().filter(|_| algorithm.learns_from_demos());
     if let Some(path) = demos.filter(|path| !from.find_recordings(path, games).exists()) {

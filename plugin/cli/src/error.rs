@@ -29,6 +29,8 @@ use playbot_lab::{
 use playbot_learner::{FileError, LearnError};
 use thiserror::Error;
 
+use super::tell::without_controls;
+
 /// How a command that worked ended.
 pub enum Outcome {
     /// Nothing to complain about.
@@ -163,7 +165,7 @@ impl CliError {
             | Self::Unplayable(_)
             | Self::Vision(_)
             | Self::ObservationConfig(_)
-            | Self::Eval(EvalError::Vision(_))
+            | Self::Eval(EvalError::Vision(_) | EvalError::Memory(_))
             | Self::Export(ExportError::Vision(_) | ExportError::ObservationConfig(_)) => 3,
             Self::File(error) | Self::Export(ExportError::File(error)) => file_code(error),
             Self::Run(error) | Self::Runs(RunsError::Run(error)) => run_code(error),
@@ -266,7 +268,8 @@ fn train_code(error: &TrainError) -> u8 {
 /// [`CliError::BrokenPipe`] if nobody reads any more.
 pub fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
     use io::Write;
-    writeln!(io::stdout().lock(), "{line}").map_err(|error| match error.kind() {
+    let line = line.to_string();
+    writeln!(io::stdout().lock(), "{}", without_controls(&line)).map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
         _ => CliError::Io(format!("cannot write to standard output: {error}")),
     })

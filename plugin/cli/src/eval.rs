@@ -107,15 +107,15 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         experiment.check_test(game).map_err(or_levels)?;
     }
     splits.iter().try_for_each(|split| split.check(game))?;
+    // Not after some of it was measured.
+    let plan_of = |split| EvalPlan::of(&experiment, split, args.compute.threads());
+    splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
     let players = players(game, &experiment, &args, games)?;
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
         for Chosen { name, player, observation_config } in &players {
-            let plan = EvalPlan {
-                observation_config: *observation_config,
-                ..EvalPlan::of(&experiment, split, args.compute.threads())
-            };
+            let plan = EvalPlan { observation_config: *observation_config, ..plan_of(split) };
             let measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = methods::follow(game, name, player, &plan)?;

@@ -12,7 +12,7 @@ use playbot_lab::{
     train::{
         Experiment,
         config::ExperimentError,
-        config_file::{ConfigError, parse_experiment, parse_experiment_with, read_experiment_with},
+        config_file::{ConfigError, locate, parse_experiment, parse_experiment_with, read_experiment_with},
         default_experiment::default_experiment,
     },
 };
@@ -45,6 +45,24 @@ impl ExperimentArgs {
             None => {
                 let ExperimentText { origin, text } = default_experiment(games);
                 parse_experiment_with(&text, Path::new(&*origin), &sets)
+            }
+        }
+    }
+
+    /// What went wrong when an experiment that was [loaded](Self::load) met its game, with file, line and column of the key to
+    /// blame, or the `key=value` that is.
+    pub fn locate(
+        &self,
+        games: &Games,
+        options: impl IntoIterator<Item = Option<String>>,
+        error: ExperimentError,
+    ) -> ConfigError {
+        let sets = self.sets(options);
+        match &self.experiment {
+            Some(path) => locate(&std::fs::read_to_string(path).unwrap_or_default(), path, &sets, error),
+            None => {
+                let ExperimentText { origin, text } = default_experiment(games);
+                locate(&text, Path::new(&*origin), &sets, error)
             }
         }
     }

@@ -1,12 +1,20 @@
-//! Ctrl-C: the first one asks the running work to stop at the next good place, the second one stops at once.
+//! Ctrl-C: the first one asks the running work to stop at the next good place, the second one stops at once. Work that has no
+//! good place in time is stopped where it is: everything that was saved is whole, and the last of it goes on.
 
-use std::sync::{
-    Mutex, OnceLock, PoisonError,
-    atomic::{AtomicBool, Ordering},
+use std::{
+    sync::{
+        Mutex, OnceLock, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::Duration,
 };
 
 /// The exit code of work that was stopped, as shells have it: 128 and the number of the signal.
 pub const EXIT_CODE: u8 = 130;
+
+/// How long work may look for a good place to stop. Whoever asks waits for two seconds at most, some of which the end needs.
+const PATIENCE: Duration = Duration::from_millis(1600);
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static INSTALLED: OnceLock<()> = OnceLock::new();
@@ -24,7 +32,7 @@ impl Remains {
     fn words(&self) -> String {
         let left = self.left.as_deref().unwrap_or("what was not saved is lost");
         let command = self.command.as_ref().map_or_else(String::new, |command| format!(": go on with {command}"));
-        format!("stopped at once; {left}{command}")
+        format!("{left}{command}")
     }
 }
 
@@ -33,15 +41,24 @@ pub fn listen() {
     INSTALLED.get_or_init(|| {
         let installed = ctrlc::set_handler(|| {
             if ASKED.swap(true, Ordering::SeqCst) {
-                tell!("\n{}", REMAINS.lock().unwrap_or_else(PoisonError::into_inner).words());
-                std::process::exit(EXIT_CODE.into());
+                stop("stopped at once");
             }
-            tell!("\nstopping after this step; press Ctrl-C again to stop at once and lose it");
+            tell!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
+            thread::spawn(|| {
+                thread::sleep(PATIENCE);
+                stop("stopped within a step, which would have taken longer");
+            });
         });
         if let Err(error) = installed {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");
         }
     });
+}
+
+/// Ends the program where it is.
+fn stop(how: &str) -> ! {
+    tell!("\n{how}; {}", REMAINS.lock().unwrap_or_else(PoisonError::into_inner).words());
+    std::process::exit(EXIT_CODE.into())
 }
 
 /// Whether somebody asked to stop.
@@ -66,10 +83,10 @@ mod tests {
     #[test]
     fn the_last_words_say_what_is_left_and_how_to_go_on() {
         let nothing = Remains { left: None, command: None };
-        assert_eq!(nothing.words(), "stopped at once; what was not saved is lost");
+        assert_eq!(nothing.words(), "what was not saved is lost");
         let left = Some("the last checkpoint of a is that of step 81,920".to_owned());
         let saved = Remains { left, command: Some("`playbot train --run a --resume`".to_owned()) };
-        let words = "stopped at once; the last checkpoint of a is that of step 81,920: go on with \
+        let words = "the last checkpoint of a is that of step 81,920: go on with \
                      `playbot train --run a --resume`";
         assert_eq!(saved.words(), words);
     }

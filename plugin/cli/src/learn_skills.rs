@@ -69,6 +69,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         Some(demos) => demos.clone(),
         None => args.from.recordings(&experiment, games)?,
     };
+    experiment.check_skill_memory(game).map_err(|error| args.from.locate(games, [], error))?;
     prepare(&args.out)?;
     let dataset = read_demos(game, &experiment, &demos, args.compute.threads())?;
     if args.force {

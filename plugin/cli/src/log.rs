@@ -87,7 +87,9 @@ impl<S: Subscriber> Layer<S> for FilesOnce {
         let metadata = event.metadata();
         let is_repeated = match *metadata.level() {
             Level::ERROR => metadata.target().starts_with("bevy_asset"),
-            Level::WARN => metadata.target().starts_with("playbot_lab::train"),
+            Level::WARN => {
+                ["playbot_lab::train", "playbot_learner"].iter().any(|from| metadata.target().starts_with(from))
+            }
             _ => false,
         };
         if !is_repeated {

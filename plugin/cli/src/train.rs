@@ -127,6 +127,8 @@ pub fn tell_length(experiment: &Experiment) {
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = args.from.load(games, args.settings())?;
     let game = open::game(games, &args.from, &experiment)?;
+    let checked = experiment.check_game(game).and_then(|()| experiment.check_memory(game));
+    checked.map_err(|error| args.from.locate(games, args.settings(), error))?;
     let skills = match &args.skills {
         Some(path) => Some(open::skills(path, args.compute.device(), &args.from)?),
         None => None,

@@ -14,8 +14,13 @@ pub use blind::{CHAOS, blind_bots};
 pub use summary::{EvalSummary, error_over_levels, summarize};
 
 use crate::{
-    arrangement::Arrangement, ended_episodes::EndedEpisodes, game::Game, parallel::on_threads, split::LevelSplit,
-    train::Experiment, worlds::build_observing_world,
+    arrangement::Arrangement,
+    ended_episodes::EndedEpisodes,
+    game::Game,
+    parallel::on_threads,
+    split::LevelSplit,
+    train::{Experiment, config::ExperimentError, memory::check_bytes},
+    worlds::build_observing_world,
 };
 use bevy_playbot::{
     agent::Agent,
@@ -58,6 +63,9 @@ pub enum EvalError {
     /// The game broke its contract.
     #[error(transparent)]
     Fault(#[from] Fault),
+    /// There are more episodes than there is memory for.
+    #[error(transparent)]
+    Memory(#[from] ExperimentError),
 }
 
 impl Player {
@@ -121,6 +129,19 @@ impl EvalPlan {
             threads,
         }
     }
+
+    /// Checks that what comes of all episodes fits into the memory that is free.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Memory`].
+    pub fn check_memory(&self) -> Result<(), ExperimentError> {
+        let (levels, episodes) = (self.split.len(), u64::from(self.episodes_per_level));
+        // What came of each, and its number in the list of those to play.
+        let bytes = levels.saturating_mul(episodes).saturating_mul((size_of::<Trail>() + size_of::<u64>()) as u64);
+        let what = format!("the results of {levels} levels × {episodes} episodes");
+        check_bytes(what, bytes, "the number of levels, or `eval.episodes_per_level`")
+    }
 }
 
 /// One measured episode, and where it led.
@@ -173,6 +194,7 @@ fn play(
     if let Some(problem) = game.problem() {
         return Err(Fault(problem).into());
     }
+    plan.check_memory()?;
     let arrangement = Arrangement::new(game, plan.arenas, plan.worlds);
     let worlds: Result<Vec<_>, _> =
         arrangement.first_agents().map(|first| build_eval_world(game, player, plan, arrangement, first)).collect();

@@ -132,6 +132,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     written.tell(args.json)?;
     match episode_world.divergence() {
+        None if interrupt::asked() => Ok(Outcome::Stopped),
         None => Ok(Outcome::Pass),
         Some(divergence) => {
             tell!("from there on it is not the game that was recorded: {divergence}");

@@ -190,7 +190,7 @@ impl Experiment {
 
     /// Environment steps of one rollout.
     pub fn steps_per_update(&self) -> u64 {
-        u64::from(self.arenas) * self.rollout_steps() as u64
+        u64::from(self.arenas).saturating_mul(self.rollout_steps() as u64)
     }
 
     /// Rollouts, and so updates, of the whole training.

@@ -50,10 +50,12 @@ pub enum ConfigError {
         source: Box<ExperimentError>,
     },
     /// The values do not go together.
-    #[error("{}: {source}", path.display())]
+    #[error("{}:{}:{}: {source}", path.display(), at.0, at.1)]
     Values {
         /// The file.
         path: PathBuf,
+        /// Line and column of the key to blame, from 1; the first ones of the file if it leaves that key out.
+        at: (usize, usize),
         /// Why.
         source: ExperimentError,
     },

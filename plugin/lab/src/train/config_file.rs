@@ -4,7 +4,7 @@
 //! path from the file's own folder. Each is laid over the ones before it, and the file's own keys over all of them, key by
 //! key; a list is one value. A base may have a base of its own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{
     config::{Experiment, ExperimentError},
@@ -14,7 +14,7 @@ use super::{
 
 pub use super::config_error::ConfigError;
 
-/// Files below one another, at most: more means that they go round in a circle.
+/// Files below one another, at most.
 const MAX_DEPTH: usize = 8;
 
 /// Reads and checks an experiment.
@@ -41,31 +41,49 @@ pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Ex
 ///
 /// [`ConfigError`].
 pub fn parse_experiment_with<S: AsRef<str>>(text: &str, path: &Path, sets: &[S]) -> Result<Experiment, ConfigError> {
-    let own = parse_experiment(text, path)?;
+    let keys = gather(text, path, &mut Vec::new())?;
+    let own = keys.parse(&Origin::start_of(path))?;
     let experiment = own.with_set(sets)?;
     match experiment.check() {
         Ok(()) => Ok(experiment),
-        Err(source) => Err(blame(&own, sets, source, path)),
+        Err(source) => {
+            let fails =
+                |sets: &[&str]| own.with_set(sets).is_ok_and(|changed| changed.check().as_ref() == Err(&source));
+            let sets = if fails(&[]) { Vec::new() } else { blame(sets, fails) };
+            Err(placed(&keys, sets, source, path))
+        }
     }
 }
 
-/// Who is to blame for values that do not go together: the file, if it is no better without the sets; otherwise those
-/// sets without which the error would be gone, or all of them together.
-fn blame<S: AsRef<str>>(own: &Experiment, sets: &[S], source: ExperimentError, path: &Path) -> ConfigError {
-    let fails = |sets: &[&str]| own.with_set(sets).is_ok_and(|changed| changed.check().as_ref() == Err(&source));
-    if fails(&[]) {
-        return ConfigError::Values { path: path.into(), source };
+/// An error that was found out later than when the experiment was read, such as when it met its game, with the place of
+/// the key to blame. Text, path and sets are those that the experiment was read from.
+pub fn locate<S: AsRef<str>>(text: &str, path: &Path, sets: &[S], source: ExperimentError) -> ConfigError {
+    let key = source.key().unwrap_or_default();
+    let sets_it = |set: &&str| {
+        let name = set.split_once('=').map_or("", |(name, _)| name.trim());
+        name == key || key.starts_with(&format!("{name}.")) || name.starts_with(&format!("{key}."))
+    };
+    let sets = sets.iter().map(AsRef::as_ref).filter(sets_it).map(str::to_owned).collect();
+    placed(&gather(text, path, &mut Vec::new()).unwrap_or_default(), sets, source, path)
+}
+
+/// An error of the sets to blame, or of the place in a file if there are none.
+fn placed(keys: &Keys, sets: Vec<String>, source: ExperimentError, path: &Path) -> ConfigError {
+    if !sets.is_empty() {
+        return ConfigError::Sets { sets, source: source.into() };
     }
+    let (path, at) = source.key().and_then(|key| keys.place(key)).unwrap_or((path, (1, 1)));
+    ConfigError::Values { path: path.into(), at, source }
+}
+
+/// Those sets without which the error would be gone, or all of them together.
+fn blame<S: AsRef<str>>(sets: &[S], fails: impl Fn(&[&str]) -> bool) -> Vec<String> {
     let all: Vec<&str> = sets.iter().map(AsRef::as_ref).collect();
     let without = |left_out: usize| -> Vec<&str> {
         all.iter().enumerate().filter(|(at, _)| *at != left_out).map(|(_, set)| *set).collect()
     };
-    let mut sets: Vec<String> =
-        (0..all.len()).filter(|&at| !fails(&without(at))).map(|at| all[at].to_owned()).collect();
-    if sets.is_empty() {
-        sets = all.into_iter().map(str::to_owned).collect();
-    }
-    ConfigError::Sets { sets, source: source.into() }
+    let guilty: Vec<String> = (0..all.len()).filter(|&at| !fails(&without(at))).map(|at| all[at].to_owned()).collect();
+    if guilty.is_empty() { all.into_iter().map(str::to_owned).collect() } else { guilty }
 }
 
 /// Parses the text of an experiment. `path` is for messages and says where to look for files that it is built on.
@@ -74,7 +92,7 @@ fn blame<S: AsRef<str>>(own: &Experiment, sets: &[S], source: ExperimentError, p
 ///
 /// [`ConfigError::Syntax`], also for what it is built on; [`ConfigError::Read`] if that cannot be read.
 pub fn parse_experiment(text: &str, path: &Path) -> Result<Experiment, ConfigError> {
-    gather(text, path, 0)?.parse(&Origin::start_of(path))
+    gather(text, path, &mut Vec::new())?.parse(&Origin::start_of(path))
 }
 
 fn read(path: &Path) -> Result<String, ConfigError> {
@@ -82,8 +100,8 @@ fn read(path: &Path) -> Result<String, ConfigError> {
 }
 
 /// The keys of a file over those of what it is built on. Each file is checked alone, so that a wrong value is found even
-/// if a later one hides it.
-fn gather(text: &str, path: &Path, depth: usize) -> Result<Keys, ConfigError> {
+/// if a later one hides it. `users` are the files that are built on this one.
+fn gather(text: &str, path: &Path, users: &mut Vec<PathBuf>) -> Result<Keys, ConfigError> {
     let start = Origin::start_of(path);
     let mut own = Keys::of_text(text, path)?;
     let base = own.take("base");
@@ -95,27 +113,41 @@ fn gather(text: &str, path: &Path, depth: usize) -> Result<Keys, ConfigError> {
             let message = "`base` must be a list of presets and files, such as [\"coinrun-ppo\", \"mine.ron\"]";
             base.origin.error((1, 1), message.to_owned())
         })?;
-        if depth == MAX_DEPTH {
-            return Err(base.origin.error((1, 1), format!("`base` goes round in a circle, or {MAX_DEPTH} files deep")));
-        }
+        users.push(path.into());
         for name in names {
-            keys = keys.overlaid(&gather_base(&name, path, depth + 1, &base.origin)?);
+            keys = keys.overlaid(&gather_base(&name, users, &base.origin)?);
         }
+        users.pop();
     }
     Ok(keys.overlaid(&own))
 }
 
-fn gather_base(name: &str, user: &Path, depth: usize, origin: &Origin) -> Result<Keys, ConfigError> {
+fn gather_base(name: &str, users: &mut Vec<PathBuf>, origin: &Origin) -> Result<Keys, ConfigError> {
+    let user = users.last().cloned().unwrap_or_default();
+    let path =
+        if name.ends_with(".ron") { user.with_file_name(name) } else { format!("assets/presets/{name}.ron").into() };
+    let chain = || {
+        let files: Vec<String> = users.iter().chain([&path]).map(|file| file.display().to_string()).collect();
+        files.join(" → ")
+    };
+    let same = |known: &PathBuf| {
+        *known == path || known.canonicalize().is_ok_and(|known| path.canonicalize().is_ok_and(|path| path == known))
+    };
+    if users.iter().any(same) {
+        return Err(origin.error((1, 1), format!("`base` goes round in a circle: {}", chain())));
+    }
+    if users.len() > MAX_DEPTH {
+        return Err(origin.error((1, 1), format!("`base` goes more than {MAX_DEPTH} files deep: {}", chain())));
+    }
     if name.ends_with(".ron") {
-        let path = user.with_file_name(name);
         let text = std::fs::read_to_string(&path).map_err(|error| {
             origin.error((1, 1), format!("`base` names {}, which cannot be read: {error}", path.display()))
         })?;
-        return gather(&text, &path, depth);
+        return gather(&text, &path, users);
     }
     let preset = Preset::find(name)
         .map_err(|error| origin.error((1, 1), format!("{error}; or a file, by its path ending in .ron")))?;
-    gather(preset.text, Path::new(&format!("assets/presets/{name}.ron")), depth)
+    gather(preset.text, &path, users)
 }
 
 #[cfg(test)]

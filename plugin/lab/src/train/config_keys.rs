@@ -201,6 +201,16 @@ impl Keys {
         self.0.get(key).map(|value| value.text.as_str())
     }
 
+    /// Where a key, or the first one of a section, was written: file, line and column; `None` if no file says it.
+    pub(super) fn place(&self, key: &str) -> Option<(&Path, (usize, usize))> {
+        let section = format!("{key}.");
+        let found = self.0.iter().find(|(name, _)| *name == key || name.starts_with(&section))?;
+        match &found.1.origin {
+            Origin::File { path, key, .. } => Some((path, *key)),
+            Origin::Set(_) => None,
+        }
+    }
+
     /// Full paths of all keys, in alphabetical order.
     pub(super) fn paths(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)

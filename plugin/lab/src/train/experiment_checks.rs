@@ -42,13 +42,16 @@ impl Experiment {
         if !(0.0..=1.0).contains(&self.study.threshold) {
             return refuse("study.threshold", self.study.threshold, "a success rate lies between 0 and 1");
         }
-        self.image.check().map_err(|error| ExperimentError::Settings(format!("image: {error}")))?;
+        let of_image =
+            |error| ExperimentError::Settings { key: Some("image".to_owned()), words: format!("`image`: {error}") };
+        self.image.check().map_err(of_image)?;
         self.skills.validate().map_err(settings)?;
         self.score.validate().map_err(settings)?;
         self.sac.validate().map_err(settings)?;
         self.ppo_config().validate().map_err(settings)?;
         self.spirl.validate().map_err(settings)?;
         self.rlpd.validate().map_err(settings)?;
+        self.check_limits()?;
         if self.algorithm.learns_from_demos() {
             self.recordings()?;
         }

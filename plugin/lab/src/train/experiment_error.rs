@@ -3,6 +3,7 @@
 use playbot_learner::LearnError;
 use thiserror::Error;
 
+use super::config_keys::Keys;
 use crate::{mode::ModeError, split::LevelSplit};
 
 /// The experiment makes no sense.
@@ -66,20 +67,50 @@ pub enum ExperimentError {
     #[error("`demos` is missing: there is something to learn from recordings, so name a file or a folder of them")]
     NoDemos,
     /// The learner refuses its settings.
-    #[error("{0}")]
-    Settings(String),
+    #[error("{words}")]
+    Settings {
+        /// Key or section in the file, if one is to blame.
+        key: Option<String>,
+        /// What is wrong.
+        words: String,
+    },
+}
+
+impl ExperimentError {
+    /// The key to look at first, or a section.
+    pub fn key(&self) -> Option<&str> {
+        match self {
+            Self::Overlap { .. } | Self::Leak { .. } => Some("train"),
+            Self::Mode { key, .. } | Self::Value { key, .. } => Some(key),
+            // Keys are named between backticks.
+            Self::Memory { keys, .. } => keys.split('`').nth(1),
+            Self::NoDemos => Some("algorithm"),
+            Self::Settings { key, .. } => key.as_deref(),
+        }
+    }
 }
 
 fn gib(bytes: &u64) -> f64 {
     *bytes as f64 / f64::from(1 << 30)
 }
 
-/// What a learner has against its settings; that they are settings goes without saying.
+/// What a learner has against its settings; that they are settings goes without saying. It begins with the name of one,
+/// as `ppo lr`, which is `ppo.lr` in the file.
 pub(super) fn settings(error: LearnError) -> ExperimentError {
-    ExperimentError::Settings(match error {
+    let words = match error {
         LearnError::Config(text) => text,
         other => other.to_string(),
-    })
+    };
+    let mut parts = words.splitn(3, ' ');
+    let section = parts.next().map(|section| if section == "skill" { "skills" } else { section });
+    let name = parts.next().map(|name| name.trim_end_matches(':'));
+    match section.zip(name).map(|(section, name)| format!("{section}.{name}")) {
+        Some(key) if Keys::all().text(&key).is_some() => {
+            let rest = parts.next().unwrap_or_default();
+            ExperimentError::Settings { words: format!("`{key}` {rest}"), key: Some(key) }
+        }
+        _ => ExperimentError::Settings { key: None, words },
+    }
 }
 
 pub(super) fn refuse(key: &'static str, value: impl ToString, why: impl Into<String>) -> Result<(), ExperimentError> {

@@ -1,153 +1,231 @@
 //! How much memory a training needs, so that nobody finds out when the machine stands still.
+//!
+//! What is added up is a lower bound: whatever is refused here could not have worked.
 
-use std::fs;
+use playbot_learner::{ActionSpace, ObsKind};
 
-use super::config::{Experiment, ExperimentError, LearnerKind};
+use super::{
+    config::{Experiment, ExperimentError, LearnerKind},
+    free_memory::free_memory,
+};
 use crate::game::Game;
 use crate::sensors::GameSensors;
 
-/// What a training may take where the system does not say how much is free.
-const USUAL: u64 = 16 << 30;
+/// Bytes of a number that is learned: the number, its gradient and the two moments of Adam.
+const LEARNED: u64 = 16;
+
+/// Bytes that a World without agents takes at least, and those of an agent.
+const WORLD: u64 = 128 << 10;
+const ARENA: u64 = 1 << 10;
+
+/// Something that is kept.
+struct Part {
+    /// It, with the factors of its size.
+    what: String,
+    bytes: u64,
+    /// The keys to lower.
+    keys: String,
+}
+
+/// Sizes of what the game shows and takes.
+struct Sizes {
+    is_image: bool,
+    /// Bytes of an observation.
+    observation: u64,
+    /// Numbers of an observation that a layer reads; 0 for images, which are read by convolutions.
+    inputs: u64,
+    /// Numbers that stand for an action, and those that say how it is drawn.
+    action: u64,
+    outputs: u64,
+}
 
 impl Experiment {
-    /// Checks that what a training keeps fits into the memory that is free: rollouts, and the replay buffer of SAC. What
-    /// the networks compute with is not counted.
+    /// Checks that what a training keeps fits into the memory that is free: networks with their gradients and moments,
+    /// minibatches, rollouts, the replay buffer of SAC, and Worlds.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Memory`] with the sum and the keys to lower.
+    /// [`ExperimentError::Memory`] with the largest part and the keys to lower.
     pub fn check_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        if self.algorithm.is_trained() { self.check_memory_within(game, free()) } else { Ok(()) }
+        self.check_memory_within(game, free_memory())
+    }
+
+    /// [`check_memory`](Self::check_memory) of what learning skills keeps.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn check_skill_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        check_parts(&self.skill_parts(&self.sizes(game)), free_memory())
     }
 
     fn check_memory_within(&self, game: &dyn Game, free: u64) -> Result<(), ExperimentError> {
-        let kind = self.observation_config().obs_kind(game);
-        let is_image = self.observation_config().is_image();
-        let observation = kind.numbers() as u64 * if is_image { 1 } else { 4 };
-        let (arenas, steps) = (u64::from(self.arenas), self.rollout_steps() as u64);
-        let rollouts = product(&[arenas, steps, observation]);
-        if rollouts > free {
-            let learner = self.algorithm.learner().key();
-            let image = if is_image { ", `image.width`, `image.height` or `image.stack`" } else { "" };
-            return Err(ExperimentError::Memory {
-                what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes"),
-                needed: rollouts,
-                free,
-                keys: format!("`arenas`, `{learner}.num_steps`{image}"),
-            });
+        let sizes = self.sizes(game);
+        // Skills are learned before, and their moments forgotten.
+        if self.algorithm.needs_skills() {
+            check_parts(&self.skill_parts(&sizes), free)?;
         }
+        if !self.algorithm.is_trained() {
+            return Ok(());
+        }
+        let mut parts = vec![self.worlds_part(), self.rollout_part(&sizes)];
         match self.algorithm.learner() {
-            LearnerKind::Ppo => Ok(()),
-            LearnerKind::Sac => self.check_replay_buffer(observation, rollouts, free),
+            LearnerKind::Ppo => parts.extend(self.ppo_parts(&sizes)),
+            LearnerKind::Sac => parts.extend(self.sac_parts(&sizes)),
+        }
+        check_parts(&parts, free)
+    }
+
+    fn sizes(&self, game: &dyn Game) -> Sizes {
+        let kind: ObsKind = self.observation_config().obs_kind(game);
+        let is_image = self.observation_config().is_image();
+        let numbers = kind.numbers() as u64;
+        let (action, outputs) = match game.actions() {
+            ActionSpace::Discrete(choices) => (choices as u64, choices as u64),
+            ActionSpace::Continuous(dims) => (dims as u64, 2 * dims as u64),
+        };
+        let (observation, inputs) = if is_image { (numbers, 0) } else { (numbers.saturating_mul(4), numbers) };
+        Sizes { is_image, observation, inputs, action, outputs }
+    }
+
+    fn worlds_part(&self) -> Part {
+        let (arenas, worlds) = (u64::from(self.arenas), u64::from(self.worlds));
+        Part {
+            what: format!("{worlds} Worlds with {arenas} arenas"),
+            bytes: product(&[worlds, WORLD]).saturating_add(product(&[arenas, ARENA])),
+            keys: "`worlds`, `arenas`".to_owned(),
         }
     }
 
-    /// Checks that the replay buffer fits beside the rollouts, in bytes of `observation`s.
-    fn check_replay_buffer(&self, observation: u64, rollouts: u64, free: u64) -> Result<(), ExperimentError> {
-        let transitions = (self.sac.buffer as u64).min(self.steps);
-        let replay = product(&[transitions, 2, observation]);
-        if replay.saturating_add(rollouts) > free {
-            return Err(ExperimentError::Memory {
-                what: format!("the slots of a replay buffer of {transitions} transitions × 2 × {observation} bytes"),
-                needed: replay,
-                free,
-                keys: "`sac.buffer`".to_owned(),
-            });
+    fn rollout_part(&self, sizes: &Sizes) -> Part {
+        let (arenas, steps, observation) = (u64::from(self.arenas), self.rollout_steps() as u64, sizes.observation);
+        let learner = self.algorithm.learner().key();
+        let image = if sizes.is_image { ", `image.width`, `image.height` or `image.stack`" } else { "" };
+        Part {
+            what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes"),
+            bytes: product(&[arenas, steps, observation]),
+            keys: format!("`arenas`, `{learner}.num_steps`{image}"),
         }
-        Ok(())
     }
+
+    fn ppo_parts(&self, sizes: &Sizes) -> [Part; 2] {
+        let inputs = sizes.inputs.saturating_add(self.latent());
+        let (actor, key) = match self.algorithm.needs_skills() && self.score.init_from_decoder {
+            true => (&self.skills.hidden, "`skills.hidden` or `ppo.hidden`"),
+            false => (&self.ppo.hidden, "`ppo.hidden`"),
+        };
+        let numbers = layers(inputs, actor, sizes.outputs).saturating_add(layers(inputs, &self.ppo.hidden, 1));
+        let rows = product(&[u64::from(self.arenas), self.ppo.num_steps as u64]) / (self.ppo.minibatches as u64).max(1);
+        let row = sizes.observation.saturating_add(product(&[4, sum(actor).saturating_add(sum(&self.ppo.hidden))]));
+        [networks(numbers, key), minibatch(rows, row, "`ppo.hidden`; or more `ppo.minibatches`")]
+    }
+
+    fn sac_parts(&self, sizes: &Sizes) -> [Part; 3] {
+        let sac = match self.algorithm.trains_on_demos() {
+            true => self.rlpd.over(self.sac.clone()),
+            false => self.sac.clone(),
+        };
+        let inputs = sizes.inputs.saturating_add(self.latent());
+        let critic = layers(inputs.saturating_add(sizes.action), &sac.hidden, 1);
+        let numbers = layers(inputs, &sac.hidden, sizes.outputs).saturating_add(product(&[critic, sac.critics as u64]));
+        let transitions = (sac.buffer as u64).min(self.steps);
+        let row = product(&[2, sizes.observation]).saturating_add(product(&[4, sum(&sac.hidden), sac.critics as u64]));
+        let buffer = Part {
+            what: format!(
+                "the slots of a replay buffer of {transitions} transitions × 2 × {} bytes",
+                sizes.observation
+            ),
+            bytes: product(&[transitions, 2, sizes.observation]),
+            keys: "`sac.buffer`".to_owned(),
+        };
+        let key = if self.algorithm.trains_on_demos() {
+            "`sac.hidden`, `rlpd.critics`"
+        } else {
+            "`sac.hidden`, `sac.critics`"
+        };
+        [networks(numbers, key), minibatch(sac.batch as u64, row, "`sac.batch`, `sac.hidden`"), buffer]
+    }
+
+    fn skill_parts(&self, sizes: &Sizes) -> [Part; 2] {
+        let skills = &self.skills;
+        let (latent, gru, encoder) = (skills.latent as u64, skills.gru_hidden as u64, skills.encoder_hidden as u64);
+        let first = layers(sizes.inputs.saturating_add(sizes.action), &[skills.encoder_hidden], 0);
+        let between = product(&[3, gru, gru.saturating_add(gru)]);
+        let recurrent = product(&[3, gru, encoder.saturating_add(gru)])
+            .saturating_add(product(&[between, (skills.gru_layers as u64).saturating_sub(1)]));
+        let prior = layers(sizes.inputs, &skills.hidden, 2 * latent.min(u64::MAX / 2));
+        let decoder = layers(sizes.inputs.saturating_add(latent), &skills.hidden, sizes.outputs);
+        let numbers = [first, recurrent, product(&[2, latent, gru]), prior, decoder];
+        let row = sizes
+            .observation
+            .saturating_add(product(&[4, gru, skills.gru_layers as u64]))
+            .saturating_add(4 * encoder.min(u64::MAX / 4));
+        let rows = product(&[skills.batch as u64, skills.window as u64]);
+        let keys =
+            "`skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden`, `skills.gru_layers`, `skills.latent`";
+        let numbers = numbers.iter().fold(0u64, |sum, part| sum.saturating_add(*part));
+        [networks(numbers, keys), minibatch(rows, row, "`skills.batch`, `skills.window` or the sizes of its networks")]
+    }
+
+    /// Numbers of a skill that the policy reads.
+    fn latent(&self) -> u64 {
+        if self.algorithm.needs_skills() { self.skills.latent as u64 } else { 0 }
+    }
+}
+
+/// Checks that bytes of `what` fit into the memory that is free.
+///
+/// # Errors
+///
+/// [`ExperimentError::Memory`] with the keys to lower.
+pub(crate) fn check_bytes(what: String, bytes: u64, keys: &str) -> Result<(), ExperimentError> {
+    check_parts(&[Part { what, bytes, keys: keys.to_owned() }], free_memory())
+}
+
+fn check_parts(parts: &[Part], free: u64) -> Result<(), ExperimentError> {
+    let needed = parts.iter().fold(0u64, |sum, part| sum.saturating_add(part.bytes));
+    match parts.iter().max_by_key(|part| part.bytes) {
+        Some(largest) if needed > free => {
+            let beside = if largest.bytes > free { "" } else { ", and what else is kept," };
+            let (what, keys) = (format!("{}{beside}", largest.what), largest.keys.clone());
+            Err(ExperimentError::Memory {
+                what,
+                needed: if beside.is_empty() { largest.bytes } else { needed },
+                free,
+                keys,
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn networks(numbers: u64, keys: &str) -> Part {
+    let what = format!("networks of {numbers} numbers with gradients and moments");
+    Part { what, bytes: product(&[numbers, LEARNED]), keys: keys.to_owned() }
+}
+
+fn minibatch(rows: u64, row: u64, keys: &str) -> Part {
+    let what = format!("minibatches of {rows} rows × {row} bytes");
+    Part { what, bytes: product(&[rows, row]), keys: keys.to_owned() }
+}
+
+/// Numbers of a network of dense layers.
+fn layers(inputs: u64, hidden: &[usize], outputs: u64) -> u64 {
+    let (mut numbers, mut width) = (0u64, inputs);
+    for next in hidden.iter().map(|width| *width as u64).chain([outputs]) {
+        numbers = numbers.saturating_add(product(&[width.saturating_add(1), next]));
+        width = next;
+    }
+    numbers
+}
+
+fn sum(widths: &[usize]) -> u64 {
+    widths.iter().fold(0, |sum, width| sum.saturating_add(*width as u64))
 }
 
 fn product(factors: &[u64]) -> u64 {
     factors.iter().fold(1, |product, factor| product.saturating_mul(*factor))
 }
 
-/// Free memory in bytes: on Linux what the kernel calls available, and no more than the limit of a container. A number
-/// of our own would refuse what a large machine can do, or let a small one thrash.
-fn free() -> u64 {
-    let available = fs::read_to_string("/proc/meminfo").ok().and_then(|text| available_in(&text)).unwrap_or(USUAL);
-    let limit = fs::read_to_string("/sys/fs/cgroup/memory.max").ok().and_then(|text| text.trim().parse().ok());
-    available.min(limit.unwrap_or(u64::MAX))
-}
-
-/// The line `MemAvailable:   123456 kB`.
-fn available_in(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kib.checked_mul(1024)
-}
-
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use bevy::prelude::*;
-
-    use super::*;
-    use crate::train::config_file::parse_experiment;
-    use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
-
-    /// A game of ten numbers.
-    struct Ten;
-
-    impl Game for Ten {
-        fn name(&self) -> &'static str {
-            "ten"
-        }
-        fn version(&self) -> u32 {
-            1
-        }
-        fn modes(&self) -> &'static [&'static str] {
-            &["a"]
-        }
-        fn tick_hz(&self) -> f64 {
-            15.0
-        }
-        fn actions(&self) -> ActionSpace {
-            ActionSpace::Discrete(2)
-        }
-        fn observation(&self) -> ObservationSpace {
-            ObservationSpace { names: (0..10).map(|i| i.to_string()).collect() }
-        }
-        fn build(&self, _app: &mut App, _mode: &str) {}
-        fn spawn_agent(&self, world: &mut World, _index: u32) -> Entity {
-            world.spawn_empty().id()
-        }
-    }
-
-    fn check(algorithm: &str, changes: &str, free: u64) -> Result<(), String> {
-        let text = format!(
-            r#"(game: "ten", train: "a:0..3", test: "a:4..7", steps: 9000, arenas: 64, algorithm: "{algorithm}", {changes})"#
-        );
-        let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
-        experiment.check_memory_within(&Ten, free).map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn rollouts_must_fit() {
-        // 64 arenas × 256 steps × 40 bytes = 640 KiB, which all Worlds share.
-        assert_eq!(check("ppo", "worlds: 2", 640 << 10), Ok(()));
-        let text = check("ppo", "worlds: 2", 639 << 10).expect_err("too large");
-        assert!(text.contains("64 arenas × 256 steps × 40 bytes"), "{text}");
-        let pictures = "observation: Raster, image: (width: 512, height: 512, stack: 8)";
-        let text = check("ppo", pictures, 16 << 30).expect_err("96 GiB");
-        for words in ["64 arenas × 256 steps × 6291456 bytes", "96.0 GiB", "16.0 GiB", "`image.stack`"] {
-            assert!(text.contains(words), "{text}");
-        }
-    }
-
-    #[test]
-    fn the_replay_buffer_must_fit_as_far_as_it_is_filled() {
-        // 9000 transitions × 80 bytes = 703 KiB, and a rollout of one tick.
-        let sac = "worlds: 1, sac: (num_steps: 1, buffer: 1000000)";
-        assert_eq!(check("sac", sac, 720 << 10), Ok(()));
-        let text = check("sac", sac, 700 << 10).expect_err("too large");
-        assert!(text.contains("9000 transitions × 2 × 40 bytes") && text.contains("`sac.buffer`"), "{text}");
-    }
-
-    #[test]
-    fn the_kernel_says_what_is_available() {
-        let text = "MemTotal:       16384000 kB\nMemFree:          100 kB\nMemAvailable:    2048 kB\n";
-        assert_eq!((available_in(text), available_in("MemFree: 3 kB")), (Some(2 << 20), None));
-    }
-}
+mod tests;

@@ -103,11 +103,11 @@ fn who_spoils_a_sound_file_is_named() {
         parse_experiment_with(text, Path::new("x.ron"), sets).expect_err("must be refused").to_string()
     };
     let text = error(GOOD, &["seed=3", "ppo.lr=NaN"]);
-    assert!(text.starts_with("`ppo.lr=NaN`: ppo lr must be"), "{text}");
+    assert!(text.starts_with("`ppo.lr=NaN`: `ppo.lr` must be"), "{text}");
     let text = error(GOOD, &["arenas=6", "worlds=4", "seed=3"]);
     assert!(text.starts_with("`arenas=6`, `worlds=4`: `worlds` is 4"), "{text}");
     let bad = GOOD.replace("gamma: 0.99", "gamma: 1.5");
-    assert!(error(&bad, &["seed=3"]).starts_with("x.ron: ppo gamma"), "the file is wrong by itself");
+    assert!(error(&bad, &["seed=3"]).starts_with("x.ron:1:1: `ppo.gamma` must lie"), "the file is wrong by itself");
     assert_eq!(error(GOOD, &["steps=0"]), "`steps=0`: must be at least 1", "the key is named once");
     assert!(error(GOOD, &["ppo.lr=0", "ppo.lr=-1"]).starts_with("`ppo.lr=-1`: "), "the last one counts");
 }
@@ -182,7 +182,14 @@ fn files_can_be_built_on_files_and_errors_name_the_right_one() {
     assert!(text.contains("middle.ron:3:") && text.contains("`ppo.gamma`"), "{text}");
 
     write("middle.ron", "(base: [\"top.ron\"])");
-    assert!(read("top.ron").expect_err("a circle").to_string().contains("circle"));
+    let text = read("top.ron").expect_err("a circle").to_string();
+    assert!(text.contains("goes round in a circle: ") && text.contains("top.ron → "), "{text}");
+    assert!(text.matches("top.ron").count() == 2 && text.matches("middle.ron").count() == 2, "{text}");
+    for depth in 0..10 {
+        write(&format!("deep{depth}.ron"), &format!("(base: [\"deep{}.ron\"])", depth + 1));
+    }
+    let text = read("deep0.ron").expect_err("too deep").to_string();
+    assert!(text.contains("more than 8 files deep") && text.contains("deep9.ron"), "{text}");
     write("top.ron", "(\n base: [\"coinrun-pop\"])");
     let text = read("top.ron").expect_err("unknown").to_string();
     assert!(text.contains("top.ron:2:") && text.contains("did you mean `coinrun-ppo`?"), "{text}");

@@ -1,0 +1,92 @@
+//! What fits is let through, and what does not is refused before it is asked for.
+
+use std::path::Path;
+
+use bevy::prelude::*;
+
+use super::*;
+use crate::train::config_file::parse_experiment;
+use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
+
+/// A game of ten numbers.
+struct Ten;
+
+impl Game for Ten {
+    fn name(&self) -> &'static str {
+        "ten"
+    }
+    fn version(&self) -> u32 {
+        1
+    }
+    fn modes(&self) -> &'static [&'static str] {
+        &["a"]
+    }
+    fn tick_hz(&self) -> f64 {
+        15.0
+    }
+    fn actions(&self) -> ActionSpace {
+        ActionSpace::Discrete(2)
+    }
+    fn observation(&self) -> ObservationSpace {
+        ObservationSpace { names: (0..10).map(|i| i.to_string()).collect() }
+    }
+    fn build(&self, _app: &mut App, _mode: &str) {}
+    fn spawn_agent(&self, world: &mut World, _index: u32) -> Entity {
+        world.spawn_empty().id()
+    }
+}
+
+fn check(algorithm: &str, changes: &str, free: u64) -> Result<(), String> {
+    let arenas = if changes.contains("arenas") { "" } else { "arenas: 64," };
+    let text = format!(
+        r#"(game: "ten", train: "a:0..3", test: "a:4..7", steps: 9000, {arenas} algorithm: "{algorithm}", {changes})"#
+    );
+    let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
+    experiment.check_memory_within(&Ten, free).map_err(|error| error.to_string())
+}
+
+#[test]
+fn rollouts_must_fit() {
+    // 64 arenas × 4096 steps × 40 bytes = 10 MiB, which all Worlds share, and less than that of everything else.
+    let long = "worlds: 2, ppo: (num_steps: 4096, minibatches: 4096)";
+    assert_eq!(check("ppo", long, 20 << 20), Ok(()));
+    let text = check("ppo", long, 9 << 20).expect_err("too large");
+    assert!(text.contains("64 arenas × 4096 steps × 40 bytes need"), "{text}");
+    let text = check("ppo", long, 10 << 20).expect_err("too large with the rest");
+    assert!(text.contains("40 bytes, and what else is kept, need"), "{text}");
+    let pictures = "observation: Raster, image: (width: 512, height: 512, stack: 8)";
+    let text = check("ppo", pictures, 16 << 30).expect_err("96 GiB");
+    for words in ["64 arenas × 256 steps × 6291456 bytes", "96.0 GiB", "16.0 GiB", "`image.stack`"] {
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn the_replay_buffer_must_fit_as_far_as_it_is_filled() {
+    // 9000 transitions × 80 bytes = 703 KiB, and a rollout of one tick.
+    let sac = "worlds: 1, sac: (num_steps: 1, buffer: 1000000, hidden: [8], batch: 8)";
+    assert_eq!(check("sac", sac, 1000 << 10), Ok(()));
+    let text = check("sac", sac, 700 << 10).expect_err("too large");
+    assert!(text.contains("9000 transitions × 2 × 40 bytes") && text.contains("`sac.buffer`"), "{text}");
+}
+
+#[test]
+fn no_size_is_too_large_to_be_added_up() {
+    let most = u64::MAX;
+    for (algorithm, changes, key) in [
+        ("ppo", format!("ppo: (hidden: [{most}])"), "`ppo.hidden`"),
+        ("ppo", format!("ppo: (hidden: [{most}, {most}])"), "`ppo.hidden`"),
+        ("sac", format!("sac: (batch: {most})"), "`sac.batch`"),
+        ("sac", format!("sac: (critics: {most})"), "`sac.critics`"),
+        ("rlpd", format!("rlpd: (critics: {most}), demos: \"d\""), "`rlpd.critics`"),
+        ("score-ppo", "skills: (latent: 4294967295), demos: \"d\"".to_owned(), "`skills.latent`"),
+        ("score-ppo", "skills: (gru_hidden: 4294967295), demos: \"d\"".to_owned(), "`skills.gru_hidden`"),
+        ("score-ppo", "skills: (gru_layers: 4294967295), demos: \"d\"".to_owned(), "`skills.gru_layers`"),
+        ("score-ppo", "skills: (hidden: [4294967295]), demos: \"d\"".to_owned(), "`skills.hidden`"),
+        ("bc", format!("skills: (batch: {most}, window: {most}), demos: \"d\""), "`skills.batch`"),
+        ("ppo", "arenas: 400000, worlds: 400000, ppo: (num_steps: 1, minibatches: 1)".to_owned(), "`worlds`"),
+    ] {
+        let text = check(algorithm, &changes, 16 << 30).expect_err(&changes);
+        assert!(text.contains(key), "{changes}: {text}");
+    }
+}
