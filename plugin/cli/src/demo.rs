@@ -25,6 +25,7 @@ pub use super::demo_show::deciders;
   playbot demo verify demos/GAME
   playbot demo verify a.demo b.demo --json
   playbot demo repair torn.demo --out whole.demo
+  playbot demo repair torn.demo --header-from other.demo
   playbot demo merge --out all.demo alice.demo bob.demo")]
 pub struct Args {
     #[command(subcommand)]
@@ -69,6 +70,10 @@ enum Verb {
         /// File to write; the damaged file itself if none is named, which is then kept beside it as FILE.bak.
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Another recording of the same game, mode and version, whose header to take if both copies of the file's own are
+        /// damaged.
+        #[arg(long, value_name = "FILE")]
+        header_from: Option<PathBuf>,
         /// Print the result as a line of JSON.
         #[arg(long)]
         json: bool,
@@ -92,7 +97,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         Verb::Ls { path, json } => ls(&path, json),
         Verb::Show { file, episode, json } => show(&file, episode, json),
         Verb::Verify { paths, json } => verify(&paths, json, games),
-        Verb::Repair { file, out, json } => mend(&file, out.as_deref().unwrap_or(&file), json),
+        Verb::Repair { file, out, header_from, json } => {
+            mend(&file, out.as_deref().unwrap_or(&file), header_from.as_deref(), json)
+        }
         Verb::Merge { files, out, json } => merge(&files, &out, json),
     }
 }
@@ -203,8 +210,8 @@ fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<
 }
 
 /// Repairs a file. One in which no episode is whole is a finding.
-fn mend(file: &Path, out: &Path, as_json: bool) -> Result<Outcome, CliError> {
-    let report = repair(file, out).map_err(open::missing_recording)?;
+fn mend(file: &Path, out: &Path, header_from: Option<&Path>, as_json: bool) -> Result<Outcome, CliError> {
+    let report = repair(file, out, header_from).map_err(open::missing_recording)?;
     if as_json {
         print_line(json!(report))?;
     } else {
@@ -214,6 +221,10 @@ fn mend(file: &Path, out: &Path, as_json: bool) -> Result<Outcome, CliError> {
         };
         let places = counted(report.dropped_regions.len() as u64, "place");
         print_line(format!("{}: {kept}; dropped {} bytes in {places}", out.display(), report.dropped_bytes))?;
+        if let Some(from) = &report.header_from {
+            let from = if from == file { "its second copy".to_owned() } else { from.display().to_string() };
+            print_line(format!("its header was damaged, and is taken from {from}"))?;
+        }
         if let Some(backup) = &report.backup {
             print_line(format!("the damaged file is kept as {}", backup.display()))?;
         }

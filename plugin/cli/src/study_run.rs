@@ -17,7 +17,7 @@ use playbot_lab::{
         Experiment, Trainer,
         checkpoint::CheckpointChoice,
         metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
-        run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, is_unstarted},
+        run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, end_replacement, is_unstarted},
         run_lock::RunLock,
         sealed_file::{read_sealed, write_sealed},
         study::StudyRun,
@@ -99,11 +99,13 @@ impl<'a> Runner<'a> {
     pub fn run(&mut self, run: &StudyRun, title: &str, on_step: impl FnMut(u64)) -> Result<Ended, CliError> {
         let game = self.games.get(&run.experiment.game)?;
         let folder = self.folder.join(run.id());
+        end_replacement(&folder)?;
         let is_saved = self.is_saved(run, &folder)?;
         if is_saved && let Some(result) = known_result(&folder.join(RESULT)) {
             return Ok(Some((result, success_curve(&folder)?)));
         }
-        fs::create_dir_all(&folder).map_err(|error| io_error("create", &folder, &error))?;
+        fs::create_dir_all(&folder)
+            .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
         let lock = RunLock::take(&folder)?;
         let dir = if is_saved { RunFolder::Begun(RunDir::open_with(lock)?.run) } else { RunFolder::New(lock) };
         let clock = CostClock::start();
@@ -296,8 +298,4 @@ fn known_result(path: &Path) -> Option<StudyResult> {
     }
     let read = read_sealed(path).inspect_err(|error| tracing::warn!("{error}; the run is measured again"));
     read.ok().map(|(result, _)| result)
-}
-
-fn io_error(action: &str, path: &Path, error: &impl ToString) -> CliError {
-    CliError::Io(format!("cannot {action} {}: {}", path.display(), error.to_string()))
 }

@@ -135,7 +135,7 @@ fn a_torn_recording_loses_its_last_episode_only() {
     std::fs::write(&path, &bytes[..bytes.len() - 3]).expect("writable");
     let error = verify_file(&Corridor, &path, |_| {}).expect_err("torn").to_string();
     assert!(error.contains("playbot demo repair"), "{error}");
-    assert_eq!(repair(&path, &mended).expect("repairable").kept_episodes, 4);
+    assert_eq!(repair(&path, &mended, None).expect("repairable").kept_episodes, 4);
     assert_eq!(verify_file(&Corridor, &mended, |_| {}).expect("whole").divergences.len(), 0);
 }
 

@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::error::RunsError;
+use crate::train::replaced_run::is_leftover;
 
 /// Files and folders that only a run has. One of them is enough, so that a run that lost the others is found as well.
 const SIGNS: [&str; 3] = ["run.json", "metrics.jsonl", "checkpoints"];
@@ -39,7 +40,8 @@ fn folders_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut folders = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        if entry.file_type()?.is_dir() {
+        // What a process that was killed left of a run is no run: the next training there ends it.
+        if entry.file_type()?.is_dir() && !is_leftover(&entry.path()) {
             folders.push(entry.path());
         }
     }

@@ -25,6 +25,8 @@ use super::{
 const PREFIX: &str = "step-";
 const SUMMARY: &str = "summary.json";
 const UNFINISHED: &str = "unfinished";
+/// What a checkpoint is called while it is deleted, so that no half one is taken for whole.
+const REMOVED: &str = "removed";
 
 /// When checkpoints are written and how many stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -173,12 +175,16 @@ fn put_aside(path: &Path) -> Result<(), RunError> {
 
 /// Removes all but the last `keep` (at least one) and the best.
 fn prune(run: &Path, keep: usize) -> Result<(), RunError> {
+    // A process that was killed may have left it.
+    remove_if_there(&folder(run).join(REMOVED))?;
     let all = list(run)?;
     let best = best(&all);
     let old = all.len().saturating_sub(keep.max(1));
     for (index, checkpoint) in all.iter().enumerate().take(old) {
         if Some(index) != best {
-            remove_if_there(&checkpoint.path)?;
+            let removed = folder(run).join(REMOVED);
+            fs::rename(&checkpoint.path, &removed).map_err(io_error("move", &checkpoint.path))?;
+            remove_if_there(&removed)?;
         }
     }
     Ok(())

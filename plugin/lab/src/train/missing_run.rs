@@ -7,7 +7,10 @@ use std::{
 
 use bevy_playbot::unknown_name::nearest;
 
-use super::{replaced_run::is_free, run_error::RunError};
+use super::{
+    replaced_run::{is_being_replaced, is_free},
+    run_error::RunError,
+};
 
 /// Files and folders of a run. One of them is enough: a run that lost the others is a damaged one.
 const SIGNS: [&str; 4] = ["run.json", "experiment.ron", "metrics.jsonl", "checkpoints"];
@@ -38,6 +41,11 @@ fn of_folder(path: &Path) -> String {
     let shown: Vec<_> = inside.iter().take(NAMED).map(|run| run.display().to_string()).collect();
     let more = if inside.len() > NAMED { ", …" } else { "" };
     match inside.is_empty() {
+        true if is_being_replaced(path) => {
+            "it was to be replaced, which was stopped before the new run began; `playbot train --resume` there brings the \
+             old one back"
+                .to_owned()
+        }
         true if is_free(path) => {
             format!(
                 "the folder is there, but no training began in it; `playbot train --run {}` starts one",

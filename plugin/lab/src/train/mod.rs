@@ -28,7 +28,7 @@ mod passed_over;
 pub mod presets;
 mod prior_checks;
 pub(crate) mod progress;
-mod replaced_run;
+pub(crate) mod replaced_run;
 mod ron_keys;
 pub mod run_dir;
 mod run_error;

@@ -11,6 +11,9 @@ use super::{
     run_lock::{LOCK_FILE, RunLock},
 };
 
+/// Between the name of a run and the number of the process that replaces it.
+const MARK: &str = ".replaced-";
+
 /// What a run was before another one took its place.
 pub(super) struct ReplacedRun {
     run: PathBuf,
@@ -29,7 +32,7 @@ impl ReplacedRun {
             return Ok(aside);
         }
         let mut name = run.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".replaced-{}", std::process::id()));
+        name.push(format!("{MARK}{}", std::process::id()));
         let folder = run.with_file_name(name);
         fs::create_dir_all(&folder).map_err(io_error("create", &folder))?;
         aside.folder = Some(folder.clone());
@@ -63,6 +66,57 @@ impl ReplacedRun {
     }
 }
 
+/// Ends what a process that was killed while it replaced a run has left: the old run comes back if the new one had not begun,
+/// and is removed if it had.
+///
+/// # Errors
+///
+/// [`RunError::Busy`] while the other process lives; [`RunError::Io`] if the folder cannot be written.
+pub fn end_replacement(run: &Path) -> Result<(), RunError> {
+    let leftovers = leftovers(run);
+    if leftovers.is_empty() || !run.is_dir() {
+        return Ok(());
+    }
+    let _lock = RunLock::take(run)?;
+    for folder in leftovers {
+        let aside = ReplacedRun { run: run.into(), folder: Some(folder.clone()) };
+        let run = run.display();
+        if aside.run.join("run.json").is_file() {
+            tracing::warn!("{} is what {run} was before it was replaced, and is removed", folder.display());
+            aside.remove();
+        } else {
+            tracing::warn!(
+                "{run} was to be replaced, which was stopped before the new run began: the old one is brought back"
+            );
+            aside.put_back();
+        }
+    }
+    Ok(())
+}
+
+/// Whether a folder is what is left of a run that is being replaced.
+pub(crate) fn is_leftover(folder: &Path) -> bool {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    name.rsplit_once(MARK).is_some_and(|(run, process)| !run.is_empty() && process.parse::<u32>().is_ok())
+}
+
+/// Whether parts of a run lie beside it.
+pub(super) fn is_being_replaced(run: &Path) -> bool {
+    !leftovers(run).is_empty()
+}
+
+/// The folders beside a run that hold parts of what it was.
+fn leftovers(run: &Path) -> Vec<PathBuf> {
+    let own = |folder: &PathBuf| {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let run = run.file_name().unwrap_or_default().to_string_lossy();
+        is_leftover(folder) && name.rsplit_once(MARK).is_some_and(|(name, _)| *name == *run)
+    };
+    let parent = run.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let names = names_in(parent).unwrap_or_default();
+    names.into_iter().map(|name| run.with_file_name(name)).filter(own).collect()
+}
+
 fn names_in(folder: &Path) -> Result<Vec<OsString>, RunError> {
     let names = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     names.map_err(io_error("list", folder))
@@ -92,4 +146,81 @@ pub fn is_unstarted(path: &Path) -> bool {
 /// Whether a run can be begun in a folder without replacing anything: it is empty, or a run ended there before it began.
 pub(super) fn is_free(path: &Path) -> bool {
     is_unstarted(path) && (RunLock::is_known(path) || names_in(path).is_ok_and(|names| names.is_empty()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run_with(root: &Path, files: &[&str]) -> PathBuf {
+        let run = root.join("a");
+        for file in files {
+            let path = run.join(file);
+            fs::create_dir_all(path.parent().expect("in the run")).expect("writable");
+            fs::write(path, "old").expect("writable");
+        }
+        run
+    }
+
+    fn all(root: &Path) -> Vec<String> {
+        let mut names: Vec<String> = names_in(root)
+            .expect("readable")
+            .into_iter()
+            .map(|name| name.to_string_lossy().into_owned())
+            .filter(|name| name != LOCK_FILE)
+            .collect();
+        names.sort();
+        names
+    }
+
+    const FILES: [&str; 4] = ["experiment.ron", "run.json", "metrics.jsonl", "checkpoints/step-1/summary.json"];
+
+    #[test]
+    fn a_kill_at_any_place_leaves_one_whole_run() {
+        // The run is moved file by file; then the new one is written: the experiment first.
+        for moved in 0..=FILES.len() {
+            for is_begun in [false, true] {
+                let root = tempfile::tempdir().expect("a folder");
+                let run = run_with(root.path(), &FILES);
+                let aside = ReplacedRun::put_aside(&run).expect("movable");
+                let folder = aside.folder.clone().expect("there was something");
+                assert!(is_leftover(&folder) && !is_leftover(&run));
+                match is_begun {
+                    // Killed while the old run was moved, or after the first file of the new one.
+                    false => {
+                        for name in names_in(&folder).expect("readable").into_iter().take(moved) {
+                            fs::rename(folder.join(&name), run.join(&name)).expect("movable");
+                        }
+                    }
+                    true => {
+                        fs::write(run.join("experiment.ron"), "new").expect("writable");
+                        fs::write(run.join("run.json"), "new").expect("writable");
+                    }
+                }
+                let was_whole = run.join("run.json").is_file() && !is_begun;
+                if was_whole {
+                    continue;
+                }
+                end_replacement(&run).expect("writable");
+                assert_eq!(all(root.path()), ["a"], "{moved} {is_begun}");
+                let text = fs::read_to_string(run.join("experiment.ron")).expect("there");
+                assert_eq!(text, if is_begun { "new" } else { "old" });
+                if !is_begun {
+                    assert_eq!(all(&run), ["checkpoints", "experiment.ron", "metrics.jsonl", "run.json"]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_another_process_replaces_is_left_to_it() {
+        let root = tempfile::tempdir().expect("a folder");
+        let run = run_with(root.path(), &FILES);
+        let lock = RunLock::take(&run).expect("free");
+        let aside = ReplacedRun::put_aside(&run).expect("movable");
+        assert!(matches!(end_replacement(&run), Err(RunError::Busy(_))));
+        drop(lock);
+        aside.put_back();
+        assert_eq!(all(root.path()), ["a"]);
+    }
 }

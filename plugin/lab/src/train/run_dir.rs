@@ -15,7 +15,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{DeviceKind, seal_text, unseal_text};
+use playbot_learner::{DeviceKind, seal_text};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -29,9 +29,9 @@ use super::{
     passed_over::passed_over,
     progress::Progress,
     replaced_run::{ReplacedRun, is_free},
-    run_error::{FOLDER, edited, unreadable},
+    run_error::{FOLDER, unreadable},
     run_lock::RunLock,
-    sealed_file::{read_sealed, unsealed, warn_of_no_seal, write_sealed},
+    sealed_file::{check_text_seal, read_sealed, warn_of_no_seal, write_sealed},
     train_error::TrainError,
     trainer::{self, Trainer},
     update_report::UpdateReport,
@@ -40,7 +40,7 @@ use crate::game::Game;
 
 pub(super) use super::run_error::{damaged, io_error};
 pub use super::{
-    replaced_run::{check_replaceable, is_unstarted},
+    replaced_run::{check_replaceable, end_replacement, is_unstarted},
     run_error::RunError,
 };
 
@@ -110,6 +110,7 @@ impl RunDir {
     /// [`RunError::Exists`] for a run unless `force`, which replaces it; what is no run is left alone with
     /// [`RunError::NotARun`], and what is in use with [`RunError::Busy`]. [`RunError::Io`] if it cannot be written.
     pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
+        end_replacement(path)?;
         if path.exists() {
             check_replaceable(path)?;
             if !force && !is_free(path) {
@@ -150,7 +151,7 @@ impl RunDir {
     /// [`RunError::NoRun`] if there is none; another [`RunError`] if its files are damaged.
     pub fn open(path: &Path) -> Result<OpenedRun, RunError> {
         check_is_run(path)?;
-        check_experiment_seal(&path.join(EXPERIMENT))?;
+        check_text_seal(&path.join(EXPERIMENT))?;
         let experiment = read_experiment(&path.join(EXPERIMENT))?;
         let info_path = path.join("run.json");
         let (info, had_seal) = read_sealed(&info_path).map_err(|error| match error {
@@ -169,6 +170,7 @@ impl RunDir {
     ///
     /// As for [`open`](Self::open), and [`RunError::Busy`].
     pub fn open_to_write(path: &Path) -> Result<OpenedRun, RunError> {
+        end_replacement(path)?;
         // A folder that is no run gets no lock file.
         Self::open(path)?;
         Self::open_with(RunLock::take(path)?)
@@ -296,11 +298,4 @@ fn read_checkpoint(
     let learner = TrainedLearner::load(algorithm, &checkpoint.learner_file(), device)?;
     let (state, _) = read_sealed(&checkpoint.arenas_file())?;
     Ok((learner, state))
-}
-
-/// Checks that the experiment of a run is the one that was written.
-fn check_experiment_seal(path: &Path) -> Result<(), RunError> {
-    let bytes = fs::read(path).map_err(io_error("read", path))?;
-    let read = unsealed(bytes, |text| unseal_text(text).map_err(|error| error.to_string()));
-    read.map(drop).map_err(|message| edited(path, &message))
 }

@@ -2,11 +2,11 @@
 
 use std::{fs, path::Path};
 
-use playbot_learner::{Unsealed, seal_json, unseal_json};
+use playbot_learner::{Unsealed, seal_json, unseal_json, unseal_text};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::json;
 
-use super::run_error::{RunError, damaged, io_error};
+use super::run_error::{RunError, damaged, edited, io_error};
 
 /// Writes a value, which must become a JSON object with an entry, and its checksum: whole or not at all.
 ///
@@ -31,11 +31,15 @@ pub fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<(T, bool), RunErr
     Ok((value, had_seal))
 }
 
+/// Checks that the experiment of a run, a text with its checksum on the first line, is the one that was written.
+pub(super) fn check_text_seal(path: &Path) -> Result<(), RunError> {
+    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let read = unsealed(bytes, |text| unseal_text(text).map_err(|error| error.to_string()));
+    read.map(drop).map_err(|message| edited(path, &message))
+}
+
 /// The text of a file, whose bytes may be no text any more.
-pub(super) fn unsealed(
-    bytes: Vec<u8>,
-    unseal: impl FnOnce(&str) -> Result<Unsealed, String>,
-) -> Result<Unsealed, String> {
+fn unsealed(bytes: Vec<u8>, unseal: impl FnOnce(&str) -> Result<Unsealed, String>) -> Result<Unsealed, String> {
     let text = String::from_utf8(bytes).map_err(|error| {
         format!("the file is damaged: it is no text from byte {} on", error.utf8_error().valid_up_to())
     })?;

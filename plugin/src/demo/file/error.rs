@@ -55,19 +55,28 @@ pub enum DemoFault {
         source: std::io::Error,
     },
     /// The file does not begin like a demonstration file.
-    #[error("not a demonstration file: it begins with \"{found}\" instead of \"playbot-demo\"")]
+    #[error(
+        "not a demonstration file: it begins with \"{found}\" instead of \"playbot-demo\"; if it was one, `playbot demo repair \
+         FILE` takes the copy of its header, or, with --header-from, that of another recording of the same game"
+    )]
     NotADemo {
         /// The first bytes of the file, with unprintable ones escaped.
         found: String,
     },
     /// The file ends before its header does.
-    #[error("the file ends inside its header, after {length} bytes: it holds no episode")]
+    #[error(
+        "the file ends inside its header, after {length} bytes: it holds no episode, unless the length in its first line is \
+         damaged, which `playbot demo repair FILE` finds out"
+    )]
     TruncatedHeader {
         /// Length of the file in bytes.
         length: u64,
     },
     /// The first line is damaged.
-    #[error("the first line of the file is damaged (\"{found}\"): {why}")]
+    #[error(
+        "the first line of the file is damaged (\"{found}\"): {why}; \
+         `playbot demo repair FILE` takes its copy, or, with --header-from, that of another recording of the same game"
+    )]
     HeaderLine {
         /// The line, with unprintable characters escaped.
         found: String,
@@ -75,7 +84,10 @@ pub enum DemoFault {
         why: &'static str,
     },
     /// The header is not the RON text that is expected.
-    #[error("the header does not parse at line {line}, column {column}: {message}")]
+    #[error(
+        "the header does not parse at line {line}, column {column}: {message}; \
+         `playbot demo repair FILE` takes its copy, or, with --header-from, that of another recording of the same game"
+    )]
     HeaderSyntax {
         /// Line in the file, from 1 (line 1 is the `playbot-demo` line).
         line: usize,
@@ -85,7 +97,10 @@ pub enum DemoFault {
         message: String,
     },
     /// The header parses, but it is not the header that was written.
-    #[error("the header does not match its checksum: it was damaged or edited by hand")]
+    #[error(
+        "the header does not match its checksum: it was damaged or edited by hand; \
+         `playbot demo repair FILE` takes its copy, or, with --header-from, that of another recording of the same game"
+    )]
     HeaderChecksum,
     /// A value in the header makes no sense.
     #[error("header field `{field}`: {why}")]

@@ -9,6 +9,8 @@
 //!     game: "coinrun",
 //!     …
 //! )
+//! // playbot-demo header=00000102 crc32=0c1d2e3f  the same once more, as comments
+//! // …
 //! FE 45 50 FF | length | payload | CRC-32         a frame: see DemoEpisode
 //! FE 45 50 FF | length | payload | CRC-32
 //! ```
@@ -17,6 +19,7 @@
 //!   whatever happens, the episodes before it stay.
 //! - Nothing is believed unchecked. [`DemoReader`] gives an episode out only when its checksum holds,
 //!   its lists agree in length, its actions are in range and its numbers are finite.
+//! - The header is there twice: if one copy is damaged, the other one says what was recorded.
 //! - A damaged file is an error that says where. [`repair`](repair()) recovers every sound episode, also behind
 //!   the damage.
 //! - A tick of a game with at most 256 actions takes about 5 bytes: the action and the state hash.
@@ -34,6 +37,7 @@ mod payload;
 mod preamble;
 mod reader;
 mod repair;
+mod second_header;
 mod store;
 mod summary;
 #[cfg(test)]

@@ -7,9 +7,13 @@
 //!     game: "coinrun",
 //!     …
 //! )
+//! // playbot-demo header=00000102 crc32=0c1d2e3f
+//! // (
+//! …
 //! ```
 //!
-//! The magic line gives the length of the RON text in bytes and its CRC-32. It stays the same in all
+//! The text ends with a [copy](super::second_header) of itself in comments. The magic line gives the length of the RON text
+//! in bytes and its CRC-32. It stays the same in all
 //! formats, so that an older program can say that a file is too new for it.
 
 use std::io::Read;
@@ -18,6 +22,7 @@ use serde::Deserialize;
 
 use super::error::DemoFault;
 use super::header::{DEMO_FORMAT, DemoHeader};
+use super::second_header;
 
 /// How every demonstration file begins.
 pub const DEMO_MAGIC: &str = "playbot-demo ";
@@ -43,6 +48,8 @@ pub(super) fn encode(header: &DemoHeader) -> Result<Vec<u8>, DemoFault> {
     let mut text = ron::ser::to_string_pretty(header, pretty)
         .map_err(|e| DemoFault::HeaderValue { field: "header", why: e.to_string() })?;
     text.push('\n');
+    let top = format!("{}{text}", magic_line(text.len(), crc32fast::hash(text.as_bytes())));
+    text.push_str(&second_header::copy_of(&top));
     if text.len() > MAX_HEADER {
         let why = format!("{} bytes of text, but at most {MAX_HEADER} are read back", text.len());
         return Err(DemoFault::HeaderValue { field: "header", why });

@@ -9,7 +9,8 @@ use serde::Serialize;
 use super::error::{DemoFault, DemoFileError};
 use super::frame::{self, FRAME_EXTRA, FRAME_MAGIC, MAX_PAYLOAD};
 use super::header::DemoHeader;
-use super::{payload, preamble, store};
+use super::reader::DemoReader;
+use super::{payload, preamble, second_header, store};
 
 /// A stretch of the input that holds no sound frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -33,9 +34,13 @@ pub struct RepairReport {
     pub dropped_regions: Vec<DroppedRegion>,
     /// Where the damaged file was kept, when it was repaired in place.
     pub backup: Option<PathBuf>,
+    /// Where the header was found, if the one at the top is damaged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub header_from: Option<PathBuf>,
 }
 
-/// Copies the header and every sound episode of `path` to `out`.
+/// Copies the header and every sound episode of `path` to `out`. A damaged header is taken from its copy in the file, and if
+/// that is damaged too from `header_from`, another recording of the same game; what does not fit that header is dropped.
 ///
 /// A frame is sound when its checksum holds and its episode fits the header. After a damaged frame the
 /// search goes on at the next frame magic, so episodes behind the damage are kept too.
@@ -45,10 +50,14 @@ pub struct RepairReport {
 ///
 /// # Errors
 ///
-/// When the header is not sound, when `out` is another file that exists
+/// When no header is sound, when `out` is another file that exists
 /// ([`DemoFault::Exists`]), while another program records to the file that is repaired in place
 /// ([`DemoFault::Locked`]), or when reading or writing fails.
-pub fn repair(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RepairReport, DemoFileError> {
+pub fn repair(
+    path: impl AsRef<Path>,
+    out: impl AsRef<Path>,
+    header_from: Option<&Path>,
+) -> Result<RepairReport, DemoFileError> {
     let (path, out) = (path.as_ref(), out.as_ref());
     let at_input = |fault| DemoFileError::new(path, fault);
     let file = File::open(path).map_err(|e| at_input(DemoFault::io("open the file")(e)))?;
@@ -60,9 +69,9 @@ pub fn repair(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RepairRep
     if in_place {
         store::lock(&file).map_err(at_input)?;
     }
-    let Loaded { input, header, start } = load(&file).map_err(at_input)?;
-    let mut output = input[..start].to_vec();
-    let mut report = salvage(&input, start, &header, &mut output);
+    let Loaded { input, header, top, start, header_from } = load(&file, path, header_from)?;
+    let mut output = top;
+    let mut report = RepairReport { header_from, ..salvage(&input, start, &header, &mut output) };
     if in_place {
         if output == input {
             return Ok(report);
@@ -81,20 +90,37 @@ pub fn repair(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RepairRep
     Ok(report)
 }
 
-/// A file whose header is sound.
+/// A file whose header is known.
 struct Loaded {
     /// All of its bytes.
     input: Vec<u8>,
     header: DemoHeader,
+    /// How the repaired file begins.
+    top: Vec<u8>,
     /// Where frames begin.
     start: usize,
+    /// The file that the header is from, if it is not from the top of this one.
+    header_from: Option<PathBuf>,
 }
 
-fn load(mut file: &File) -> Result<Loaded, DemoFault> {
+fn load(mut file: &File, path: &Path, header_from: Option<&Path>) -> Result<Loaded, DemoFileError> {
+    let at_input = |fault| DemoFileError::new(path, fault);
     let mut input = Vec::new();
-    file.read_to_end(&mut input).map_err(DemoFault::io("read the file"))?;
-    let (header, start) = preamble::decode(input.as_slice())?;
-    Ok(Loaded { input, header, start: start as usize })
+    file.read_to_end(&mut input).map_err(|e| at_input(DemoFault::io("read the file")(e)))?;
+    let fault = match preamble::decode(input.as_slice()) {
+        Ok((header, start)) => {
+            let (top, start) = (input[..start as usize].to_vec(), start as usize);
+            return Ok(Loaded { input, header, top, start, header_from: None });
+        }
+        Err(fault) => fault,
+    };
+    let (header, start, from) = match (second_header::recover(&input), header_from) {
+        (Some((header, start)), _) => (header, start, path.to_owned()),
+        (None, Some(other)) => (DemoReader::open(other)?.header().clone(), 0, other.to_owned()),
+        (None, None) => return Err(at_input(fault)),
+    };
+    let top = preamble::encode(&header).map_err(at_input)?;
+    Ok(Loaded { input, header, top, start, header_from: Some(from) })
 }
 
 /// Appends every sound frame from `start` on to `output`.
@@ -169,8 +195,8 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use super::super::DemoWriter;
     use super::super::testing::{episode, header, write};
-    use super::super::{DemoReader, DemoWriter};
     use super::*;
 
     fn seeds(path: &Path) -> Vec<u64> {
@@ -187,7 +213,7 @@ mod tests {
         bytes[second as usize + 30] ^= 0x10;
         fs::write(&path, &bytes).expect("damaged");
         let out = folder.path().join("b.demo");
-        let report = repair(&path, &out).expect("repaired");
+        let report = repair(&path, &out, None).expect("repaired");
         assert_eq!(seeds(&out), [1, 3]);
         assert_eq!(fs::read(&path).expect("read"), bytes, "the input is not touched");
         let frame = frame::encode(&episode(2, 9), &header()).expect("valid").len() as u64;
@@ -198,9 +224,10 @@ mod tests {
             dropped_bytes: frame,
             dropped_regions: regions,
             backup: None,
+            header_from: None,
         };
         assert_eq!(report, expected);
-        let error = repair(&path, &out).expect_err("the output exists");
+        let error = repair(&path, &out, None).expect_err("the output exists");
         assert!(matches!(error.fault, DemoFault::Exists), "{error}");
     }
 
@@ -208,7 +235,7 @@ mod tests {
     fn repair_in_place_keeps_backups_and_allows_appending() {
         let folder = tempfile::tempdir().expect("temporary folder");
         let path = write(folder.path(), "a.demo", &[episode(1, 5)]);
-        assert_eq!(repair(&path, &path).expect("nothing to do").backup, None);
+        assert_eq!(repair(&path, &path, None).expect("nothing to do").backup, None);
         for round in 1..=2 {
             let torn = [fs::read(&path).expect("read"), FRAME_MAGIC.to_vec(), vec![9; 7]].concat();
             fs::write(&path, &torn).expect("torn");
@@ -218,7 +245,7 @@ mod tests {
                     && error.to_string().contains(&format!("`playbot demo repair {}`", path.display())),
                 "{error}"
             );
-            let report = repair(&path, &path).expect("repaired");
+            let report = repair(&path, &path, None).expect("repaired");
             let backup = folder.path().join(if round == 1 { "a.demo.bak" } else { "a.demo.bak2" });
             assert_eq!((report.kept_episodes, report.dropped_bytes), (round, 11));
             assert_eq!(report.backup.as_deref(), Some(backup.as_path()));

@@ -59,7 +59,7 @@ fn a_cut_at_any_byte_costs_at_most_the_last_episode() {
         if whole == 0 {
             let error = read_lenient(&path).expect_err("no header");
             assert!(matches!(error.fault, DemoFault::TruncatedHeader { length } if length == cut as u64), "{error}");
-            assert!(repair(&path, &out).is_err());
+            assert!(repair(&path, &out, None).is_err());
             continue;
         }
         let (read, error) = read_lenient(&path).expect("the header is whole");
@@ -79,7 +79,7 @@ fn a_cut_at_any_byte_costs_at_most_the_last_episode() {
         assert_eq!((report.kept_episodes, report.dropped_bytes), (whole - 1, torn));
         assert_eq!(output, bytes[..boundaries[whole - 1] as usize]);
         if cut % 50 == 0 {
-            assert_eq!(repair(&path, &out).expect("repaired"), report);
+            assert_eq!(repair(&path, &out, None).expect("repaired"), report);
             assert_eq!(fs::read(&out).expect("read"), output);
             fs::remove_file(&out).expect("removed");
         }
@@ -163,7 +163,7 @@ fn hostile_lengths_and_values_are_errors() {
         assert!(read.is_empty() && error.contains(words), "{error} should say: {words}");
         assert!(error.contains("episode 0"), "{error}");
         let out = folder.path().join("repaired.demo");
-        assert_eq!(repair(&path, &out).expect("repaired").kept_episodes, 0);
+        assert_eq!(repair(&path, &out, None).expect("repaired").kept_episodes, 0);
         fs::remove_file(out).expect("removed");
     }
 }
@@ -205,7 +205,7 @@ fn a_place_that_cannot_be_written_is_named() {
     assert!(DemoReader::open(folder.path()).is_err(), "a folder is not a file");
     let file = write(folder.path(), "a.demo", &[]);
     assert!(DemoWriter::create(file.join("b.demo"), header()).is_err());
-    assert!(repair(&file, missing).is_err());
+    assert!(repair(&file, missing, None).is_err());
 }
 
 #[test]
