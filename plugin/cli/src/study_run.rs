@@ -293,9 +293,6 @@ fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
 
 /// The result of a run that was measured. A damaged one is measured again.
 fn known_result(path: &Path) -> Option<StudyResult> {
-    if !path.exists() {
-        return None;
-    }
-    let read = read_sealed(path).inspect_err(|error| tracing::warn!("{error}; the run is measured again"));
-    read.ok().map(|(result, _)| result)
+    let read = path.exists().then(|| read_sealed(path))?;
+    Some(read.inspect_err(|error| tracing::warn!("{error}; the run is measured again")).ok()?.0)
 }

@@ -296,6 +296,5 @@ fn read_checkpoint(
     device: DeviceKind,
 ) -> Result<(TrainedLearner, TrainState), RunError> {
     let learner = TrainedLearner::load(algorithm, &checkpoint.learner_file(), device)?;
-    let (state, _) = read_sealed(&checkpoint.arenas_file())?;
-    Ok((learner, state))
+    Ok((learner, read_sealed(&checkpoint.arenas_file())?.0))
 }
