@@ -96,7 +96,7 @@ impl AntMazeMode {
             "random-start" => self.random_start = true,
             _ if key == "limit" => {
                 let ticks = value.parse().ok().filter(|ticks| *ticks > 0);
-                let wanted = "write ticks, at least 1, as in limit=1000";
+                let wanted = "write a number of ticks, at least 1 and at most 4294967295, as in limit=1000";
                 self.limit = ticks.ok_or_else(|| OptionError::new(key, value, wanted))?;
             }
             _ if self.map.set_option(key, value)? => {}

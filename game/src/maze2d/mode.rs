@@ -104,7 +104,7 @@ impl Maze2dMode {
             ("retarget", "") => self.retarget = true,
             ("limit", _) => {
                 let steps = value.parse().ok().filter(|&steps| steps > 0);
-                let wanted = "write steps, at least 1, as in limit=1000";
+                let wanted = "write a number of steps, at least 1 and at most 4294967295, as in limit=1000";
                 self.limit = steps.ok_or_else(|| OptionError::new(key, value, wanted))?;
             }
             _ if self.map.set_option(key, value)? => {}

@@ -39,7 +39,7 @@ pub struct Args {
     demos: Option<PathBuf>,
     /// Learn from at most so many recorded steps, instead of the experiment's `demo_steps`. Whole episodes are taken, and
     /// at least one, however long it is.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     max_steps: Option<u64>,
     /// Passes over the recordings, instead of the experiment's.
     #[arg(long)]

@@ -12,6 +12,7 @@ mod findings;
 mod lander;
 mod leaps;
 mod level_detectors;
+mod one_world;
 mod orders;
 mod pipeline;
 mod recording;

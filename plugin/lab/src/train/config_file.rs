@@ -58,10 +58,12 @@ pub fn parse_experiment_with<S: AsRef<str>>(text: &str, path: &Path, sets: &[S])
 /// An error that was found out later than when the experiment was read, such as when it met its game, with the place of
 /// the key to blame. Text, path and sets are those that the experiment was read from.
 pub fn locate<S: AsRef<str>>(text: &str, path: &Path, sets: &[S], source: ExperimentError) -> ConfigError {
-    let key = source.key().unwrap_or_default();
+    let keys = source.keys();
+    // A set may change a whole section, and a section be to blame.
     let sets_it = |set: &&str| {
         let name = set.split_once('=').map_or("", |(name, _)| name.trim());
-        name == key || key.starts_with(&format!("{name}.")) || name.starts_with(&format!("{key}."))
+        let is_within = |inner: &str, outer: &str| inner.strip_prefix(outer).is_some_and(|rest| rest.starts_with('.'));
+        keys.iter().any(|key| name == *key || is_within(key, name) || is_within(name, key))
     };
     let sets = sets.iter().map(AsRef::as_ref).filter(sets_it).map(str::to_owned).collect();
     placed(&gather(text, path, &mut Vec::new()).unwrap_or_default(), sets, source, path)
@@ -72,7 +74,7 @@ fn placed(keys: &Keys, sets: Vec<String>, source: ExperimentError, path: &Path) 
     if !sets.is_empty() {
         return ConfigError::Sets { sets, source: source.into() };
     }
-    let (path, at) = source.key().and_then(|key| keys.place(key)).unwrap_or((path, (1, 1)));
+    let (path, at) = source.keys().into_iter().find_map(|key| keys.place(key)).unwrap_or((path, (1, 1)));
     ConfigError::Values { path: path.into(), at, source }
 }
 

@@ -77,15 +77,15 @@ pub enum ExperimentError {
 }
 
 impl ExperimentError {
-    /// The key to look at first, or a section.
-    pub fn key(&self) -> Option<&str> {
+    /// The keys or sections to look at, the first one first.
+    pub fn keys(&self) -> Vec<&str> {
         match self {
-            Self::Overlap { .. } | Self::Leak { .. } => Some("train"),
-            Self::Mode { key, .. } | Self::Value { key, .. } => Some(key),
+            Self::Overlap { .. } | Self::Leak { .. } => vec!["train", "test"],
+            Self::Mode { key, .. } | Self::Value { key, .. } => vec![key],
             // Keys are named between backticks.
-            Self::Memory { keys, .. } => keys.split('`').nth(1),
-            Self::NoDemos => Some("algorithm"),
-            Self::Settings { key, .. } => key.as_deref(),
+            Self::Memory { keys, .. } => keys.split('`').skip(1).step_by(2).collect(),
+            Self::NoDemos => vec!["algorithm"],
+            Self::Settings { key, .. } => key.as_deref().into_iter().collect(),
         }
     }
 }

@@ -5,6 +5,9 @@ use std::{fs, path::Path};
 /// What a training may take where the system does not say how much is free.
 const USUAL: u64 = 16 << 30;
 
+/// Address space that threads and their stacks take besides what is counted.
+const THREADS: u64 = 128 << 20;
+
 /// Bytes that are free. A number of our own would refuse what a large machine can do, or let a small one thrash.
 pub(crate) fn free_memory() -> u64 {
     let read = |path: &str| fs::read_to_string(path).ok();
@@ -13,7 +16,7 @@ pub(crate) fn free_memory() -> u64 {
         read("/proc/self/cgroup").map_or(u64::MAX, |text| left_in_groups(Path::new("/sys/fs/cgroup"), &text));
     let space = read("/proc/self/limits").and_then(|text| address_space(&text)).unwrap_or(u64::MAX);
     let taken = read("/proc/self/status").and_then(|text| line_kib(&text, "VmSize:")).unwrap_or(0);
-    available.min(of_groups).min(space.saturating_sub(taken))
+    available.min(of_groups).min(space.saturating_sub(taken).saturating_sub(THREADS))
 }
 
 /// Bytes in a line such as `MemAvailable:   123456 kB`.
