@@ -6,7 +6,7 @@ mod program;
 
 use std::{fs, path::Path};
 
-use program::{done, json_lines};
+use program::{done, json_lines, unsealed};
 use serde_json::Value;
 
 const OLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/older");
@@ -63,7 +63,7 @@ fn is_near(now: &Value, then: &Value) -> bool {
 
 /// That a run has trained as the older one did.
 fn trained_as_then(folder: &Path, run: &str, then: &str) {
-    let (now, then) = (json_lines(&read(folder, &format!("{run}/metrics.jsonl"))), json_lines(then));
+    let (now, then) = (json_lines(&unsealed(&read(folder, &format!("{run}/metrics.jsonl")))), json_lines(then));
     assert_eq!(now.len(), then.len());
     for (now, then) in now.iter().zip(&then) {
         let (now, then) = (now.as_object().expect("an object"), then.as_object().expect("an object"));

@@ -5,7 +5,7 @@ mod program;
 
 use std::{fs, path::Path};
 
-use program::{ended, json_lines};
+use program::{ended, json_lines, unsealed};
 
 /// Trains PPO for four updates of 128 steps, three runs: two seeds, and another learning rate.
 fn three_runs(folder: &Path) {
@@ -111,7 +111,7 @@ fn a_run_stands_where_it_goes_on_and_is_in_training_while_somebody_has_its_lock(
     three_runs(folder);
     // As if it had been killed after another update of a longer training.
     let (experiment, metrics) = (folder.join("runs/b/experiment.ron"), folder.join("runs/b/metrics.jsonl"));
-    let text = fs::read_to_string(&experiment).expect("written");
+    let text = unsealed(&fs::read_to_string(&experiment).expect("written"));
     assert!(text.contains(" steps: 512,"), "{text}");
     fs::write(&experiment, text.replace(" steps: 512,", " steps: 1024,")).expect("writable");
     let text = fs::read_to_string(&metrics).expect("written");
@@ -138,7 +138,7 @@ fn the_threshold_is_that_of_the_experiments() {
     let folder = folder.path();
     three_runs(folder);
     let edit = |file: &str, from: &str, to: &str| {
-        let text = fs::read_to_string(folder.join(file)).expect("written");
+        let text = unsealed(&fs::read_to_string(folder.join(file)).expect("written"));
         assert!(text.contains(from), "{text}");
         fs::write(folder.join(file), text.replace(from, to)).expect("writable");
     };

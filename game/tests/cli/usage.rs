@@ -46,7 +46,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["train", "--run", "r", "--set", "ppo.gama=1"], "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
         (&["train", "--run", "r", "--set", "ppo.lr"], "write key=value"),
         (&["quickstart", "--set", "ppo.lr=fast"], "`ppo.lr` must be a number such as 0.0005, not fast"),
-        (&["learn-skills", "--out", "s", "--epochs", "0"], "epochs must be at least 1"),
+        (&["learn-skills", "--out", "s", "--epochs", "0"], "`skills.epochs` must be at least 1"),
         (&["learn-skills", "--out", "s", "--threads", "0"], "it must be at least 1"),
         (&["eval", "--bot", "random", "--threads", "0"], "it must be at least 1"),
         (&["train", "--run", "r", "--threads", "0"], "it must be at least 1"),

@@ -7,7 +7,7 @@ use std::{
     process::{Command, Output},
 };
 
-pub use playbot_shell::{code, errors, json_lines, lines, said};
+pub use playbot_shell::{code, errors, json_lines, lines, said, unsealed};
 
 pub fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_playbot"));

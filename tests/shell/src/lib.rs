@@ -12,6 +12,7 @@ mod run_folder;
 mod shell;
 mod tests;
 mod trained;
+mod unsealed;
 mod waiting;
 
 pub use at_work::{at_work, kill};
@@ -20,4 +21,5 @@ pub use game_program::GameProgram;
 pub use output::{code, ended, errors, json_lines, lines, said};
 pub use run_folder::{logged, results, steps};
 pub use shell::Shell;
+pub use unsealed::unsealed;
 pub use waiting::output;

@@ -49,9 +49,10 @@ impl Experiment {
 
     /// The numbers with the ranges of what is of use; whether they must be positive is checked before.
     fn numbers(&self) -> Vec<(&'static str, f64, (f64, f64))> {
-        const RATE: (f64, f64) = (0.0, 1e3);
         const WEIGHT: (f64, f64) = (0.0, 1e6);
-        const NORM: (f64, f64) = (0.0, 1e30);
+        // Numbers of single precision; a rate beyond all reason is for the training to find out.
+        const RATE: (f64, f64) = (0.0, 1e30);
+        const NORM: (f64, f64) = RATE;
         let (ppo, sac, skills) = (&self.ppo, &self.sac, &self.skills);
         let mut numbers = vec![
             ("ppo.lr", ppo.lr, RATE),

@@ -143,7 +143,8 @@ impl Experiment {
         } else {
             "`sac.hidden`, `sac.critics`"
         };
-        [networks(numbers, key), minibatch(sac.batch as u64, row, "`sac.batch`, `sac.hidden`"), buffer]
+        let row_keys = format!("`sac.batch`, {key}");
+        [networks(numbers, key), minibatch(sac.batch as u64, row, &row_keys), buffer]
     }
 
     fn skill_parts(&self, sizes: &Sizes) -> [Part; 2] {

@@ -54,8 +54,8 @@ mod tests {
             (r#"algorithm: "spirl-ppo", ppo: (time_limit: Legacy)"#, "`ppo.time_limit` is Legacy"),
             (r#"algorithm: "spirl-sac", sac: (num_steps: 15)"#, "`sac.num_steps` is 15: a policy over skills learns"),
             (r#"algorithm: "spirl-ppo", ppo: (norm_obs: true)"#, "`ppo.norm_obs` is true"),
-            (r#"algorithm: "spirl-ppo", spirl: (target_kl: Some(0.0))"#, "spirl target_kl must be positive"),
-            (r#"algorithm: "rlpd", rlpd: (demo_share: 1.0)"#, "rlpd demo_share must lie between"),
+            (r#"algorithm: "spirl-ppo", spirl: (target_kl: Some(0.0))"#, "`spirl.target_kl` must be positive"),
+            (r#"algorithm: "rlpd", rlpd: (demo_share: 1.0)"#, "`rlpd.demo_share` must lie between"),
             (r#"algorithm: "rlpd", observation: Raster"#, "`observation` is Raster: rlpd learns from vectors only"),
         ] {
             let text = check(changes).expect_err(changes);

@@ -56,18 +56,15 @@ pub enum DemoFault {
     },
     /// The file does not begin like a demonstration file.
     #[error(
-        "not a demonstration file: it begins with \"{found}\" instead of \"playbot-demo\"; if it was one, `playbot demo repair \
-         FILE` takes the copy of its header, or, with --header-from, that of another recording of the same game"
+        "not a demonstration file: it begins with \"{found}\" instead of \"playbot-demo\"; run `playbot demo repair \
+         FILE` if it was one, which takes the copy of its header, or with --header-from that of another recording"
     )]
     NotADemo {
         /// The first bytes of the file, with unprintable ones escaped.
         found: String,
     },
     /// The file ends before its header does.
-    #[error(
-        "the file ends inside its header, after {length} bytes: it holds no episode, unless the length in its first line is \
-         damaged, which `playbot demo repair FILE` finds out"
-    )]
+    #[error("the file ends inside its header, after {length} bytes: it holds no episode")]
     TruncatedHeader {
         /// Length of the file in bytes.
         length: u64,
@@ -75,7 +72,7 @@ pub enum DemoFault {
     /// The first line is damaged.
     #[error(
         "the first line of the file is damaged (\"{found}\"): {why}; \
-         `playbot demo repair FILE` takes its copy, or, with --header-from, that of another recording of the same game"
+         run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
     )]
     HeaderLine {
         /// The line, with unprintable characters escaped.
@@ -86,7 +83,7 @@ pub enum DemoFault {
     /// The header is not the RON text that is expected.
     #[error(
         "the header does not parse at line {line}, column {column}: {message}; \
-         `playbot demo repair FILE` takes its copy, or, with --header-from, that of another recording of the same game"
+         run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
     )]
     HeaderSyntax {
         /// Line in the file, from 1 (line 1 is the `playbot-demo` line).
@@ -99,7 +96,7 @@ pub enum DemoFault {
     /// The header parses, but it is not the header that was written.
     #[error(
         "the header does not match its checksum: it was damaged or edited by hand; \
-         `playbot demo repair FILE` takes its copy, or, with --header-from, that of another recording of the same game"
+         run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
     )]
     HeaderChecksum,
     /// A value in the header makes no sense.

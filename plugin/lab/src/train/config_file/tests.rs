@@ -93,8 +93,8 @@ fn values_that_do_not_go_together_name_the_numbers_and_a_way_out() {
         "`worlds` is 3: must divide `arenas` = 64; 4 does"
     );
     let idle = "algorithm: \"sac\", sac: (num_steps: 0), ppo: (anneal_lr: true)";
-    assert!(values(&GOOD.replace("ppo: (gamma: 0.99)", idle)).contains("num_steps must be at least 1"));
-    assert!(values(&GOOD.replace("gamma: 0.99", "gamma: 1.5")).contains("gamma must lie in 0..1"));
+    assert!(values(&GOOD.replace("ppo: (gamma: 0.99)", idle)).contains("`sac.num_steps` must be at least 1"));
+    assert!(values(&GOOD.replace("gamma: 0.99", "gamma: 1.5")).contains("`ppo.gamma` must lie in 0..1"));
 }
 
 #[test]
@@ -107,7 +107,8 @@ fn who_spoils_a_sound_file_is_named() {
     let text = error(GOOD, &["arenas=6", "worlds=4", "seed=3"]);
     assert!(text.starts_with("`arenas=6`, `worlds=4`: `worlds` is 4"), "{text}");
     let bad = GOOD.replace("gamma: 0.99", "gamma: 1.5");
-    assert!(error(&bad, &["seed=3"]).starts_with("x.ron:1:1: `ppo.gamma` must lie"), "the file is wrong by itself");
+    let text = error(&bad, &["seed=3"]);
+    assert!(text.starts_with("x.ron:4:") && text.contains(": `ppo.gamma` must lie"), "wrong by itself: {text}");
     assert_eq!(error(GOOD, &["steps=0"]), "`steps=0`: must be at least 1", "the key is named once");
     assert!(error(GOOD, &["ppo.lr=0", "ppo.lr=-1"]).starts_with("`ppo.lr=-1`: "), "the last one counts");
 }
