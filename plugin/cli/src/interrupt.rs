@@ -44,15 +44,19 @@ pub fn listen() {
                 stop("stopped at once");
             }
             tell!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
-            thread::spawn(|| {
-                thread::sleep(PATIENCE);
-                stop("stopped within a step, which would have taken longer");
-            });
+            thread::spawn(stop_in_time);
         });
         if let Err(error) = installed {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");
         }
     });
+}
+
+/// Stops work that finds no good place.
+#[expect(clippy::disallowed_methods, reason = "people wait by the clock, and nothing is simulated here")]
+fn stop_in_time() {
+    thread::sleep(PATIENCE);
+    stop("stopped within a step, which would have taken longer")
 }
 
 /// Ends the program where it is.

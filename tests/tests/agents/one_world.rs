@@ -38,7 +38,6 @@ fn sixty_four_agents_in_one_world_learn_like_one_in_each_of_sixty_four() {
         let column = |rows: &[[f64; 2]]| mean(&rows.iter().map(|row| row[at]).collect::<Vec<_>>());
         let ((one, one_error), (many, many_error)) = (column(&one), column(&many));
         let error = (one_error + many_error).sqrt();
-        println!("{what}: {one:.3} in one World, {many:.3} in 64, ± {error:.3}");
         assert!((one - many).abs() < 3.0 * error + 0.01, "{what}: {one} in one World, {many} in 64, ± {error}");
     }
     let untrained = 0.6;

@@ -57,7 +57,7 @@ pub enum ConfigError {
         /// Line and column of the key to blame, from 1; the first ones of the file if it leaves that key out.
         at: (usize, usize),
         /// Why.
-        source: ExperimentError,
+        source: Box<ExperimentError>,
     },
 }
 

@@ -75,7 +75,7 @@ fn placed(keys: &Keys, sets: Vec<String>, source: ExperimentError, path: &Path) 
         return ConfigError::Sets { sets, source: source.into() };
     }
     let (path, at) = source.keys().into_iter().find_map(|key| keys.place(key)).unwrap_or((path, (1, 1)));
-    ConfigError::Values { path: path.into(), at, source }
+    ConfigError::Values { path: path.into(), at, source: source.into() }
 }
 
 /// Those sets without which the error would be gone, or all of them together.
