@@ -127,8 +127,8 @@ pub fn tell_length(experiment: &Experiment) {
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = args.from.load(games, args.settings())?;
     let game = open::game(games, &args.from, &experiment)?;
-    let checked = experiment.check_game(game).and_then(|()| experiment.check_memory(game));
-    checked.map_err(|error| args.from.locate(games, args.settings(), error))?;
+    // Levels are checked by the trainer, which takes longer.
+    experiment.check_memory(game).map_err(|error| args.from.locate(games, args.settings(), error))?;
     let skills = match &args.skills {
         Some(path) => Some(open::skills(path, args.compute.device(), &args.from)?),
         None => None,
@@ -136,7 +136,7 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let (device, threads) = (args.compute.device(), args.compute.threads());
     let demos = read_rollouts(game, &experiment, &args.from, games, threads)?;
     let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &demos, device, threads)
-        .map_err(|error| explain(error, args, &experiment))?;
+        .map_err(|error| explain(error, args, &experiment, games))?;
     let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.compute.device(), args.force)?;
     if args.from.experiment.is_none() {
         let Experiment { train, test, .. } = &experiment;
@@ -145,9 +145,14 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     Ok((run, trainer))
 }
 
-/// The error of a training that cannot begin; where skills are missing, with the commands that make and use them.
-fn explain(error: TrainError, args: &Args, experiment: &Experiment) -> CliError {
-    let TrainError::NoSkills(algorithm) = error else { return error.into() };
+/// The error of a training that cannot begin: with the place of the key to blame, and where skills are missing, with the
+/// commands that make and use them.
+fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Games) -> CliError {
+    let algorithm = match error {
+        TrainError::NoSkills(algorithm) => algorithm,
+        TrainError::Experiment(error) => return args.from.locate(games, args.settings(), error).into(),
+        other => return other.into(),
+    };
     let plain = match experiment.algorithm.learner() {
         LearnerKind::Ppo => Algorithm::Ppo,
         LearnerKind::Sac => Algorithm::Sac,

@@ -6,8 +6,10 @@ use std::{
     path::Path,
 };
 
-use playbot_learner::{seal_json, unseal_json};
+use playbot_learner::seal_json;
 use serde_json::Value;
+
+use super::sealed_file::unsealed_line;
 
 /// One line.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,8 +58,8 @@ impl JsonLines {
 }
 
 fn parse(line: &[u8]) -> Option<JsonLine> {
+    let unsealed = unsealed_line(line)?;
     let text = String::from_utf8(line.to_vec()).ok()?;
-    let unsealed = unseal_json(&text).ok()?;
     let value: Value = serde_json::from_str(&unsealed.text).ok()?;
     Some(JsonLine { step: value["step"].as_u64()?, text, value, had_seal: unsealed.had_seal })
 }

@@ -96,8 +96,14 @@ pub fn end_replacement(run: &Path) -> Result<(), RunError> {
 
 /// Whether a folder is what is left of a run that is being replaced.
 pub(crate) fn is_leftover(folder: &Path) -> bool {
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    name.rsplit_once(MARK).is_some_and(|(run, process)| !run.is_empty() && process.parse::<u32>().is_ok())
+    replaced_name(folder).is_some()
+}
+
+/// The name of the run whose parts a folder holds.
+fn replaced_name(folder: &Path) -> Option<String> {
+    let name = folder.file_name()?.to_string_lossy();
+    let (run, process) = name.rsplit_once(MARK)?;
+    (!run.is_empty() && process.parse::<u32>().is_ok()).then(|| run.to_owned())
 }
 
 /// Whether parts of a run lie beside it.
@@ -107,11 +113,8 @@ pub(super) fn is_being_replaced(run: &Path) -> bool {
 
 /// The folders beside a run that hold parts of what it was.
 fn leftovers(run: &Path) -> Vec<PathBuf> {
-    let own = |folder: &PathBuf| {
-        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let run = run.file_name().unwrap_or_default().to_string_lossy();
-        is_leftover(folder) && name.rsplit_once(MARK).is_some_and(|(name, _)| *name == *run)
-    };
+    let run_name = run.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let own = |folder: &PathBuf| replaced_name(folder).as_ref() == Some(&run_name);
     let parent = run.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let names = names_in(parent).unwrap_or_default();
     names.into_iter().map(|name| run.with_file_name(name)).filter(own).collect()

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use playbot_learner::{Unsealed, seal_json, unseal_json, unseal_text};
+use playbot_learner::{BrokenSeal, Unsealed, seal_json, unseal_json, unseal_text};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::json;
 
@@ -25,8 +25,7 @@ pub fn write_sealed(path: &Path, value: &impl Serialize) -> Result<(), RunError>
 /// [`RunError::Io`], or [`RunError::Damaged`] with the line if it is no JSON of this kind.
 pub fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<(T, bool), RunError> {
     let bytes = fs::read(path).map_err(io_error("read", path))?;
-    let Unsealed { text, had_seal } = unsealed(bytes, |text| unseal_json(text).map_err(|error| error.to_string()))
-        .map_err(|message| damaged(path, &message))?;
+    let Unsealed { text, had_seal } = unsealed(bytes, unseal_json).map_err(|message| damaged(path, &message))?;
     let value = serde_json::from_str(&text).map_err(|error| damaged(path, &error))?;
     Ok((value, had_seal))
 }
@@ -35,16 +34,20 @@ pub fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<(T, bool), RunErr
 pub(super) fn check_text_seal(path: &Path) -> Result<(), RunError> {
     // Whoever reads it says what is wrong if it cannot be read.
     let Ok(bytes) = fs::read(path) else { return Ok(()) };
-    let read = unsealed(bytes, |text| unseal_text(text).map_err(|error| error.to_string()));
-    read.map(drop).map_err(|message| edited(path, &message))
+    unsealed(bytes, unseal_text).map(drop).map_err(|message| edited(path, &message))
+}
+
+/// A line of a journal without its checksum; `None` if that is not the right one, or the line is no text.
+pub(crate) fn unsealed_line(line: &[u8]) -> Option<Unsealed> {
+    unseal_json(std::str::from_utf8(line).ok()?).ok()
 }
 
 /// The text of a file, whose bytes may be no text any more.
-fn unsealed(bytes: Vec<u8>, unseal: impl FnOnce(&str) -> Result<Unsealed, String>) -> Result<Unsealed, String> {
+fn unsealed(bytes: Vec<u8>, unseal: fn(&str) -> Result<Unsealed, BrokenSeal>) -> Result<Unsealed, String> {
     let text = String::from_utf8(bytes).map_err(|error| {
         format!("the file is damaged: it is no text from byte {} on", error.utf8_error().valid_up_to())
     })?;
-    unseal(&text)
+    unseal(&text).map_err(|error| error.to_string())
 }
 
 /// Says once of a run that nobody can tell whether its files are damaged.

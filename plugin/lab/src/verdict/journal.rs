@@ -7,13 +7,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{seal_json, unseal_json};
+use playbot_learner::seal_json;
 use serde::Deserialize;
 
 use super::{
     error::{TestError, io_error},
     level_verdict::LevelVerdict,
 };
+use crate::train::sealed_file::unsealed_line;
 
 /// Name of the file in the folder of a test.
 pub(super) const JOURNAL: &str = "levels.jsonl";
@@ -116,7 +117,7 @@ impl Journal {
             let mut line = vec![0; bytes];
             self.file.seek(SeekFrom::Start(start))?;
             self.file.read_exact(&mut line)?;
-            take(&unsealed(&line).ok_or(io::ErrorKind::InvalidData)?)?;
+            take(&unsealed_line(&line).ok_or(io::ErrorKind::InvalidData)?.text)?;
         }
         self.file.seek(SeekFrom::Start(self.length)).map(drop)
     }
@@ -131,16 +132,12 @@ fn whole_lines(file: &mut File) -> io::Result<(BTreeMap<u64, (u64, usize)>, u64)
         line.clear();
         reader.read_until(b'\n', &mut line)?;
         let Some(text) = line.strip_suffix(b"\n") else { break };
-        let Some(place) = unsealed(text).and_then(|line| serde_json::from_str::<Place>(&line).ok()) else { break };
+        let Some(line_text) = unsealed_line(text).map(|line| line.text) else { break };
+        let Ok(place) = serde_json::from_str::<Place>(&line_text) else { break };
         lines.entry(place.index).or_insert((length, text.len()));
         length += line.len() as u64;
     }
     Ok((lines, length))
-}
-
-/// A line without its checksum; `None` if that is not the right one. Older versions wrote none.
-fn unsealed(line: &[u8]) -> Option<String> {
-    unseal_json(std::str::from_utf8(line).ok()?).ok().map(|line| line.text)
 }
 
 #[cfg(test)]

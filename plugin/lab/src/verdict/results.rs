@@ -10,6 +10,7 @@ use std::{
 };
 
 use crc32fast::Hasher;
+use playbot_learner::BrokenSeal;
 use serde_json::Value;
 
 use super::{
@@ -136,13 +137,13 @@ impl ResultLines {
         let line = self.lines.next().transpose().map_err(io_error("read", &self.path))?;
         self.number += 1;
         match line {
-            Some(line) if line == END || line == end(&self.hasher) => {
+            // No level begins so.
+            Some(line) if line.starts_with(']') => {
+                if line != END && line != end(&self.hasher) {
+                    return Err(self.damaged(&BrokenSeal.to_string()));
+                }
                 self.is_over = true;
                 Ok(None)
-            }
-            Some(line) if line.starts_with(']') => {
-                let message = "the file is damaged: its checksum is not that of its contents";
-                Err(self.damaged(message))
             }
             Some(line) => {
                 hash_line(&mut self.hasher, &line);

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{Unsealed, seal_json, unseal_json};
+use playbot_learner::{Unsealed, seal_json};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -15,7 +15,7 @@ use super::{
     job::JobResult,
     record::ScoreRecord,
 };
-use crate::verdict::Earlier;
+use crate::{train::sealed_file::unsealed_line, verdict::Earlier};
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -135,8 +135,7 @@ impl ScoreJournal {
         loop {
             line.clear();
             reader.read_until(b'\n', &mut line).map_err(io_error("read", &self.path))?;
-            let Some(text) = line.strip_suffix(b"\n").and_then(|line| std::str::from_utf8(line).ok()) else { break };
-            let Ok(Unsealed { text, .. }) = unseal_json(text) else { break };
+            let Some(Unsealed { text, .. }) = line.strip_suffix(b"\n").and_then(unsealed_line) else { break };
             if self.length == 0 {
                 let Ok(head) = serde_json::from_str::<Head>(&text) else { break };
                 let differences = head.record.differences(record);
