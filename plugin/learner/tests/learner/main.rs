@@ -1,6 +1,5 @@
 //! The learner as a whole: does it learn, is it exact, does it survive a restart.
 
-mod allocations;
 mod augmentation;
 mod checkpoint;
 mod clock;

@@ -1,4 +1,7 @@
-//! Steps compute in memory that the steps before them have left.
+//! Steps compute in memory that the steps before them have left. What is left waits for whoever asks first in the whole
+//! program, so that these tests are a program of their own and take turns.
+
+use std::sync::{Mutex, PoisonError};
 
 use allocation_counter::{AllocationInfo, measure};
 use burn::tensor::{Tensor, TensorData};
@@ -11,6 +14,8 @@ use rayon::ThreadPoolBuilder;
 
 /// What the third step asks for, on one thread.
 fn of_a_step(mut step: impl FnMut() + Send) -> AllocationInfo {
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let pool = ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     pool.install(|| {
         (0..2).for_each(|_| step());
