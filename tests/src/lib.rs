@@ -8,6 +8,7 @@ pub mod foreign;
 pub mod measuring;
 pub mod memory;
 mod painted;
+pub mod power_cut;
 pub mod recording;
 pub mod scene;
 pub mod soak;

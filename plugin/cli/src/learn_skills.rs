@@ -7,7 +7,7 @@ use std::{
 
 use playbot_lab::games::Games;
 use playbot_lab::train::Experiment;
-use playbot_learner::{Dataset, DeviceKind, FileError, SkillMetrics, SkillModel, SkillTrainer};
+use playbot_learner::{Dataset, DeviceKind, FileError, SkillMetrics, SkillModel, SkillTrainer, disk};
 use serde_json::json;
 
 use super::{
@@ -109,7 +109,7 @@ pub fn checkpoint_of(out: &Path) -> PathBuf {
 ///
 /// The system refuses.
 pub fn remove(checkpoint: &Path) -> Result<(), CliError> {
-    match std::fs::remove_file(checkpoint) {
+    match disk::remove_file(checkpoint) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
             Err(CliError::Io(format!("cannot remove {}: {error}", checkpoint.display())))
         }

@@ -1,11 +1,9 @@
 //! Files to write: looked at before the work whose result they are to hold.
 
-use std::{
-    fs::{self, File},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use playbot_lab::train::run_dir::write_atomically;
+use playbot_learner::disk::{self, DiskFile};
 
 use super::error::CliError;
 
@@ -23,8 +21,8 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
     }
     make_folder_of(path)?;
     let probe = beside(path, ".probe");
-    File::create(&probe)
-        .and_then(|_| fs::remove_file(&probe))
+    DiskFile::create(&probe)
+        .and_then(|_| disk::remove_file(&probe))
         .map_err(|error| CliError::Io(format!("cannot write {}: {error}; {ELSEWHERE}", path.display())))
 }
 
@@ -35,7 +33,7 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
 /// The system refuses.
 pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     let folder = path.parent().unwrap_or(path);
-    fs::create_dir_all(folder)
+    disk::create_dir_all(folder)
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}; {ELSEWHERE}", folder.display())))
 }
 
@@ -48,7 +46,7 @@ pub fn make_folder(folder: &Path) -> Result<(), CliError> {
     if folder.is_file() {
         return Err(CliError::Usage(format!("{} is a file: name a folder to write into", folder.display())));
     }
-    fs::create_dir_all(folder).map_err(|error| {
+    disk::create_dir_all(folder).map_err(|error| {
         CliError::Io(format!(
             "cannot create {}: {error}; make room or rights there, or name another folder",
             folder.display()

@@ -21,7 +21,7 @@ use playbot_lab::{
         run_lock::RunLock,
     },
 };
-use playbot_learner::{Dataset, DeviceKind, SkillModel};
+use playbot_learner::{Dataset, DeviceKind, SkillModel, disk};
 use serde_json::json;
 
 use report::write_report;
@@ -189,8 +189,7 @@ fn check_folder(path: &Path) -> Result<(), CliError> {
 
 /// Makes the folder of the quickstart and locks it.
 fn take_folder(path: &Path) -> Result<RunLock, CliError> {
-    std::fs::create_dir_all(path)
-        .map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+    disk::create_dir_all(path).map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
     Ok(RunLock::take(path)?)
 }
 

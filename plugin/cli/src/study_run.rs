@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeSet,
-    fs,
     path::{Path, PathBuf},
 };
 
@@ -23,7 +22,7 @@ use playbot_lab::{
         study::StudyRun,
     },
 };
-use playbot_learner::{DeviceKind, SkillModel};
+use playbot_learner::{DeviceKind, SkillModel, disk};
 
 use super::{
     cloning::cloning,
@@ -104,7 +103,7 @@ impl<'a> Runner<'a> {
         if is_saved && let Some(result) = known_result(&folder.join(RESULT)) {
             return Ok(Some((result, success_curve(&folder)?)));
         }
-        fs::create_dir_all(&folder)
+        disk::create_dir_all(&folder)
             .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
         let lock = RunLock::take(&folder)?;
         let dir = if is_saved { RunFolder::Begun(RunDir::open_with(lock)?.run) } else { RunFolder::New(lock) };

@@ -36,6 +36,7 @@
 
 mod among_workers;
 mod device;
+pub mod disk;
 mod error;
 mod file;
 mod learner;
@@ -57,10 +58,9 @@ pub mod spirl;
 pub(crate) use among_workers::are_awake;
 pub use among_workers::{among_awake_workers, among_workers, waited};
 pub use device::{DeviceKind, UnknownDevice};
+pub use disk::{write_atomically, write_atomically_with};
 pub use error::{FileError, LearnError};
-pub use file::{
-    BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text, write_atomically, write_atomically_with,
-};
+pub use file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text};
 pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;
 pub use observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureCard};

@@ -1,9 +1,6 @@
 //! A way that was found, as a recording.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use bevy_playbot::demo::file::DemoWriter;
 use playbot_lab::{
@@ -11,6 +8,7 @@ use playbot_lab::{
     explore::{Exploration, Route, record_route},
     game::Game,
 };
+use playbot_learner::disk;
 
 use crate::{
     error::CliError,
@@ -52,7 +50,7 @@ impl RecordingFile {
         let written = self.record(game, exploration, route, &fresh);
         if written.is_err() {
             // It is of no use, and the error says why.
-            let _ = fs::remove_file(&fresh);
+            let _ = disk::remove_file(&fresh);
         }
         written
     }
@@ -78,6 +76,6 @@ impl RecordingFile {
                 game.name()
             )));
         }
-        fs::rename(fresh, &self.0).map_err(|error| CliError::Io(format!("cannot write {path}: {error}")))
+        disk::rename(fresh, &self.0).map_err(|error| CliError::Io(format!("cannot write {path}: {error}")))
     }
 }

@@ -13,7 +13,7 @@ use std::{
 };
 
 use bevy_playbot::level_files::LevelFile;
-use playbot_learner::{write_atomically, write_atomically_with};
+use playbot_learner::{disk, write_atomically, write_atomically_with};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -182,11 +182,11 @@ impl BugSet {
             return Err(BugError::Exists(folder.to_owned()));
         }
         let (path, level_folder) = (folder.join(MUTANTS), folder.join(LEVELS));
-        gone(fs::remove_file(&path)).map_err(io_error("remove", &path))?;
+        gone(disk::remove_file(&path)).map_err(io_error("remove", &path))?;
         if replace {
-            gone(fs::remove_dir_all(&level_folder)).map_err(io_error("remove", &level_folder))?;
+            gone(disk::remove_dir_all(&level_folder)).map_err(io_error("remove", &level_folder))?;
         }
-        fs::create_dir_all(&level_folder).map_err(io_error("create", &level_folder))?;
+        disk::create_dir_all(&level_folder).map_err(io_error("create", &level_folder))?;
         for (id, text) in levels {
             let file = folder.join(level_path(id));
             write_atomically(&file, format!("{}\n", text.trim_end()).as_bytes()).map_err(io_error("write", &file))?;

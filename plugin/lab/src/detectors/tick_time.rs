@@ -1,13 +1,13 @@
 //! Ticks that take too long.
 
 use std::{
-    fs::{self, OpenOptions},
     io::{self, Write},
     path::Path,
     sync::{Mutex, PoisonError},
     time::Duration,
 };
 
+use playbot_learner::disk::{self, DiskFile};
 use serde::Serialize;
 
 use crate::detector::Setting;
@@ -85,8 +85,7 @@ impl TickTime {
             text.push_str(&serde_json::to_string(tick)?);
             text.push('\n');
         }
-        let mut file = OpenOptions::new().create(true).append(true).open(folder.join(TIMING))?;
-        file.write_all(text.as_bytes())?;
+        DiskFile::append(&folder.join(TIMING))?.write_all(text.as_bytes())?;
         Ok(slow.len())
     }
 }
@@ -97,7 +96,7 @@ impl TickTime {
 ///
 /// The file cannot be removed.
 pub fn forget_timing(folder: &Path) -> io::Result<()> {
-    match fs::remove_file(folder.join(TIMING)) {
+    match disk::remove_file(&folder.join(TIMING)) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
     }

@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_learner::disk;
+
 use super::{
     error::{FindingError, io_error},
     file_name::ENDING,
@@ -46,7 +48,7 @@ pub fn clear_findings(folder: &Path) -> Result<(), FindingError> {
         return Ok(());
     }
     for (_, file) in files_in(&below).map_err(io_error("list", &below))? {
-        fs::remove_file(&file).map_err(io_error("remove", &file))?;
+        disk::remove_file(&file).map_err(io_error("remove", &file))?;
     }
     Ok(())
 }
@@ -62,7 +64,7 @@ pub fn gather_findings(folders: &[PathBuf], out: &Path) -> Result<(), FindingErr
         if !below.is_dir() {
             continue;
         }
-        fs::create_dir_all(&target).map_err(io_error("create", &target))?;
+        disk::create_dir_all(&target).map_err(io_error("create", &target))?;
         for (name, file) in files_in(&below).map_err(io_error("list", &below))? {
             let copy = target.join(format!("{name}.{ENDING}"));
             let bytes = fs::read(&file).map_err(io_error("read", &file))?;

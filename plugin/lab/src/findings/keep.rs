@@ -1,8 +1,9 @@
 //! Writing findings while levels are tested.
 
-use std::{fs, path::PathBuf};
+use std::path::PathBuf;
 
 use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
+use playbot_learner::disk;
 
 use super::{
     checks::Checks,
@@ -140,7 +141,7 @@ impl FindingFiles {
             return Ok(None);
         }
         let below = self.folder.join(FINDINGS);
-        fs::create_dir_all(&below).map_err(io_error("create", &below))?;
+        disk::create_dir_all(&below).map_err(io_error("create", &below))?;
         finding.write(&below.join(&name))?;
         Ok(Some(format!("{FINDINGS}/{name}")))
     }

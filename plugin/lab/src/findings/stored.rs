@@ -4,7 +4,7 @@
 //! checksummed, and shown by every program that shows recordings. The head of the finding is the recording's note.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -13,6 +13,7 @@ use bevy_playbot::{
     demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoWriter},
     episode::EpisodeEnd,
 };
+use playbot_learner::disk;
 use serde::Deserialize;
 
 use super::{
@@ -129,10 +130,10 @@ impl StoredFinding {
     /// The disk fails.
     pub fn write(&self, path: &Path) -> Result<(), FindingError> {
         let fresh = beside(path);
-        let written = self.write_new(&fresh).and_then(|()| fs::rename(&fresh, path).map_err(io_error("write", path)));
+        let written = self.write_new(&fresh).and_then(|()| disk::rename(&fresh, path).map_err(io_error("write", path)));
         if written.is_err() {
             // The first error is the one to report.
-            let _ = fs::remove_file(&fresh);
+            let _ = disk::remove_file(&fresh);
         }
         written
     }

@@ -1,8 +1,7 @@
 //! The report: a single HTML file.
 
 use std::fmt::Write as _;
-use std::fs;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -103,16 +102,8 @@ impl Report {
     /// [`ReportError`] when the folder does not exist or cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), ReportError> {
         let path = path.as_ref();
-        let mut temporary = path.as_os_str().to_owned();
-        temporary.push(".writing");
-        let temporary = PathBuf::from(temporary);
-        fs::File::create(&temporary)
-            .and_then(|mut file| file.write_all(self.to_html().as_bytes()).and_then(|()| file.sync_all()))
-            .and_then(|()| fs::rename(&temporary, path))
-            .map_err(|source| {
-                let _ = fs::remove_file(&temporary);
-                ReportError { path: path.to_owned(), source }
-            })
+        playbot_learner::write_atomically(path, self.to_html().as_bytes())
+            .map_err(|source| ReportError { path: path.to_owned(), source })
     }
 }
 

@@ -9,11 +9,11 @@
 //! A folder called `step-…` is whole: it is filled under another name first.
 
 use std::{
-    fs::{self, File},
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 
+use playbot_learner::disk;
 use serde::{Deserialize, Serialize};
 
 pub use super::checkpoint_choice::CheckpointChoice;
@@ -138,7 +138,7 @@ pub(super) fn write(
     let fresh = Checkpoint { path: folder.join(UNFINISHED), summary };
     let path = folder.join(format!("{PREFIX}{:012}", summary.step));
     remove_if_there(&fresh.path)?;
-    fs::create_dir_all(&fresh.path).map_err(io_error("create", &fresh.path))?;
+    disk::create_dir_all(&fresh.path).map_err(io_error("create", &fresh.path))?;
     let filled = fill(&fresh).and_then(|()| write_sealed(&fresh.path.join(SUMMARY), &summary));
     if filled.is_err() {
         // Gives back the space; the first error is the one to report.
@@ -146,11 +146,7 @@ pub(super) fn write(
         return filled;
     }
     put_aside(&path)?;
-    fs::rename(&fresh.path, &path).map_err(io_error("move", &fresh.path))?;
-    // Makes the new name durable where folders can be opened; elsewhere the rename is all there is.
-    if let Ok(folder) = File::open(&folder) {
-        let _ = folder.sync_all();
-    }
+    disk::rename(&fresh.path, &path).map_err(io_error("move", &fresh.path))?;
     prune(run, keep)
 }
 
@@ -170,7 +166,7 @@ fn put_aside(path: &Path) -> Result<(), RunError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let aside = path.with_file_name(format!("damaged-{name}"));
     remove_if_there(&aside)?;
-    fs::rename(path, &aside).map_err(io_error("move", path))
+    disk::rename(path, &aside).map_err(io_error("move", path))
 }
 
 /// Removes all but the last `keep` (at least one) and the best.
@@ -183,7 +179,7 @@ fn prune(run: &Path, keep: usize) -> Result<(), RunError> {
     for (index, checkpoint) in all.iter().enumerate().take(old) {
         if Some(index) != best {
             let removed = folder(run).join(REMOVED);
-            fs::rename(&checkpoint.path, &removed).map_err(io_error("move", &checkpoint.path))?;
+            disk::rename(&checkpoint.path, &removed).map_err(io_error("move", &checkpoint.path))?;
             remove_if_there(&removed)?;
         }
     }
@@ -205,7 +201,7 @@ fn read_summary(path: &Path) -> Result<CheckpointSummary, RunError> {
 }
 
 fn remove_if_there(folder: &Path) -> Result<(), RunError> {
-    match fs::remove_dir_all(folder) {
+    match disk::remove_dir_all(folder) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", folder)(error)),
         _ => Ok(()),
     }

@@ -1,12 +1,12 @@
 //! Files with one line of JSON per update, which a crash can tear at their end.
 
 use std::{
-    fs::{self, OpenOptions},
+    fs,
     io::{self, Write},
     path::Path,
 };
 
-use playbot_learner::seal_json;
+use playbot_learner::{disk::DiskFile, seal_json};
 use serde_json::Value;
 
 use super::sealed_file::unsealed_line;
@@ -70,8 +70,7 @@ fn parse(line: &[u8]) -> Option<JsonLine> {
 ///
 /// The operating system refuses.
 pub fn append_json_line(path: &Path, line: &Value) -> io::Result<()> {
-    let mut file = OpenOptions::new().create(true).append(true).open(path)?;
-    file.write_all(format!("{}\n", seal_json(&line.to_string())).as_bytes())
+    DiskFile::append(path)?.write_all(format!("{}\n", seal_json(&line.to_string())).as_bytes())
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
+use playbot_learner::disk::DiskFile;
 use serde_json::{Value, json};
 
 use super::{
@@ -71,6 +72,18 @@ impl MetricsLog {
     /// [`RunError::Io`].
     pub fn append(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
         self.write(report.step, &metrics_line(report), &timing_line(report, steps_per_update, wall_time()))
+    }
+
+    /// Waits until all that was appended is on the disk, where a checkpoint relies on it.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Io`].
+    pub(super) fn sync(&self) -> Result<(), RunError> {
+        let there = [&self.metrics, &self.timing].into_iter().filter(|path| path.exists());
+        there
+            .into_iter()
+            .try_for_each(|path| DiskFile::append(path).and_then(|file| file.sync()).map_err(io_error("write", path)))
     }
 
     fn write(&self, step: u64, metrics: &Value, timing: &Value) -> Result<(), RunError> {

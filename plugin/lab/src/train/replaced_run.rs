@@ -6,6 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use playbot_learner::disk;
+
 use super::{
     run_error::{RunError, io_error},
     run_lock::{LOCK_FILE, RunLock},
@@ -34,10 +36,10 @@ impl ReplacedRun {
         let mut name = run.file_name().unwrap_or_default().to_owned();
         name.push(format!("{MARK}{}", std::process::id()));
         let folder = run.with_file_name(name);
-        fs::create_dir_all(&folder).map_err(io_error("create", &folder))?;
+        disk::create_dir_all(&folder).map_err(io_error("create", &folder))?;
         aside.folder = Some(folder.clone());
         for name in names {
-            if let Err(error) = fs::rename(run.join(&name), folder.join(&name)) {
+            if let Err(error) = disk::rename(&run.join(&name), &folder.join(&name)) {
                 aside.put_back();
                 return Err(io_error("replace", run)(error));
             }
@@ -48,7 +50,7 @@ impl ReplacedRun {
     /// Forgets it. The new run does not depend on whether this works.
     pub(super) fn remove(self) {
         if let Some(folder) = self.folder
-            && let Err(error) = fs::remove_dir_all(&folder)
+            && let Err(error) = disk::remove_dir_all(&folder)
         {
             tracing::warn!("cannot remove the old run in {}: {error}", folder.display());
         }
@@ -58,9 +60,9 @@ impl ReplacedRun {
     pub(super) fn put_back(self) {
         let Some(folder) = self.folder else { return };
         for name in names_in(&folder).unwrap_or_default() {
-            let _ = fs::rename(folder.join(&name), self.run.join(&name));
+            let _ = disk::rename(&folder.join(&name), &self.run.join(&name));
         }
-        if fs::remove_dir(&folder).is_err() {
+        if disk::remove_dir(&folder).is_err() {
             tracing::warn!("the old run is in {}", folder.display());
         }
     }

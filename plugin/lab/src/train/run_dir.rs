@@ -10,12 +10,9 @@
 //! runs/<id>/run.lock           locked while somebody trains, see [`RunLock`]
 //! ```
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use playbot_learner::{DeviceKind, seal_text};
+use playbot_learner::{DeviceKind, disk, seal_text};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -118,7 +115,7 @@ impl RunDir {
                 return Err(if is_run { RunError::Exists(path.into()) } else { RunError::NotARun(path.into()) });
             }
         }
-        fs::create_dir_all(path).map_err(io_error(FOLDER, path))?;
+        disk::create_dir_all(path).map_err(io_error(FOLDER, path))?;
         Self::begin(RunLock::take(path)?, experiment, info)
     }
 
@@ -230,6 +227,7 @@ impl RunDir {
     ///
     /// [`RunError`]; the earlier checkpoints are still there.
     pub fn save(&self, trainer: &mut Trainer) -> Result<(), RunError> {
+        self.metrics_log().sync()?;
         let keep = trainer.experiment().checkpoints.keep;
         checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
             trainer.learner.save(&fresh.learner_file())?;

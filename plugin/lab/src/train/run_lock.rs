@@ -7,6 +7,8 @@ use std::{
     thread,
 };
 
+use playbot_learner::disk::DiskFile;
+
 use super::run_dir::{RunError, io_error};
 
 /// Name of the file that is locked. It stays when the lock is given back, and says nothing then.
@@ -20,7 +22,7 @@ const TRIES: usize = 1000;
 #[derive(Debug)]
 pub struct RunLock {
     folder: PathBuf,
-    _file: File,
+    _file: DiskFile,
 }
 
 impl RunLock {
@@ -31,9 +33,9 @@ impl RunLock {
     /// [`RunError::Busy`] if somebody has it; [`RunError::Io`] if the folder cannot be written.
     pub fn take(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(LOCK_FILE);
-        let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
+        let file = DiskFile::open(&path, OpenOptions::new().create(true).truncate(false).write(true));
         let file = file.map_err(io_error("open", &path))?;
-        match try_often(&file) {
+        match try_often(file.as_file()) {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(RunError::Busy(folder.into())),
             // Some network file systems have no locks.

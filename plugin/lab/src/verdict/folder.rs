@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{seal_json, unseal_json, write_atomically, write_atomically_with};
+use playbot_learner::{disk, seal_json, unseal_json, write_atomically, write_atomically_with};
 
 use super::{
     error::{TestError, io_error, json_fault},
@@ -54,7 +54,7 @@ impl TestFolder {
         if path.is_file() {
             return Err(TestError::NotAFolder(path.into()));
         }
-        fs::create_dir_all(path).map_err(io_error("create", path))?;
+        disk::create_dir_all(path).map_err(io_error("create", path))?;
         let (record_file, results) = (path.join(RECORD), path.join(RESULTS));
         let is_known = record_file.exists();
         let is_taken = is_known || results.exists();
@@ -115,7 +115,7 @@ impl TestFolder {
 }
 
 fn remove(file: &Path) -> Result<(), TestError> {
-    match fs::remove_file(file) {
+    match disk::remove_file(file) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", file)(error)),
         _ => Ok(()),
     }

@@ -2,12 +2,12 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs::{File, OpenOptions, TryLockError},
+    fs::{OpenOptions, TryLockError},
     io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
-use playbot_learner::seal_json;
+use playbot_learner::{disk::DiskFile, seal_json};
 use serde::Deserialize;
 
 use super::{
@@ -23,7 +23,7 @@ pub(super) const JOURNAL: &str = "levels.jsonl";
 /// somebody writes.
 pub(super) struct Journal {
     path: PathBuf,
-    file: File,
+    file: DiskFile,
     /// Where the line of each level begins and how many bytes it has, without its line feed: by place in the range.
     lines: BTreeMap<u64, (u64, usize)>,
     length: u64,
@@ -44,9 +44,9 @@ impl Journal {
     /// [`TestError::Busy`], or the operating system refuses.
     pub fn open(folder: &Path) -> Result<(Self, u64), TestError> {
         let path = folder.join(JOURNAL);
-        let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-        let mut file = options.map_err(io_error("open", &path))?;
-        match file.try_lock() {
+        let file = DiskFile::open(&path, OpenOptions::new().read(true).write(true).create(true).truncate(false));
+        let mut file = file.map_err(io_error("open", &path))?;
+        match file.as_file().try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(TestError::Busy(folder.into())),
             // Some network file systems have no locks.
@@ -56,7 +56,7 @@ impl Journal {
             Err(TryLockError::Error(error)) => return Err(io_error("lock", &path)(error)),
         }
         let found = whole_lines(&mut file).and_then(|(lines, length)| {
-            let cut = file.metadata()?.len() - length;
+            let cut = file.as_file().metadata()?.len() - length;
             file.set_len(length)?;
             file.seek(SeekFrom::Start(length))?;
             Ok((lines, length, cut))
@@ -124,7 +124,7 @@ impl Journal {
 }
 
 /// Where the lines are up to the first damaged one, and where that begins. Of two lines of one level the first counts.
-fn whole_lines(file: &mut File) -> io::Result<(BTreeMap<u64, (u64, usize)>, u64)> {
+fn whole_lines(file: &mut DiskFile) -> io::Result<(BTreeMap<u64, (u64, usize)>, u64)> {
     let (mut lines, mut length) = (BTreeMap::new(), 0);
     let mut reader = BufReader::new(file);
     let mut line = Vec::new();

@@ -1,11 +1,11 @@
 //! Joining the results of shards.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
-use playbot_learner::write_atomically_with;
+use playbot_learner::{disk, write_atomically_with};
 
 use super::{
     error::{TestError, io_error},
@@ -64,7 +64,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
 
 fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out: &Path) -> Result<(), TestError> {
     let is_new = !out.exists();
-    fs::create_dir_all(out).map_err(io_error("create", out))?;
+    disk::create_dir_all(out).map_err(io_error("create", out))?;
     let path = out.join(RESULTS);
     // The writer knows errors of the system alone.
     let mut damaged = None;
@@ -87,7 +87,7 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
     };
     if written.is_err() && is_new {
         // If it is not empty after all, it stays; what went wrong before is what is told.
-        let _ = fs::remove_dir(out);
+        let _ = disk::remove_dir(out);
     }
     written
 }

@@ -1,7 +1,7 @@
 //! Self-describing safetensors files: tensors by name, and a JSON description in the header.
 
 use super::seal::{Form, digits_of};
-use super::write_atomically;
+use crate::disk::write_atomically;
 use crate::{FileError, LearnError};
 use safetensors::{Dtype, SafeTensorError, SafeTensors, tensor::TensorView};
 use std::collections::{BTreeMap, HashMap};

@@ -69,7 +69,7 @@ pub fn merge_demos(files: &[impl AsRef<Path>], out: impl AsRef<Path>) -> Result<
     if let Err(error) = copied {
         drop(writer);
         // Half a merge looks like a whole one.
-        let _ = std::fs::remove_file(out);
+        let _ = playbot_learner::disk::remove_file(out);
         return Err(error);
     }
     Ok(report)

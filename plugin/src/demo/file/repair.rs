@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use playbot_learner::disk::{DiskFile, hard_link, remove_file, rename};
 use serde::Serialize;
 
 use super::error::{DemoFault, DemoFileError};
@@ -80,11 +81,11 @@ pub fn repair(
         report.backup = Some(backup.map_err(|e| at_input(DemoFault::io("keep a backup")(e)))?);
     }
     let temporary = beside(out, ".repairing");
-    let written = File::create(&temporary)
-        .and_then(|mut file| file.write_all(&output).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&temporary, out));
+    let written = DiskFile::create(&temporary)
+        .and_then(|mut file| file.write_all(&output).and_then(|()| file.sync()))
+        .and_then(|()| rename(&temporary, out));
     written.map_err(|source| {
-        let _ = fs::remove_file(&temporary);
+        let _ = remove_file(&temporary);
         DemoFileError::new(out, DemoFault::io("write the repaired file")(source))
     })?;
     Ok(report)
@@ -172,14 +173,14 @@ fn keep_backup(path: &Path, content: &[u8]) -> std::io::Result<PathBuf> {
             1 => beside(path, ".bak"),
             _ => beside(path, &format!(".bak{number}")),
         };
-        match fs::hard_link(path, &backup) {
+        match hard_link(path, &backup) {
             Ok(()) => return Ok(backup),
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
             // File systems without hard links.
             Err(_) => {
-                let mut copy = File::create_new(&backup)?;
+                let mut copy = DiskFile::create_new(&backup)?;
                 copy.write_all(content)?;
-                copy.sync_all()?;
+                copy.sync()?;
                 return Ok(backup);
             }
         }

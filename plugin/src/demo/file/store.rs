@@ -3,6 +3,8 @@
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 
+use playbot_learner::disk::DiskFile;
+
 use super::error::DemoFault;
 
 /// What the writer needs of a file; the tests stand in a disk that fills up.
@@ -11,9 +13,9 @@ pub(super) trait Store: Write + Send + Sync {
     fn cut(&mut self, length: u64) -> io::Result<()>;
 }
 
-impl Store for File {
+impl Store for DiskFile {
     fn sync(&mut self) -> io::Result<()> {
-        match self.sync_data() {
+        match DiskFile::sync(self) {
             // Devices and pipes cannot be synchronised, and need not be.
             Err(e) if e.kind() == io::ErrorKind::InvalidInput => Ok(()),
             other => other,

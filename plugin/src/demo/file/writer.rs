@@ -4,6 +4,8 @@ use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use playbot_learner::disk::{DiskFile, remove_file};
+
 use super::episode::DemoEpisode;
 use super::error::{DemoFault, DemoFileError};
 use super::header::DemoHeader;
@@ -48,7 +50,7 @@ impl DemoWriter {
         Self::start(path, header, OpenOptions::new().write(true).create_new(true)).inspect_err(|error| {
             // A file without a header would be in the way of the next attempt.
             if matches!(error.fault, DemoFault::Io { action: "write the header", .. }) {
-                let _ = std::fs::remove_file(path);
+                let _ = remove_file(path);
             }
         })
     }
@@ -67,15 +69,15 @@ impl DemoWriter {
     fn start(path: &Path, header: DemoHeader, options: &OpenOptions) -> Result<Self, DemoFileError> {
         let attempt = || {
             let bytes = preamble::encode(&header)?;
-            let mut file = options.open(path).map_err(|source| match source.kind() {
+            let mut file = DiskFile::open(path, options).map_err(|source| match source.kind() {
                 io::ErrorKind::AlreadyExists => DemoFault::Exists,
                 _ => DemoFault::Io { action: "create the file", source },
             })?;
-            lock(&file)?;
-            if file.metadata().is_ok_and(|m| m.len() > 0) {
+            lock(file.as_file())?;
+            if file.as_file().metadata().is_ok_and(|m| m.len() > 0) {
                 file.set_len(0).map_err(DemoFault::io("empty the file"))?;
             }
-            file.write_all(&bytes).and_then(|()| file.sync()).map_err(DemoFault::io("write the header"))?;
+            file.write_all(&bytes).and_then(|()| Store::sync(&mut file)).map_err(DemoFault::io("write the header"))?;
             Ok((file, bytes.len() as u64))
         };
         let (file, length) = attempt().map_err(|fault: DemoFault| DemoFileError::new(path, fault))?;
@@ -95,10 +97,10 @@ impl DemoWriter {
         let path = path.as_ref();
         let fault = |fault| DemoFileError::new(path, fault);
         let open = || {
-            let file = OpenOptions::new().read(true).write(true).open(path);
+            let file = DiskFile::open(path, OpenOptions::new().read(true).write(true));
             let file = file.map_err(DemoFault::io("open the file"))?;
-            lock(&file)?;
-            let same_file = file.try_clone().map_err(DemoFault::io("open the file"))?;
+            lock(file.as_file())?;
+            let same_file = file.as_file().try_clone().map_err(DemoFault::io("open the file"))?;
             Ok((file, DemoReader::from_file(path, same_file)?))
         };
         // The reader shares the handle: a lock may keep others from reading.

@@ -2,12 +2,16 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File, OpenOptions, TryLockError},
+    fs::{OpenOptions, TryLockError},
     io::{self, BufRead, BufReader, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
-use playbot_learner::{Unsealed, seal_json};
+use playbot_learner::{
+    Unsealed,
+    disk::{self, DiskFile},
+    seal_json,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -28,7 +32,7 @@ struct Head {
 /// A file with a line of JSON for each finished job. It is locked while somebody writes.
 pub struct ScoreJournal {
     path: PathBuf,
-    file: File,
+    file: DiskFile,
     length: u64,
     command: String,
     finished: BTreeMap<(String, String), JobResult>,
@@ -51,9 +55,9 @@ impl ScoreJournal {
         if earlier == Earlier::Keep && (score.exists() || path.exists()) {
             return Err(ScoreError::Exists(score.into()));
         }
-        let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-        let file = options.map_err(io_error("open", &path))?;
-        match file.try_lock() {
+        let file = DiskFile::open(&path, OpenOptions::new().read(true).write(true).create(true).truncate(false));
+        let file = file.map_err(io_error("open", &path))?;
+        match file.as_file().try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(ScoreError::Busy(score.into())),
             // Some network file systems have no locks.
@@ -106,7 +110,7 @@ impl ScoreJournal {
         let Self { path, file, .. } = self;
         // Not every system removes files that are open.
         drop(file);
-        fs::remove_file(&path).map_err(io_error("remove", &path))
+        disk::remove_file(&path).map_err(io_error("remove", &path))
     }
 
     fn write(&mut self, line: &impl Serialize) -> Result<(), ScoreError> {
@@ -130,7 +134,7 @@ impl ScoreJournal {
 
     /// Reads all whole lines, and cuts off what follows after the first damaged one.
     fn read(&mut self, score: &Path, record: &ScoreRecord) -> Result<u64, ScoreError> {
-        let mut reader = BufReader::new(&self.file);
+        let mut reader = BufReader::new(self.file.as_file());
         let mut line = Vec::new();
         loop {
             line.clear();
@@ -151,7 +155,7 @@ impl ScoreJournal {
         }
         drop(reader);
         let whole = self.length;
-        let cut = self.file.metadata().map_err(io_error("read", &self.path))?.len().saturating_sub(whole);
+        let cut = self.file.as_file().metadata().map_err(io_error("read", &self.path))?.len().saturating_sub(whole);
         let cut_off = self.file.set_len(whole).and_then(|()| self.file.seek(SeekFrom::Start(whole)));
         cut_off.map_err(io_error("read", &self.path))?;
         Ok(cut)

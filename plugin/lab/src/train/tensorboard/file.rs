@@ -1,10 +1,12 @@
 //! The event file of a run.
 
 use std::{
-    fs::{self, OpenOptions},
+    fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
+
+use playbot_learner::disk::{self, DiskFile};
 
 use super::{
     event::{Event, EventKind},
@@ -36,7 +38,7 @@ impl EventFolder {
         let Some(file) = self.files()?.pop() else { return self.rewrite(std::slice::from_ref(event), event.wall_time) };
         let mut record = Vec::new();
         frame(&event.encode(), &mut record);
-        OpenOptions::new().append(true).open(file)?.write_all(&record)
+        DiskFile::append(&file)?.write_all(&record)
     }
 
     /// Puts a new file with these events in the place of the old ones, if there are any.
@@ -48,7 +50,7 @@ impl EventFolder {
     ///
     /// The operating system refuses; the old file is then still there.
     pub fn rewrite(&self, events: &[Event], now: f64) -> io::Result<()> {
-        fs::create_dir_all(&self.path)?;
+        disk::create_dir_all(&self.path)?;
         let old = self.files()?;
         let after = old.last().and_then(|file| second_of(file)).map_or(0, |second| second + 1);
         let second = (now as u64).max(after);
@@ -60,9 +62,10 @@ impl EventFolder {
             frame(&event.encode(), &mut content);
         }
         let temporary = self.path.join("unfinished");
-        fs::write(&temporary, content)?;
-        fs::rename(temporary, self.path.join(format!("{PREFIX}{second:010}.playbot")))?;
-        old.iter().try_for_each(fs::remove_file)
+        let mut file = DiskFile::create(&temporary)?;
+        file.write_all(&content).and_then(|()| file.sync())?;
+        disk::rename(&temporary, &self.path.join(format!("{PREFIX}{second:010}.playbot")))?;
+        old.iter().try_for_each(|file| disk::remove_file(file))
     }
 
     /// The event files, from the oldest to the newest.

@@ -1,8 +1,9 @@
 //! Files that are whole or not there.
 
-use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+
+use super::{DiskFile, remove_file, rename};
 
 /// Puts `bytes` at `path` so that a reader sees the old contents or the new, never a part: under a temporary name first,
 /// flushed to the disk, then renamed.
@@ -19,32 +20,29 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// What the system or `write` says; the old contents are still there, and nothing else.
 pub fn write_atomically_with(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<DiskFile>) -> io::Result<()>,
 ) -> io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(format!(".tmp{}", std::process::id()));
     let temporary = path.with_file_name(name);
-    let written = File::create(&temporary).and_then(|file| {
+    let written = DiskFile::create(&temporary).and_then(|file| {
         let mut file = BufWriter::new(file);
         write(&mut file)?;
         file.flush()?;
-        file.get_ref().sync_all()?;
-        fs::rename(&temporary, path)
+        file.get_ref().sync()?;
+        rename(&temporary, path)
     });
     if written.is_err() {
         // The first error is the one to report.
-        let _ = fs::remove_file(&temporary);
-        return written;
+        let _ = remove_file(&temporary);
     }
-    // Makes the new name durable where directories can be opened; elsewhere the rename is all there is.
-    if let Some(Ok(folder)) = path.parent().map(File::open) {
-        let _ = folder.sync_all();
-    }
-    Ok(())
+    written
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -1,0 +1,5 @@
+//! Power cuts at every place where something is written: what lies on the disk then is opened and gone on with.
+
+mod recordings;
+mod replaced;
+mod runs;

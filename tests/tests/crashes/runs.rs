@@ -1,0 +1,110 @@
+//! Trainings.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use playbot_lab::train::{
+    Algorithm, Experiment, Trainer,
+    checkpoint::CheckpointChoice,
+    config_file::parse_experiment,
+    run_dir::{RunDir, RunError},
+};
+use playbot_learner::{
+    DeviceKind,
+    disk::{DiskOperation, DiskRecording},
+};
+use playbot_tests::{
+    Corridor,
+    power_cut::{PaperDisk, PowerCut, power_cuts},
+    training::{run_info, train, written},
+};
+
+/// Updates between checkpoints.
+const EVERY: u64 = 2;
+
+const EXPERIMENT: &str = r#"(
+    game: "corridor", train: "plain:0..7", test: "plain:8..15", steps: 160, arenas: 2, worlds: 1, algorithm: "ppo",
+    ppo: (num_steps: 8, minibatches: 2, epochs: 1, hidden: [4], lr: 0.003),
+    checkpoints: (keep: 2),
+)"#;
+
+pub fn experiment(seed: u64) -> Experiment {
+    let experiment = parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid");
+    Experiment { seed, algorithm: Algorithm::Ppo, ..experiment }
+}
+
+pub fn fresh(seed: u64) -> Trainer {
+    Trainer::new(&Corridor, &experiment(seed), None, DeviceKind::Flex, 1).expect("fits")
+}
+
+/// Trains to the end, with a checkpoint after every second update.
+pub fn train_on(folder: &Path, mut trainer: Trainer) {
+    while !trainer.is_done() {
+        let stop_after = (trainer.updates() / EVERY + 1) * EVERY;
+        trainer = train(folder, trainer, Some(stop_after));
+    }
+}
+
+/// The name under which the last checkpoint was put into its place by then, if one was.
+fn last_checkpoint(operations: &[DiskOperation]) -> Option<PathBuf> {
+    operations.iter().rev().find_map(|operation| match operation {
+        DiskOperation::Rename { from, to } if from.ends_with("unfinished") && to.starts_with(from.parent()?) => {
+            let name = to.file_name()?.to_string_lossy().into_owned();
+            name.starts_with("step-").then(|| name.into())
+        }
+        _ => None,
+    })
+}
+
+/// Goes on with what a power cut has left, to the end.
+fn go_on(folder: &Path, operations: &[DiskOperation], cut: &PowerCut) {
+    let begun = last_checkpoint(&operations[..cut.operations]);
+    let opened = match RunDir::open_to_write(folder) {
+        Ok(opened) => opened,
+        Err(RunError::NoRun { .. }) => {
+            assert_eq!(begun, None, "{cut:?}: the run is gone");
+            let run = RunDir::create(folder, &experiment(1), &run_info(&experiment(1)), false);
+            drop(run.unwrap_or_else(|error| panic!("{cut:?}: {error}")));
+            return train_on(folder, fresh(1));
+        }
+        Err(error) => panic!("{cut:?}: {error}"),
+    };
+    let trainer = match opened.run.resume(&Corridor, &opened.experiment, DeviceKind::Flex, 1) {
+        Ok(trainer) => trainer,
+        Err(RunError::NoCheckpoint { .. }) => {
+            assert_eq!(begun, None, "{cut:?}: the checkpoint is gone");
+            drop(opened);
+            drop(RunDir::create(folder, &experiment(1), &run_info(&experiment(1)), true).expect("replaceable"));
+            return train_on(folder, fresh(1));
+        }
+        Err(error) => panic!("{cut:?}: {error}"),
+    };
+    let last = opened.run.checkpoint(CheckpointChoice::Last).expect("resumed from it");
+    let name = last.path.file_name().map(PathBuf::from);
+    assert!(name >= begun, "{cut:?}: {name:?} is older than {begun:?}");
+    drop(opened);
+    train_on(folder, trainer);
+}
+
+#[test]
+fn a_training_goes_on_to_the_same_bytes_wherever_the_power_failed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = folder.path().join("run");
+    let recording = DiskRecording::of(folder.path());
+    train_on(&run, fresh(1));
+    let operations = recording.operations();
+    let undisturbed = written(&run);
+    let cuts = power_cuts(&operations);
+    assert!(cuts.len() > 1000, "{} places", cuts.len());
+    for cut in &cuts {
+        let left = tempfile::tempdir().expect("a folder");
+        PaperDisk::default().after(&operations, cut).write(folder.path(), left.path());
+        let run = left.path().join("run");
+        go_on(&run, &operations, cut);
+        assert!(written(&run) == undisturbed, "{cut:?} after {:?}", operations[..cut.operations].last());
+        let leftovers = fs::read_dir(left.path()).expect("readable").count();
+        assert_eq!(leftovers, 1, "{cut:?}");
+    }
+}
