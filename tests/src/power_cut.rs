@@ -25,6 +25,8 @@ pub enum Unsynced {
     Halved,
 }
 
+const WAYS: [Unsynced; 3] = [Unsynced::Kept, Unsynced::Lost, Unsynced::Halved];
+
 /// Where the power fails.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerCut {
@@ -43,11 +45,10 @@ pub fn power_cuts(operations: &[DiskOperation]) -> Vec<PowerCut> {
             Some(DiskOperation::Write { .. }) => &[0, 1, 4, 7, 8],
             _ => &[8],
         };
-        let ways = [Unsynced::Kept, Unsynced::Lost, Unsynced::Halved];
         // Where the last bytes are torn, those before are there; all else is another place.
         torn.iter().flat_map(move |&eighths| {
-            let ways = if eighths < 8 { &ways[..1] } else { &ways[..] };
-            ways.to_vec().into_iter().map(move |unsynced| PowerCut { operations: count, eighths, unsynced })
+            let ways = if eighths < 8 { &WAYS[..1] } else { &WAYS[..] };
+            ways.iter().map(move |&unsynced| PowerCut { operations: count, eighths, unsynced })
         })
     });
     all.collect()

@@ -100,6 +100,8 @@ fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

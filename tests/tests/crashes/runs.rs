@@ -25,7 +25,7 @@ use playbot_tests::{
 const EVERY: u64 = 2;
 
 const EXPERIMENT: &str = r#"(
-    game: "corridor", train: "plain:0..7", test: "plain:8..15", steps: 160, arenas: 2, worlds: 1, algorithm: "ppo",
+    game: "corridor", train: "plain:0..7", test: "plain:8..15", steps: 320, arenas: 2, worlds: 1, algorithm: "ppo",
     ppo: (num_steps: 8, minibatches: 2, epochs: 1, hidden: [4], lr: 0.003),
     checkpoints: (keep: 2),
 )"#;

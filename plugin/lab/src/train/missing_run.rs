@@ -32,7 +32,7 @@ pub(super) fn check_is_run(path: &Path) -> Result<(), RunError> {
 }
 
 fn is_run(path: &Path) -> bool {
-    SIGNS.iter().any(|sign| path.join(sign).exists())
+    SIGNS.iter().any(|sign| path.join(sign).exists()) && !is_free(path)
 }
 
 /// What to say of a folder that is something else.

@@ -16,6 +16,10 @@ use super::{
 /// Between the name of a run and the number of the process that replaces it.
 const MARK: &str = ".replaced-";
 
+/// What a study notes of the time that a run took: also of one that was stopped before it began, say while its skills were
+/// learned.
+const COST: &str = "cost.json";
+
 /// What a run was before another one took its place.
 pub(super) struct ReplacedRun {
     run: PathBuf,
@@ -27,7 +31,8 @@ impl ReplacedRun {
     /// Moves everything but the lock aside. What makes it a run goes first, so that no half run is left by a kill.
     pub(super) fn put_aside(run: &Path) -> Result<Self, RunError> {
         let mut names = names_in(run)?;
-        names.retain(|name| name != LOCK_FILE);
+        let keeps_cost = is_unstarted(run);
+        names.retain(|name| name != LOCK_FILE && !(keeps_cost && name == COST));
         names.sort_by_key(|name| (name != "run.json", name == "experiment.ron"));
         let mut aside = Self { run: run.into(), folder: None };
         if names.is_empty() {
@@ -143,7 +148,9 @@ pub fn check_replaceable(path: &Path) -> Result<(), RunError> {
 /// Whether a folder holds at most what is written before `run.json`.
 pub fn is_unstarted(path: &Path) -> bool {
     let first = |name: &str| {
-        name == LOCK_FILE || ["experiment.ron", "run.json.tmp"].iter().any(|known| name.starts_with(known))
+        name == LOCK_FILE
+            || name == COST
+            || ["experiment.ron", "run.json.tmp"].iter().any(|known| name.starts_with(known))
     };
     names_in(path).is_ok_and(|names| names.iter().all(|name| name.to_str().is_some_and(first)))
 }

@@ -94,6 +94,8 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::verdict::{
         MapScope, TesterRecord,

@@ -245,7 +245,10 @@ mod tests {
         assert!(error.to_string().contains("cannot write the header: No space left on device"), "{error}");
         assert!(Path::new("/dev/full").exists());
         let (mut writer, _) = on_small_disk(true);
-        writer.store = Box::new(OpenOptions::new().write(true).open("/dev/full").expect("opens"));
+        writer.store = {
+            let full = DiskFile::open(Path::new("/dev/full"), OpenOptions::new().write(true));
+            Box::new(full.expect("opens"))
+        };
         let error = writer.push(&episode(1, 5)).expect_err("full");
         assert!(error.to_string().contains("No space left on device"), "{error}");
     }

@@ -171,6 +171,8 @@ fn journal_of(score: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::bugs::score::testing::record;
 

@@ -1,3 +1,5 @@
+use std::fs;
+
 use bevy_playbot::demo::file::DemoFault;
 
 use super::*;

@@ -123,7 +123,7 @@ mod tests {
 
         // A torn record, and a file of somebody else.
         let file = folder.files().expect("listed").remove(0);
-        OpenOptions::new().append(true).open(file).expect("there").write_all(&[9; 7]).expect("writable");
+        fs::OpenOptions::new().append(true).open(file).expect("there").write_all(&[9; 7]).expect("writable");
         fs::write(folder.path.join("notes.txt"), "mine").expect("writable");
         folder.rewrite(&[scalar(1)], 100.0).expect("writable");
         assert_eq!(names(&folder), ["events.out.tfevents.0000000101.playbot"], "sorts behind the old one");
