@@ -81,7 +81,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: `ppo.lr` must be"),
         (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
         (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
-        (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..127: unknown map `hard`"),
+        (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..1087: unknown map `hard`"),
         (&["eval", "--set", "game=maze2d", "--bot", "random"], "or with --levels"),
         (&["eval", "--bot", "random", "--plot", "plot.gif"], "is written as .png or .svg"),
         (&["config", "presets", "skil-paper"], "did you mean `skill-paper`?"),

@@ -172,6 +172,7 @@ fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
     json!({
         "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl, "accuracy": metrics.accuracy,
         "held_out_nll": metrics.held_out_nll(), "held_out_kl": metrics.held_out.map(|held_out| held_out.kl),
+        "state_error": metrics.state_error, "held_out_state_error": metrics.held_out.and_then(|held_out| held_out.state_error),
     })
 }
 

@@ -1,5 +1,6 @@
 //! `playbot quickstart`: the main job from end to end.
 
+mod first_success;
 mod report;
 
 use std::{
@@ -12,7 +13,7 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
-    report::{statistics::steps_to_reach, to_text_table, whole},
+    report::{statistics::steps_to_reach, to_text_table},
     runs::RunCurves,
     train::{
         Algorithm, Experiment, Trainer,
@@ -24,6 +25,7 @@ use playbot_lab::{
 use playbot_learner::{Dataset, DeviceKind, SkillModel, disk};
 use serde_json::json;
 
+use first_success::{FirstSuccess, headline, steps_of_seed};
 use report::write_report;
 
 use super::{
@@ -31,10 +33,13 @@ use super::{
     compute::Threads,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
-    interrupt, learn_skills, methods, open, program,
+    interrupt, learn_skills, methods, open, program, progress,
     read_demos::read_demos,
     train::{create_run, drive, tell_length},
 };
+
+/// Seeds with which steps to success are measured.
+const SEEDS: u64 = 3;
 
 /// The file of the skill model.
 const SKILLS: &str = "skills.safetensors";
@@ -42,7 +47,8 @@ const SKILLS: &str = "skills.safetensors";
 /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
 ///
 /// Both train for the same number of steps on the experiment's training levels, with its recordings. Behaviour cloning
-/// and the blind baselines are measured beside them, on levels that none of them has seen.
+/// and the blind baselines are measured beside them, on levels that none of them has seen. How many steps each takes until it
+/// mostly succeeds is measured with further seeds, too, which train no longer than that.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot
@@ -59,6 +65,9 @@ pub struct Args {
     /// Seed, instead of the experiment's.
     #[arg(long)]
     seed: Option<u64>,
+    /// Seeds with which the steps to success are measured: that seed and those after it.
+    #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u64).range(1..=100))]
+    seeds: u64,
     /// Environment steps for each learner, instead of the experiment's.
     #[arg(long)]
     steps: Option<u64>,
@@ -78,6 +87,7 @@ impl Default for Args {
             from: ExperimentArgs::default(),
             run: "runs/quickstart".into(),
             seed: None,
+            seeds: SEEDS,
             steps: None,
             epochs: None,
             threads: Threads::default(),
@@ -116,7 +126,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let dataset = read_demos(game, &experiment, &demos, args.threads.threads)?;
     let _lock = take_folder(&args.run)?;
     tell_length(&trained);
-    let Some(skills) = skills(&experiment, dataset, &args)? else {
+    let Some(skills) = skills(&experiment, dataset.clone(), &args)? else {
         tell!("stopped while learning skills; nothing was saved, start again with `{} quickstart`", program::name());
         return Ok(Outcome::Stopped);
     };
@@ -130,6 +140,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             return Ok(stopped(&args, algorithm));
         }
     }
+    let (seeds, first) = first_success(game, &experiment, &trained, &dataset, &args)?;
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), cloning(&skills, &experiment, draw)));
     players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
@@ -138,7 +149,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         let plan = EvalPlan::of(&experiment, &experiment.test, args.threads.threads);
         let measured = methods::measure(game, name, player, &plan)?;
         if args.json {
-            methods::print_json(&measured.summary)?;
+            let mut line = json!(measured.summary);
+            if let Some(one) = first.iter().find(|one| one.algorithm.name() == name) {
+                line["steps_to_success"] = json!(one.steps);
+            }
+            print_line(line)?;
         }
         let mut row = measured.into_row();
         if let Some(one) = trained.iter().find(|one| one.algorithm.name() == name) {
@@ -149,7 +164,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if !args.json {
         print_line(to_text_table(&rows))?;
     }
-    let comparison = format!("{}; {}", headline(&trained, experiment.study.threshold), compare(&trained));
+    let comparison = format!("{}; {}", headline(&first, &seeds, experiment.study.threshold), compare(&trained));
     tell!("{comparison}");
     let report = args.run.join("report.html");
     write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
@@ -254,13 +269,27 @@ fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     Outcome::Stopped
 }
 
-/// How many steps each took until it mostly succeeded.
-fn headline(trained: &[Trained], threshold: f64) -> String {
-    let each = trained.iter().map(|Trained { algorithm, steps_to_threshold, .. }| match steps_to_threshold {
-        Some(steps) => format!("{algorithm} {}", whole(*steps as f64)),
-        None => format!("{algorithm} not reached"),
-    });
-    format!("steps to {:.0} % success in training: {}", 100.0 * threshold, each.collect::<Vec<_>>().join(", "))
+/// After how many steps each method mostly succeeds, for the seed that was trained to the end and for the others that were
+/// asked for; fewer after Ctrl-C.
+fn first_success(
+    game: &dyn Game,
+    experiment: &Experiment,
+    trained: &[Trained],
+    dataset: &Dataset,
+    args: &Args,
+) -> Result<(Vec<u64>, Vec<FirstSuccess>), CliError> {
+    let of = |one: &Trained| FirstSuccess { algorithm: one.algorithm, steps: vec![one.steps_to_threshold] };
+    let (mut seeds, mut first) = (vec![experiment.seed], trained.iter().map(of).collect::<Vec<_>>());
+    let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();
+    for seed in (1..args.seeds).map(|more| experiment.seed.wrapping_add(more)) {
+        let experiment = Experiment { seed, ..experiment.clone() };
+        let steps = steps_of_seed(game, &experiment, &algorithms, dataset, args.threads.threads)?;
+        // The trainings are done, and their results are worth more than another seed.
+        let Some(steps) = steps else { break };
+        seeds.push(seed);
+        first.iter_mut().zip(steps).for_each(|(one, steps)| one.steps.push(steps));
+    }
+    Ok((seeds, first))
 }
 
 /// How many steps SCORE needed for what PPO reached in the end, in words.

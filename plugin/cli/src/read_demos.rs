@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use playbot_lab::{
-    demo::dataset::{Demonstrations, MAX_PICTURE_BYTES},
+    demo::dataset::Demonstrations,
     game::Game,
     games::Games,
     train::Experiment,
@@ -18,7 +18,7 @@ use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::
 /// # Errors
 ///
 /// The experiment does not go with the game's actions or observations, a recording cannot be read, belongs to another game, shows a
-/// held-out level or does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
+/// held-out level or does not replay, or the pictures would need more memory than is free.
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_agent(game)?;
     let demos = demonstrations(game, experiment, path)?;
@@ -26,7 +26,7 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
     match demos.picture_bytes() {
         0 => tell!(),
-        bytes => tell!(": {observation_config} take {:.2} of at most {:.0} GiB", gib(bytes), gib(MAX_PICTURE_BYTES)),
+        bytes => tell!(": {observation_config} take {:.2} GiB", gib(bytes)),
     }
     let bar = progress::bar("replay recordings", steps, "steps");
     let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));

@@ -9,12 +9,9 @@ use super::{
     verify::VerifyError,
 };
 use crate::sensors::GameSensors;
-use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment};
+use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment, train::free_memory::free_memory};
 use bevy_playbot::demo::file::{DemoEpisode, DemoReader, EpisodeActions, find_demos};
 use bevy_playbot::vision::ObservationConfig;
-
-/// Most memory that the pictures of a data set may take.
-pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
 
 /// Recorded episodes of a game, read and checked, before each action is paired with what was seen.
 ///
@@ -24,6 +21,8 @@ pub const MAX_PICTURE_BYTES: u64 = 4 << 30;
 pub struct Demonstrations {
     pub(super) observation_config: ObservationConfig,
     pub(super) episodes: Vec<Demonstration>,
+    /// What learns from them is to tell the game's state of pictures.
+    with_states: bool,
 }
 
 /// One episode and where it comes from.
@@ -89,7 +88,7 @@ impl Demonstrations {
                 episodes.push(Demonstration { file, index, mode, episode, is_seen });
             }
         }
-        Ok(Self { observation_config: *observation_config, episodes })
+        Ok(Self { observation_config: *observation_config, episodes, with_states: false })
     }
 
     /// What an experiment learns skills from, of all recordings below a path: none of its held-out levels, and no more
@@ -100,6 +99,7 @@ impl Demonstrations {
     /// As for [`read`](Self::read).
     pub fn of(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Self, VerifyError> {
         let demos = Self::read(game, &experiment.observation_config(), path, Some(&experiment.test))?;
+        let demos = Self { with_states: experiment.skills.state_weight > 0.0, ..demos };
         Ok(match experiment.demo_steps {
             Some(steps) => demos.at_most(steps),
             None => demos,
@@ -151,19 +151,34 @@ impl Demonstrations {
     ///
     /// # Errors
     ///
-    /// [`VerifyError`] if an episode does not replay, or the pictures would need more than [`MAX_PICTURE_BYTES`].
+    /// [`VerifyError`] if an episode does not replay, or the pictures would need more memory than is free.
     pub fn dataset(
         self,
         game: &dyn Game,
         threads: usize,
         progress: impl Fn(u64) + Sync,
     ) -> Result<Dataset, VerifyError> {
-        let (steps, bytes) = (self.steps(), self.picture_bytes());
-        if bytes > MAX_PICTURE_BYTES {
-            return Err(VerifyError::TooLarge { steps, observation_config: self.observation_config, bytes });
+        let seen = self.seen(game, threads, &progress)?;
+        if !self.with_states {
+            return Ok(seen);
+        }
+        let states = Self { observation_config: ObservationConfig::default(), ..self };
+        Ok(seen.with_states(states.seen(game, threads, &|_| {})?)?)
+    }
+
+    /// The data set of what the sensor shows.
+    fn seen(
+        &self,
+        game: &dyn Game,
+        threads: usize,
+        progress: &(impl Fn(u64) + Sync),
+    ) -> Result<Dataset, VerifyError> {
+        let (steps, bytes, free) = (self.steps(), self.picture_bytes(), free_memory());
+        if bytes > free {
+            return Err(VerifyError::TooLarge { steps, observation_config: self.observation_config, bytes, free });
         }
         let originals = self.originals();
-        let mut observed = self.observe(game, threads, &originals, &progress)?;
+        let mut observed = self.observe(game, threads, &originals, progress)?;
         let mut episodes = Vec::new();
         for (i, demo) in self.episodes.iter().enumerate() {
             let observations = if demo.is_seen {
@@ -263,6 +278,7 @@ mod tests {
         Demonstrations {
             observation_config: ObservationConfig::default(),
             episodes: episodes.enumerate().map(demo).collect(),
+            with_states: false,
         }
     }
 

@@ -9,7 +9,6 @@ use bevy::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::dataset::MAX_PICTURE_BYTES;
 use crate::{game::Game, mode::ModeError, split::LevelSplit, worlds::build_world};
 use bevy_playbot::demo::{
     file::{DemoEpisode, DemoFileError, DemoReader},
@@ -76,11 +75,11 @@ pub enum VerifyError {
     /// The pictures cannot be made.
     #[error(transparent)]
     Vision(#[from] VisionError),
-    /// The pictures need more memory than anybody would expect.
+    /// The pictures need more memory than there is.
     #[error(
-        "{steps} steps of {observation_config} need {:.1} GiB of memory, more than the {:.0} GiB that are allowed: learn from fewer \
+        "{steps} steps of {observation_config} need {:.1} GiB of memory, more than the {:.1} GiB that are free: learn from fewer \
          steps with `demo_steps`, or take smaller pictures, grey ones or a smaller stack (`image`)",
-        gib(*.bytes), gib(MAX_PICTURE_BYTES)
+        gib(*.bytes), gib(*.free)
     )]
     TooLarge {
         /// Steps of the recordings.
@@ -89,6 +88,8 @@ pub enum VerifyError {
         observation_config: ObservationConfig,
         /// Memory of the pictures.
         bytes: u64,
+        /// Memory that is free.
+        free: u64,
     },
     /// The recordings do not make a data set.
     #[error(transparent)]

@@ -66,11 +66,16 @@ impl Experiment {
         check_mode("test", &self.test, game)
     }
 
-    /// Whether the observations can be changed as `skills.augment` and `ppo.augment` say.
+    /// Whether the observations can be changed as `skills.augment` and `ppo.augment` say, and told of as `skills.state_weight`
+    /// does.
     fn check_observation(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         let kind = self.observation_config().obs_kind(game);
         if self.algorithm.needs_skills() {
             self.skills.check_observation(kind).map_err(settings)?;
+            if self.skills.state_weight > 0.0 && game.observation().len() == 0 {
+                let why = "the game fills no vector that could be told of its pictures; leave it out";
+                return refuse("skills.state_weight", self.skills.state_weight, why);
+            }
         }
         match self.algorithm.learner() {
             LearnerKind::Ppo if self.algorithm.is_trained() => self.ppo.check_observation(&kind).map_err(settings),

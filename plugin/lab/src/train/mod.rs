@@ -18,7 +18,7 @@ mod experiment_checks;
 mod experiment_error;
 mod experiment_fit;
 mod experiment_limits;
-mod free_memory;
+pub(crate) mod free_memory;
 pub mod json_lines;
 pub mod learner;
 pub(crate) mod memory;

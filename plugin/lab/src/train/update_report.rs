@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::{
     learner::LearnerMetrics,
     metrics_log::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
+    progress::RECENT,
 };
 
 /// What one update brought. Everything in it is the same in every run with the same seed, except `timing`.
@@ -34,6 +35,11 @@ pub struct UpdateReport {
 }
 
 impl UpdateReport {
+    /// Whether at least 100 episodes have ended, and of the last 100 at least this share with success.
+    pub fn mostly_succeeds(&self, share: f64) -> bool {
+        self.episodes >= RECENT as u64 && self.success_rate.is_some_and(|rate| rate >= share)
+    }
+
     /// Everything measured, by TensorBoard tag; the same numbers in every run with the same seed.
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let episodes = [

@@ -1,7 +1,8 @@
 //! A trainer's complete state in one file.
 
 use super::held_out::Best;
-use super::{Dataset, SkillDescription, SkillNets, SkillTrainer};
+use super::trainer::told_numbers;
+use super::{Dataset, SkillDescription, SkillNets, SkillTrainer, StateHeads};
 use crate::file::{FileKind, TensorFile};
 use crate::norm::{put_obs_stats, take_obs_stats};
 use crate::{DeviceKind, FileError, LearnError};
@@ -91,7 +92,12 @@ impl SkillTrainer {
                 dataset.action_space()
             )));
         }
-        let nets = SkillNets::stored(&skill, &mut file, "", &device.plain())?;
+        let mut nets = SkillNets::stored(&skill, &mut file, "", &device.plain())?;
+        if let Some(numbers) = told_numbers(&skill.config, &dataset) {
+            let features = skill.config.cnn.features();
+            let heads = StateHeads::build(&mut file.params(&device.plain()), "state_heads", features, numbers)?;
+            nets.state_heads = Some(heads);
+        }
         let best = match header.best {
             None => None,
             Some((epoch, loss)) => {
@@ -110,8 +116,9 @@ impl SkillTrainer {
             *stats = Arc::new(take_obs_stats(&mut file, "obs_norm", trainer.dataset.obs_dim())?);
         }
         trainer.sums.count = header.batches;
-        let sums = file.take_f64("epoch_sums", Some(trainer.sums.total.len()))?;
-        trainer.sums.total.copy_from_slice(&sums);
+        // Older checkpoints have no error of states.
+        let sums = file.take_f64("epoch_sums", None)?;
+        trainer.sums.total.iter_mut().zip(sums).for_each(|(total, sum)| *total = sum);
         trainer.best = best;
         trainer.epoch = header.epoch;
         let windows = trainer.cut_windows(header.epoch);

@@ -85,6 +85,11 @@ pub struct SkillConfig {
     /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
     #[serde(skip_serializing_if = "is_zero")]
     pub weight_decay: f64,
+    /// Weight of the squared error with which the trunks of decoder and prior tell, of a picture, the game's state vector:
+    /// the mean over its numbers, each by its mean and deviation over the demonstrations, summed over a window as the NLL
+    /// is. What a trunk has learned to see so, it sees on levels that were never recorded. Pictures only.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub state_weight: f64,
     /// Share of the episodes that is not learned from, but measured after each epoch.
     #[serde(skip_serializing_if = "is_zero")]
     pub held_out: f64,
@@ -126,6 +131,7 @@ impl Default for SkillConfig {
             norm_obs: false,
             augment: Vec::new(),
             weight_decay: 0.0,
+            state_weight: 0.0,
             held_out: 0.0,
             patience: None,
         }
@@ -172,7 +178,7 @@ impl SkillConfig {
             }
             _ => {}
         }
-        let weights = [("beta", self.beta), ("latent_reg", self.latent_reg), ("weight_decay", self.weight_decay)];
+        let weights = [("beta", self.beta), ("latent_reg", self.latent_reg), ("weight_decay", self.weight_decay), ("state_weight", self.state_weight)];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
             return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
         }
@@ -197,12 +203,16 @@ impl SkillConfig {
     /// `Ok` if a model of these settings can see `observation`s.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if images shall be normalised, or what is no image changed as one.
+    /// [`LearnError::Config`] if images shall be normalised, or what is no image changed as one or used to tell the state.
     pub fn check_observation(&self, observation: ObsKind) -> Result<(), LearnError> {
         self.augment.iter().try_for_each(|augmentation| augmentation.check("skill augment", &observation))?;
         match observation {
             ObsKind::Image(_) if self.norm_obs => {
                 let text = "skill norm_obs is for vectors: the pixels of images are divided by 255 instead";
+                Err(LearnError::Config(text.to_owned()))
+            }
+            ObsKind::Vector(_) if self.state_weight > 0.0 => {
+                let text = "skill state_weight is for pictures: who sees the state vector need not learn to tell it";
                 Err(LearnError::Config(text.to_owned()))
             }
             _ => Ok(()),

@@ -24,6 +24,8 @@ pub struct Dataset {
     pub(super) episodes: Arc<[DemoEpisode]>,
     /// The level of each episode.
     pub(super) levels: Arc<[usize]>,
+    /// The same episodes as vectors of the game's state, if they are known.
+    pub(super) states: Option<Arc<Self>>,
 }
 
 impl Dataset {
@@ -48,7 +50,7 @@ impl Dataset {
             space.check(&episode.actions)?;
         }
         let levels = (0..episodes.len()).collect();
-        Ok(Self { observation, space, episodes: episodes.into(), levels })
+        Ok(Self { observation, space, episodes: episodes.into(), levels, states: None })
     }
 
     /// Says which episodes were played on the same level, by any number that is the same for them: what
@@ -87,6 +89,17 @@ impl Dataset {
         self.episodes.iter().map(|episode| episode.actions.len()).sum()
     }
 
+    /// The episodes of these numbers.
+    pub(super) fn subset(&self, numbers: &[usize]) -> Self {
+        Self {
+            observation: self.observation,
+            space: self.space,
+            episodes: numbers.iter().map(|&i| self.episodes[i].clone()).collect(),
+            levels: numbers.iter().map(|&i| self.levels[i]).collect(),
+            states: self.states.as_ref().map(|states| Arc::new(states.subset(numbers))),
+        }
+    }
+
     /// Mean and deviation of each number of the observations over all steps; `None` for images.
     pub(super) fn stats(&self) -> Option<ObsStats> {
         let ObsKind::Vector(width) = self.observation else { return None };
@@ -97,9 +110,9 @@ impl Dataset {
         Some(ObsStats::of(rows, width))
     }
 
-    /// A hash of all observations and actions, the same on any number of threads.
+    /// A hash of all observations, actions and states, the same on any number of threads.
     pub(super) fn fingerprint(&self) -> u64 {
-        let hashes: Vec<[u64; 2]> = self
+        let mut hashes: Vec<[u64; 2]> = self
             .episodes
             .par_iter()
             .map(|episode| {
@@ -114,6 +127,7 @@ impl Dataset {
                 [observations, actions]
             })
             .collect();
+        hashes.extend(self.states.as_ref().map(|states| [states.fingerprint(), 0]));
         fnv1a(bytemuck::cast_slice(&hashes))
     }
 

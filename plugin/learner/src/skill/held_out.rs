@@ -2,7 +2,7 @@
 
 use super::{Dataset, SkillConfig, SkillMetrics, SkillNets, SkillTrainer, Window, skill_loss};
 use crate::LearnError;
-use crate::nn::{host, tracked};
+use crate::nn::{frozen, host, tracked};
 use crate::rng::{Streams, shuffle};
 use burn::tensor::Tensor;
 use std::collections::BTreeSet;
@@ -16,6 +16,8 @@ pub struct HeldOutMetrics {
     pub nll: f32,
     /// KL from the encoder to the prior, in nats.
     pub kl: f32,
+    /// As [`SkillMetrics::state_error`].
+    pub state_error: Option<f32>,
 }
 
 /// Demonstrations that are not learned from, with the windows that are always cut from them.
@@ -66,9 +68,7 @@ impl Dataset {
         let apart: BTreeSet<usize> = order[..count].iter().copied().collect();
         let some = |is_apart: bool| {
             let numbers = (0..groups.len()).filter(|&episode| apart.contains(&groups[episode]) == is_apart);
-            let (episodes, levels) =
-                numbers.map(|i| (self.episodes[i].clone(), self.levels[i])).unzip::<_, _, Vec<_>, Vec<_>>();
-            Self { episodes: episodes.into(), levels: levels.into(), ..self.clone() }
+            self.subset(&numbers.collect::<Vec<_>>())
         };
         let dataset = some(true);
         let windows = dataset.windows(config.window, config.windows, streams, 0)?;
@@ -81,16 +81,17 @@ impl SkillTrainer {
     /// better. The draws of skills are the same each time.
     pub(super) fn measure_held_out(&mut self) -> Result<Option<HeldOutMetrics>, LearnError> {
         let Some(held_out) = &self.held_out else { return Ok(None) };
-        let mut sums = [0.0f64; 3];
+        let mut sums = [0.0f64; 4];
         for (number, windows) in held_out.windows.chunks(self.config.batch).enumerate() {
             let mut rng = self.streams.stream("skill.held_out.noise", number as u64);
             let (forward, _) = self.forward_of(&held_out.dataset, windows, None, &mut rng)?;
             let loss = skill_loss(&forward, &self.config);
-            let parts = [&loss.total, &loss.nll, &loss.kl].map(|part| part.clone().inner());
-            let numbers = host(Tensor::cat(parts.to_vec(), 0))?;
+            let mut parts = vec![loss.total, loss.nll, loss.kl];
+            parts.extend(self.state_error(&held_out.dataset, windows, &forward)?);
+            let numbers = host(Tensor::cat(parts.into_iter().map(Tensor::inner).collect(), 0))?;
             sums.iter_mut().zip(numbers).for_each(|(sum, x)| *sum += f64::from(x) * windows.len() as f64);
         }
-        let [loss, nll, kl] = sums.map(|sum| (sum / held_out.windows.len() as f64) as f32);
+        let [loss, nll, kl, state_error] = sums.map(|sum| (sum / held_out.windows.len() as f64) as f32);
         if !loss.is_finite() {
             return Err(LearnError::NotFinite {
                 tensor: "the loss on demonstrations kept apart".to_owned(),
@@ -98,9 +99,11 @@ impl SkillTrainer {
             });
         }
         if self.config.patience.is_some() && self.best.as_ref().is_none_or(|best| loss < best.loss) {
-            self.best = Some(Best { epoch: self.epoch, loss, nets: crate::nn::frozen(&self.nets) });
+            let nets = SkillNets { state_heads: None, ..frozen(&self.nets) };
+            self.best = Some(Best { epoch: self.epoch, loss, nets });
         }
-        Ok(Some(HeldOutMetrics { loss, nll, kl }))
+        let state_error = self.nets.state_heads.as_ref().map(|_| state_error);
+        Ok(Some(HeldOutMetrics { loss, nll, kl, state_error }))
     }
 
     /// Whether [`SkillConfig::patience`] is over: more epochs make it worse where it matters.

@@ -19,6 +19,9 @@ pub struct SkillMetrics {
     pub accuracy: Option<f32>,
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
+    /// Squared error with which the state is told, the mean over its numbers and summed over a window, with
+    /// [`state_weight`](super::SkillConfig::state_weight); it begins at about as many as a window has steps, and 1.
+    pub state_error: Option<f32>,
     /// What an epoch's networks make of demonstrations kept apart; `None` for a single batch, and where there are none.
     pub held_out: Option<HeldOutMetrics>,
 }
@@ -27,20 +30,23 @@ pub struct SkillMetrics {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct MetricSums {
     pub(super) count: usize,
-    pub(super) total: [f64; 6],
+    pub(super) total: [f64; 7],
 }
 
 impl MetricSums {
     pub(super) fn add(&mut self, m: &SkillMetrics) {
-        let values = [m.loss, m.nll, m.kl, m.latent_norm, m.accuracy.unwrap_or(0.0), m.grad_norm];
+        let optional = [m.accuracy, m.state_error].map(|x| x.unwrap_or(0.0));
+        let values = [m.loss, m.nll, m.kl, m.latent_norm, optional[0], m.grad_norm, optional[1]];
         self.count += 1;
         self.total.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(x));
     }
 
-    pub(super) fn mean(self, accuracy: bool) -> SkillMetrics {
-        let [loss, nll, kl, latent_norm, hits, grad_norm] =
+    /// The means; those that `last`, the last batch, has.
+    pub(super) fn mean(self, last: &SkillMetrics) -> SkillMetrics {
+        let [loss, nll, kl, latent_norm, hits, grad_norm, state_error] =
             self.total.map(|sum| (sum / self.count.max(1) as f64) as f32);
-        SkillMetrics { loss, nll, kl, latent_norm, accuracy: accuracy.then_some(hits), grad_norm, held_out: None }
+        let (accuracy, state_error) = (last.accuracy.map(|_| hits), last.state_error.map(|_| state_error));
+        SkillMetrics { loss, nll, kl, latent_norm, accuracy, grad_norm, state_error, held_out: None }
     }
 }
 

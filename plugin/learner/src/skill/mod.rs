@@ -24,6 +24,7 @@ mod model;
 mod nets;
 mod prior;
 mod source;
+mod state_heads;
 mod trainer;
 mod windows;
 
@@ -41,5 +42,6 @@ pub use nets::{SkillForward, SkillNets};
 pub use prior::{Prior, SkillDraw};
 pub(crate) use source::SKILL_STATS;
 pub use source::SkillSource;
+pub use state_heads::StateHeads;
 pub use trainer::{SkillProgress, SkillTrainer};
 pub use windows::{Window, WindowRule};

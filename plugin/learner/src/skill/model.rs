@@ -42,7 +42,8 @@ impl SkillModel {
         stats: Option<Arc<ObsStats>>,
         device: DeviceKind,
     ) -> Self {
-        Self { description, nets: frozen(nets), stats, device, picture: None }
+        let nets = SkillNets { state_heads: None, ..frozen(nets) };
+        Self { description, nets, stats, device, picture: None }
     }
 
     /// The model with a note on how the images that it observes are made; `None` for vectors.

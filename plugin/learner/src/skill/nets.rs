@@ -1,6 +1,6 @@
 //! The three networks of the skill model together.
 
-use super::{Encoder, SkillConfig, SkillDescription};
+use super::{Encoder, SkillConfig, SkillDescription, StateHeads};
 use crate::file::TensorFile;
 use crate::nn::{ActionBatch, Dist, ObsBatch, ParamVisitor, Parameters, path};
 use crate::policy::Actor;
@@ -19,6 +19,8 @@ pub struct SkillNets {
     pub prior: Actor,
     /// Whether the decoder sees tanh(z) and not z.
     pub tanh_latent: bool,
+    /// What tells the state, while a model is learned with [`SkillConfig::state_weight`]; never in a finished model.
+    pub state_heads: Option<StateHeads>,
 }
 
 /// What the networks say about a batch of windows.
@@ -32,6 +34,10 @@ pub struct SkillForward {
     pub decoder_latent: Tensor<2>,
     /// The decoder's distributions, time-major.
     pub decoded: Dist,
+    /// What the decoder's trunk made of each step, `[steps * B, features]`, time-major; vectors as they are.
+    pub decoder_features: Tensor<2>,
+    /// What the prior's trunk made of each window's first step, `[B, features]`.
+    pub prior_features: Tensor<2>,
 }
 
 impl SkillNets {
@@ -51,7 +57,7 @@ impl SkillNets {
         let Actors { decoder, prior } = Actors::fresh(&description, streams, device)?;
         let mut rng = streams.stream("skill.encoder", 0);
         let encoder = Encoder::new(config, observation, config.action_input.width(space), &mut rng, device)?;
-        Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent })
+        Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent, state_heads: None })
     }
 
     /// The networks of a skill model out of a file.
@@ -69,7 +75,7 @@ impl SkillNets {
         let action_width = config.action_input.width(description.action_space);
         let encoder =
             Encoder::build(&mut file.params(device), &path(prefix, "encoder"), config, observation, action_width)?;
-        Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent })
+        Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent, state_heads: None })
     }
 
     /// Runs a batch of B windows through all three networks.
@@ -90,16 +96,24 @@ impl SkillNets {
         steps: usize,
     ) -> Result<SkillForward, LearnError> {
         let posterior = self.encoder.forward(states, encoded_actions, steps)?;
-        let first = self.prior.observe(&states.first(states.rows() / steps.max(1)))?;
-        let kl_per_sequence = posterior.kl(&self.prior.forward(first))?;
+        let prior_features = self.prior.observe(&states.first(states.rows() / steps.max(1)))?;
+        let kl_per_sequence = posterior.kl(&self.prior.forward(prior_features.clone()))?;
         let Dist::Gaussian { mean, log_std } = posterior else {
             return Err(LearnError::Action("the encoder is Gaussian".to_owned()));
         };
         let latent = mean + noise * log_std.exp();
         let decoder_latent = if self.tanh_latent { latent.tanh() } else { latent };
-        let decoded = self.decoder.forward_held(decoder_latent.clone(), self.decoder.observe(states)?, steps);
+        let decoder_features = self.decoder.observe(states)?;
+        let decoded = self.decoder.forward_held(decoder_latent.clone(), decoder_features.clone(), steps);
         let nll_per_step = decoded.log_prob(actions)?.neg();
-        Ok(SkillForward { nll_per_step, kl_per_sequence, decoder_latent, decoded })
+        Ok(SkillForward {
+            nll_per_step,
+            kl_per_sequence,
+            decoder_latent,
+            decoded,
+            decoder_features,
+            prior_features,
+        })
     }
 }
 
@@ -146,5 +160,8 @@ impl Parameters for SkillNets {
         self.encoder.visit(&path(prefix, "encoder"), visitor);
         self.decoder.visit(&path(prefix, "decoder"), visitor);
         self.prior.visit(&path(prefix, "prior"), visitor);
+        if let Some(heads) = &mut self.state_heads {
+            heads.visit(&path(prefix, "state_heads"), visitor);
+        }
     }
 }

@@ -3,7 +3,8 @@
 use super::held_out::{Best, HeldOut};
 use super::metrics::{MetricSums, accuracy};
 use super::{
-    Dataset, SkillConfig, SkillDescription, SkillForward, SkillMetrics, SkillModel, SkillNets, Window, skill_loss,
+    Dataset, SkillConfig, SkillDescription, SkillForward, SkillMetrics, SkillModel, SkillNets, StateHeads, Window,
+    skill_loss,
 };
 use crate::device::{is_host, update_on};
 use crate::nn::{ActionBatch, Adam, AdamConfig, NamedGrads, ObsBatch, check_loss, host, matrix, scalar, tracked};
@@ -42,6 +43,8 @@ pub struct SkillTrainer {
     pub(super) extent: (usize, usize),
     /// How the networks see observations, if not raw.
     pub(super) stats: Option<Arc<ObsStats>>,
+    /// How they tell states, if they do.
+    state_stats: Option<ObsStats>,
     pub(super) nets: SkillNets,
     pub(super) adam: Adam,
     pub(super) streams: Streams,
@@ -63,7 +66,10 @@ impl SkillTrainer {
         Self::check(&config, &dataset)?;
         device.check()?;
         let (streams, plain) = (Streams::new(seed), device.plain());
-        let nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &plain)?;
+        let mut nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &plain)?;
+        if let Some(numbers) = told_numbers(&config, &dataset) {
+            nets.state_heads = Some(StateHeads::new(config.cnn.features(), numbers, &streams, &plain));
+        }
         Self::with_nets(config, dataset, &nets, seed, device)
     }
 
@@ -71,7 +77,12 @@ impl SkillTrainer {
     fn check(config: &SkillConfig, dataset: &Dataset) -> Result<(), LearnError> {
         config.validate()?;
         config.check_observation(dataset.observation)?;
-        config.check_space(dataset.space)
+        config.check_space(dataset.space)?;
+        if config.state_weight > 0.0 && dataset.states.is_none() {
+            let text = "skill state_weight needs demonstrations with states (Dataset::with_states)";
+            return Err(LearnError::Config(text.to_owned()));
+        }
+        Ok(())
     }
 
     /// A trainer of `nets`, which has not trained them yet.
@@ -88,6 +99,7 @@ impl SkillTrainer {
         let (dataset, held_out) = dataset.without_held_out(&config, &streams)?;
         let windows = dataset.windows(config.window, config.windows, &streams, 0)?;
         Ok(Self {
+            state_stats: dataset.states.as_ref().and_then(|states| states.stats()),
             stats: if config.norm_obs { dataset.stats().map(Arc::new) } else { None },
             nets: tracked(nets),
             adam: Adam::new(AdamConfig { eps: 1e-8, weight_decay: config.weight_decay, ..AdamConfig::default() }),
@@ -145,7 +157,7 @@ impl SkillTrainer {
         if end == self.windows.len() {
             self.epoch += 1;
             self.next = 0;
-            let means = std::mem::take(&mut self.sums).mean(metrics.accuracy.is_some());
+            let means = std::mem::take(&mut self.sums).mean(&metrics);
             self.last_epoch = SkillMetrics { held_out: self.measure_held_out()?, ..means };
             self.windows = self.cut_windows(self.epoch)?;
         }
@@ -204,18 +216,25 @@ impl SkillTrainer {
         let (forward, actions) = self.forward_of(&self.dataset, windows, Some(&mut changes), &mut noise)?;
         let loss = skill_loss(&forward, &self.config);
         let accuracy = accuracy(&forward.decoded, &actions)?;
-        let parts = [&loss.total, &loss.nll, &loss.kl, &loss.latent_norm];
+        let state_error = self.state_error(&self.dataset, windows, &forward)?;
+        let objective = match &state_error {
+            Some(error) => loss.total + error.clone() * self.config.state_weight,
+            None => loss.total,
+        };
+        let mut parts = vec![&objective, &loss.nll, &loss.kl, &loss.latent_norm];
+        parts.extend(&state_error);
         // One piece of memory, and one wait for a graphics card.
-        let numbers = host(Tensor::cat(parts.map(|part| part.clone().inner()).to_vec(), 0))?;
-        let [total, nll, kl, latent_norm] = numbers[..] else {
+        let numbers = host(Tensor::cat(parts.into_iter().map(|part| part.clone().inner()).collect(), 0))?;
+        let [total, nll, kl, latent_norm, ref rest @ ..] = numbers[..] else {
             return Err(LearnError::Device(format!("{} losses instead of 4", numbers.len())));
         };
+        let state_error = rest.first().copied();
         let steps = self.adam.steps();
         for (name, value) in [("nll", nll), ("kl", kl), ("loss", total)] {
             check_loss(name, value, steps)?;
         }
-        let grad_norm = self.descend(loss.total)?;
-        Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm, held_out: None })
+        let grad_norm = self.descend(objective)?;
+        Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm, state_error, held_out: None })
     }
 
     /// Gradient, clipping, one step of Adam; gives the norm before clipping.
@@ -230,6 +249,26 @@ impl SkillTrainer {
         let norm = scalar(self.adam.step_on_device(&mut self.nets, loss.backward(), lr, max_norm))?;
         let lost = || LearnError::NotFinite { tensor: "gradient".to_owned(), steps: Some(steps) };
         norm.is_finite().then_some(norm).ok_or_else(lost)
+    }
+
+    /// The squared error with which the state of `windows` of `dataset` is told, `[1]`, where it is to be.
+    pub(super) fn state_error(
+        &self,
+        dataset: &Dataset,
+        windows: &[Window],
+        forward: &SkillForward,
+    ) -> Result<Option<Tensor<1>>, LearnError> {
+        let (Some(heads), Some(states), Some(stats)) = (&self.nets.state_heads, &dataset.states, &self.state_stats)
+        else {
+            return Ok(None);
+        };
+        let steps = self.config.window;
+        let (Observations::Vector(values), _) = states.gather(windows, steps)? else {
+            return Err(LearnError::Config("states are vectors".to_owned()));
+        };
+        let rows = steps * windows.len();
+        let states = matrix(stats.normalize(&values), rows, states.obs_dim(), &self.device.plain());
+        Ok(Some(heads.error(forward, &states)))
     }
 
     /// The networks on windows of `dataset`, with draws of skills from `noise`; images are changed if `changes` are given.
@@ -262,4 +301,10 @@ impl SkillTrainer {
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
     }
+}
+
+/// Numbers of the state that is told of each picture, if it is to be.
+pub(super) fn told_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
+    let states = dataset.states.as_ref().filter(|_| config.state_weight > 0.0)?;
+    Some(states.obs_dim())
 }

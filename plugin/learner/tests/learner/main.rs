@@ -27,6 +27,7 @@ mod score;
 mod score_sac;
 mod skill;
 mod spirl;
+mod state_heads;
 mod switches;
 mod tick;
 mod toy;
