@@ -240,3 +240,39 @@ fn a_resumed_run_shows_each_update_once_in_tensorboard() {
     assert_eq!(after.len(), 2 + 5);
     assert!(after[2..6] == before[2..], "the same updates at the same times");
 }
+
+#[test]
+fn what_a_run_has_lost_and_what_is_left_of_another_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    let path = |name: &str| folder.join("runs").join(name);
+    // Cut off between two lines, gone, not finished, and moved aside by a process that was killed.
+    let metrics = fs::read_to_string(path("b/metrics.jsonl")).expect("written");
+    let first_two: String = metrics.split_inclusive('\n').take(2).collect();
+    fs::write(path("b/metrics.jsonl"), first_two).expect("writable");
+    fs::remove_file(path("b/timing.jsonl")).expect("removed");
+    fs::write(path("b/run.json.tmp7"), "{").expect("writable");
+    fs::create_dir(path("b.replaced-7")).expect("writable");
+    fs::copy(path("b/run.json"), path("b.replaced-7/run.json")).expect("copied");
+
+    let (listed, _) = ended(folder, &["runs", "ls"], 0);
+    let words = "left over: runs/b.replaced-7 holds what runs/b was before it was to be replaced, which was stopped: \
+                 `playbot train --run runs/b --resume` brings";
+    assert!(listed.contains(words), "{listed}");
+    let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
+    assert_eq!((rows.len(), &rows[3]["left_of"]), (4, &serde_json::json!("runs/b")));
+
+    let (_, told) = ended(folder, &["train", "--run", "runs/b", "--resume"], 0);
+    for words in [
+        "runs/b/metrics.jsonl: nothing is left of 2 updates, those of the steps 384 to 512",
+        "runs/b/timing.jsonl: nothing is left of 4 updates, those of the steps 128 to 512",
+        "runs/b/run.json.tmp7 was not finished",
+        "runs/b.replaced-7 is what runs/b was before it was replaced, and is removed",
+    ] {
+        assert!(told.contains(words), "{words}: {told}");
+    }
+    assert!(!path("b/run.json.tmp7").exists() && !path("b.replaced-7").exists());
+    let (listed, _) = ended(folder, &["runs", "ls"], 0);
+    assert!(!listed.contains("left over"), "{listed}");
+}

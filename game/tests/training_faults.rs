@@ -183,6 +183,15 @@ fn a_killed_skill_training_goes_on_bit_for_bit() {
     let (_, other) = ended(folder.path(), &learn("killed", &["--resume", "--set", "skills.lr=0.5"]), 3);
     let words = "other settings: `--set skills.lr=0.5` asks for skills.lr=0.5, and the training has ";
     assert!(other.contains(words) && other.contains("start anew with --force"), "{other}");
+    let whole = std::fs::read(&checkpoint).expect("written");
+    let flipped = [&whole[..whole.len() / 2], &[!whole[whole.len() / 2]], &whole[whole.len() / 2 + 1..]].concat();
+    let zeros = vec![0; whole.len()];
+    for damaged in [&flipped[..], &whole[..whole.len() / 2], &zeros[..]] {
+        std::fs::write(folder.path().join("hurt.checkpoint"), damaged).expect("writable");
+        let (_, hurt) = ended(folder.path(), &learn("hurt", &["--resume"]), 3);
+        assert!(hurt.contains("hurt.checkpoint: ") && hurt.contains("learn anew with --force"), "{hurt}");
+        assert!(!hurt.contains("go on with the recordings"), "they are not to blame: {hurt}");
+    }
     done(folder.path(), &learn("killed", &["--resume"]));
     let (_, finished) = ended(folder.path(), &learn("killed", &["--resume"]), 0);
     assert!(finished.contains("killed is finished") && finished.contains("train --skills killed"), "{finished}");

@@ -110,6 +110,31 @@ fn the_worst_frame_is_of_the_moment_that_is_named() {
 }
 
 #[test]
+fn a_maze_is_seen_as_a_whole_whatever_the_shape_of_the_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let seen = |mode: &str, [width, height]: [usize; 2]| {
+        let [columns, rows] = [format!("width={width}"), format!("height={height}")];
+        let sizes = ["--image", &columns, "--image", &rows, "--scale", "1"];
+        written(
+            folder.path(),
+            &[&["view", "maze2d", "--mode", mode, "--seed", "3", "--tick", "4"][..], &sizes].concat(),
+        );
+        let mut picture = read(&folder.path().join("view.png"));
+        assert_eq!(picture.size, (width, height));
+        picture.frames.swap_remove(0)
+    };
+    for mode in ["medium", "large"] {
+        let square = seen(mode, [64, 64]);
+        for [width, height] in [[84, 64], [64, 84]] {
+            let picture = seen(mode, [width, height]);
+            let middle = |i: usize| picture[(i / 64 + (height - 64) / 2) * width + i % 64 + (width - 64) / 2];
+            let apart = (0..64 * 64).filter(|&i| middle(i) != square[i]).count();
+            assert!(apart < 64 * 64 / 100, "{mode}, {width} × {height}: {apart} pixels differ");
+        }
+    }
+}
+
+#[test]
 fn an_episode_becomes_a_moving_picture() {
     let folder = tempfile::tempdir().expect("a folder");
     let args = ["view", "coinrun", "--seed", "0", "--bot", "right-jump", "--episode", "--scale", "3"];

@@ -43,12 +43,18 @@ impl UnknownName {
     }
 }
 
+/// Longest name, in bytes, that is compared with others: longer ones are no slips of a finger, and take long.
+const LONGEST: usize = 256;
+
 /// The candidate most like `name`, if one is like it at all.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     if let Some(same) = candidates.iter().find(|candidate| candidate.eq_ignore_ascii_case(name)) {
         return Some(same);
+    }
+    if name.len() > LONGEST {
+        return None;
     }
     candidates
         .iter()

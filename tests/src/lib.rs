@@ -5,12 +5,14 @@ mod corridor;
 mod documentation;
 pub mod faulty;
 pub mod foreign;
+pub mod hostile;
 pub mod measuring;
 pub mod memory;
 mod painted;
 pub mod power_cut;
 pub mod recording;
 pub mod scene;
+pub mod small;
 pub mod soak;
 pub mod training;
 

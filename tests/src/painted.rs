@@ -60,7 +60,7 @@ impl Game for PaintedCorridor {
     crate::as_corridor!();
 
     fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: 8.0 })
+        Some(Picture { width: 8.0, least_height: 0.0 })
     }
 
     fn build_picture(&self, app: &mut App) {

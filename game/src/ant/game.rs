@@ -69,7 +69,7 @@ impl Game for Ant {
     }
 
     fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: VIEW })
+        Some(Picture { width: VIEW, least_height: 0.0 })
     }
 
     fn build_picture(&self, app: &mut App) {

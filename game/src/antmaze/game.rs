@@ -130,7 +130,7 @@ impl Game for AntMaze {
     }
 
     fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: VIEW })
+        Some(Picture { width: VIEW, least_height: 0.0 })
     }
 
     fn build_picture(&self, app: &mut App) {

@@ -140,7 +140,7 @@ impl Game for Maze2d {
     }
 
     fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: VIEW })
+        Some(Picture { width: VIEW, least_height: VIEW })
     }
 
     fn build_picture(&self, app: &mut App) {

@@ -174,6 +174,34 @@ fn skills_and_quickstarts_are_as_long_as_their_switches_say() {
 }
 
 #[test]
+fn skills_say_how_they_do_on_what_is_held_out() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    write_experiment(folder);
+    done(folder, &["record", "coinrun", "--levels", "easy:0..7", "--noise", "0.5", "--out", "few.demo"]);
+    let apart = ["--experiment", "small.ron", "--set", "skills.held_out=0.25"];
+    let nlls = |text: &str| -> Vec<f64> {
+        json_lines(text).iter().map(|epoch| epoch["held_out_nll"].as_f64().expect("measured")).collect()
+    };
+    let learn = |out: &str, more: &[&str]| {
+        let learn = ["learn-skills", "--epochs", "3", "--json", "--out", out];
+        let (text, told) = done(folder, &[&learn[..], &apart, more].concat());
+        (nlls(&text), told)
+    };
+    let (all, told) = learn("a", &[]);
+    let words = format!("held-out NLL {:.2} after epoch 3, the last, whose model is kept", all[2]);
+    assert!(all.len() == 3 && told.contains(&words), "{words}: {told}");
+
+    let (all, told) = learn("b", &["--set", "skills.patience=3", "--set", "skills.lr=0.1"]);
+    let best = (0..3).min_by(|&a, &b| all[a].total_cmp(&all[b])).expect("three epochs");
+    let words = format!("held-out NLL {:.2} after epoch {}, the best of 3, whose model is kept", all[best], best + 1);
+    assert!(told.contains(&words), "{words}: {told}");
+
+    done(folder, &[&["quickstart", "--run", "quick", "--steps", "128", "--seeds", "1"][..], &apart].concat());
+    assert_eq!(nlls(&String::from_utf8_lossy(&bytes(folder, "quick/skills.jsonl"))).len(), 1);
+}
+
+#[test]
 fn speed_is_measured_of_the_case_and_for_the_time_that_bench_is_told() {
     let temporary = tempfile::tempdir().expect("a folder");
     let bench = |more: &[&str]| {

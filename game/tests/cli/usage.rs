@@ -80,6 +80,13 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["config", "show", "--set", "arenas=0"], "`arenas=0`: must be at least 1"),
         (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: `ppo.lr` must be"),
         (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
+        // A game without a picture is refused in the tests of games that are not ours.
+        #[cfg(not(feature = "camera"))]
+        (&["config", "show", "--set", "observation=Camera"], "this program was built without cameras"),
+        (
+            &["config", "show", "--set", "arenas=100000", "--set", "worlds=100000"],
+            "`worlds=100000`: must be at most 10000",
+        ),
         (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
         (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..1087: unknown map `hard`"),
         (&["eval", "--set", "game=maze2d", "--bot", "random"], "or with --levels"),

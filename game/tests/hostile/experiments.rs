@@ -1,6 +1,7 @@
 //! Experiments with wrong values, lines in the wrong place and bytes that nobody wrote.
 
 use std::{
+    ops::Range,
     path::Path,
     time::{Duration, Instant},
 };
@@ -34,7 +35,7 @@ fn complaint(text: &str) -> Option<String> {
     let said = match parse_experiment_with::<&str>(text, path, &[]) {
         Err(error) => Some(error.to_string()),
         Ok(experiment) => games.get(&experiment.game).ok().and_then(|game| {
-            let checked = experiment.check_agent(game).and_then(|()| experiment.check_memory(game));
+            let checked = experiment.check_game(game).and_then(|()| experiment.check_memory(game));
             checked.err().map(|error| locate::<&str>(text, path, &[], error).to_string())
         }),
     };
@@ -53,25 +54,85 @@ fn placed(errors: &[String]) -> usize {
     100 * errors.iter().filter(|error| is_placed(error)).count() / errors.len().max(1)
 }
 
+/// Numbers at which something ends.
+const EXTREMES: [&str; 6] = ["0", "-1", "NaN", "1e308", "18446744073709551615", "4294967295"];
+
+/// What is written only if it does something, with a number.
+const UNWRITTEN: [&str; 5] = [
+    "weight_decay: 0.1,",
+    "held_out: 0.1,",
+    "patience: Some(1),",
+    "state_weight: 1.0,",
+    "augment: [Translate(1), Cutout(2)],",
+];
+
+/// Where numbers stand in a text, also those in lists and brackets, but for those in quotes.
+fn numbers(text: &str) -> Vec<Range<usize>> {
+    let is_part = |byte: u8| byte.is_ascii_alphanumeric() || b"_.+-".contains(&byte);
+    let (bytes, mut found, mut at) = (text.as_bytes(), Vec::new(), 0);
+    while at < bytes.len() {
+        let end = match bytes[at] {
+            b'"' => at + 2 + bytes[at + 1..].iter().take_while(|byte| **byte != b'"').count(),
+            byte if is_part(byte) => at + bytes[at..].iter().take_while(|byte| is_part(**byte)).count(),
+            _ => at + 1,
+        };
+        if text.get(at..end).is_some_and(|word| word.parse::<f64>().is_ok()) {
+            found.push(at..end);
+        }
+        at = end;
+    }
+    found
+}
+
+/// Lines of a text, and where those of them stand that are to be changed.
+fn joined(lines: &[String], chosen: Range<usize>) -> (String, Range<usize>) {
+    let length = |lines: &[String]| lines.iter().map(|line| line.len() + 1).sum::<usize>();
+    let start = length(&lines[..chosen.start]);
+    (lines.join("\n"), start..start + length(&lines[chosen]))
+}
+
+/// The experiment with its numbers, and with one wherever there may be one: where there is none, or the list is empty, or the
+/// key is left out. Each text comes with the place of those of its numbers that are in no text before it.
+fn with_numbers(lines: &[String]) -> Vec<(String, Range<usize>)> {
+    let mut texts = vec![joined(lines, 0..lines.len())];
+    for (at, line) in lines.iter().enumerate() {
+        let key = |empty: &str| line.strip_suffix(empty);
+        let changed = key(" None,").map(|key| format!("{key} Some(1),"));
+        if let Some(changed) = changed.or_else(|| key(" [],").map(|key| format!("{key} [1],"))) {
+            let mut lines = lines.to_vec();
+            lines[at] = changed;
+            texts.push(joined(&lines, at..at + 1));
+        }
+    }
+    let inside = 1 + lines.iter().position(|line| line.ends_with("skills: (")).expect("there are skills");
+    for line in UNWRITTEN {
+        let mut lines = lines.to_vec();
+        lines.insert(inside, line.to_owned());
+        texts.push(joined(&lines, inside..inside + 1));
+    }
+    texts
+}
+
 #[test]
 fn every_number_at_its_extremes_is_read_or_refused_with_its_line() {
-    let mut errors = Vec::new();
-    for name in EXPERIMENTS {
-        let lines = whole(name);
-        for at in 0..lines.len() {
-            let Some((key, value)) = lines[at].split_once(": ") else { continue };
-            if value.trim_end_matches(',').parse::<f64>().is_err() {
-                continue;
-            }
-            for extreme in ["0", "-1", "NaN", "1e308", "18446744073709551615", "4294967295"] {
-                let mut changed = lines.clone();
-                changed[at] = format!("{key}: {extreme},");
-                errors.extend(complaint(&changed.join("\n")));
+    let (mut errors, mut tried) = (Vec::new(), 0);
+    for (text, changed) in EXPERIMENTS.iter().flat_map(|name| with_numbers(&whole(name))) {
+        for place in numbers(&text).into_iter().filter(|place| changed.contains(&place.start)) {
+            for extreme in EXTREMES {
+                errors.extend(complaint(&format!("{}{extreme}{}", &text[..place.start], &text[place.end..])));
+                tried += 1;
             }
         }
     }
-    assert!(errors.len() > 500, "only {} of the numbers were refused", errors.len());
+    assert!(tried > 2000 && errors.len() > 1000, "only {} of {tried} numbers were refused", errors.len());
     assert!(placed(&errors) >= 95, "{} % of {}", placed(&errors), errors.len());
+}
+
+#[test]
+fn numbers_are_found_in_lists_and_brackets() {
+    let text = "(a: 1, b: \"2..3\", c: Some(-4.5e-6), d: [7, 8], e: Impala(feature: 9), f1: true)";
+    let found: Vec<&str> = numbers(text).into_iter().map(|place| &text[place]).collect();
+    assert_eq!(found, ["1", "-4.5e-6", "7", "8", "9"]);
 }
 
 /// A text that was changed in one way.

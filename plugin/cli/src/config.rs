@@ -1,10 +1,15 @@
 //! `playbot config`.
 
 use clap::Subcommand;
-use playbot_lab::games::Games;
-use playbot_lab::train::{
-    Experiment,
-    presets::{PRESETS, Preset},
+use playbot_lab::{
+    game::Game,
+    games::Games,
+    sensors::GameSensors,
+    train::{
+        Experiment,
+        config::ExperimentError,
+        presets::{PRESETS, Preset},
+    },
 };
 use serde_json::json;
 
@@ -42,10 +47,19 @@ enum Verb {
     },
 }
 
+/// Checks that the game can be seen as the experiment says.
+fn check_sight(experiment: &Experiment, game: &dyn Game) -> Result<(), ExperimentError> {
+    experiment.observation_config().check(game).map_err(|error| {
+        let words = format!("`observation`: {error}");
+        ExperimentError::Settings { key: Some("observation".to_owned()), words }
+    })
+}
+
 /// Checks what an experiment says of its game. Recordings may still be made.
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     let game = open::game(games, from, experiment)?;
-    let checked = experiment.check_game(game).and_then(|()| experiment.check_memory(game));
+    let checked = experiment.check_game(game).and_then(|()| check_sight(experiment, game));
+    let checked = checked.and_then(|()| experiment.check_memory(game));
     checked.map_err(|error| from.locate(games, [], error))?;
     let algorithm = experiment.algorithm;
     let demos = experiment.demos.as_deref().filter(|_| algorithm.learns_from_demos());

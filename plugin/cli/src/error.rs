@@ -193,7 +193,7 @@ impl CliError {
                     2
                 }
             }
-            Self::Verify(VerifyError::Fault(_)) => 2,
+            Self::Verify(VerifyError::Fault { .. }) => 2,
             Self::Verify(VerifyError::Data(error)) => learn_code(error),
             Self::Learn(error) => learn_code(error),
             #[cfg(feature = "window")]

@@ -12,7 +12,9 @@ use playbot_lab::{
     train::{
         Experiment,
         config::ExperimentError,
-        config_file::{ConfigError, locate, parse_experiment, parse_experiment_with, read_experiment_with},
+        config_file::{
+            ConfigError, locate, parse_experiment, parse_experiment_with, read_experiment_text, read_experiment_with,
+        },
         default_experiment::default_experiment,
     },
 };
@@ -59,7 +61,7 @@ impl ExperimentArgs {
     ) -> ConfigError {
         let sets = self.sets(options);
         match &self.experiment {
-            Some(path) => locate(&std::fs::read_to_string(path).unwrap_or_default(), path, &sets, error),
+            Some(path) => locate(&read_experiment_text(path).unwrap_or_default(), path, &sets, error),
             None => {
                 let ExperimentText { origin, text } = default_experiment(games);
                 locate(&text, Path::new(&*origin), &sets, error)

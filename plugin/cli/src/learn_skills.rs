@@ -168,7 +168,8 @@ pub struct SkillCheckpoint<'a> {
     pub options: Options<'a>,
 }
 
-fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
+/// The metrics of an epoch; null for what was not measured.
+pub fn epoch_json(epoch: u64, metrics: &SkillMetrics) -> serde_json::Value {
     json!({
         "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl, "accuracy": metrics.accuracy,
         "held_out_nll": metrics.held_out_nll(), "held_out_kl": metrics.held_out.map(|held_out| held_out.kl),
@@ -191,6 +192,7 @@ pub fn learn(
 ) -> Result<Option<SkillModel>, CliError> {
     let epochs = experiment.skills.epochs as u64;
     let mut trainer = begin(experiment, dataset, device, checkpoint)?;
+    let mut last = None;
     let per_epoch = trainer.batches_per_epoch() as u64;
     let bar = progress::bar("learn skills", epochs * per_epoch, "batches");
     bar.set_position(trainer.epochs_done() * per_epoch + trainer.batches_done() as u64);
@@ -208,20 +210,26 @@ pub fn learn(
             bar.finish_and_clear();
             return Ok(None);
         };
-        let apart = metrics.held_out_nll().map_or(String::new(), |nll| format!(", held-out NLL {nll:.3}"));
+        last = metrics.held_out_nll();
+        let apart = last.map_or(String::new(), |nll| format!(", held-out NLL {nll:.3}"));
         bar.set_message(format!("NLL {:.3} KL {:.2}{apart}", metrics.nll, metrics.kl));
         after_epoch(trainer.epochs_done(), &metrics)?;
     }
     bar.finish_and_clear();
-    tell_best(&trainer);
+    tell_held_out(&trainer, last);
     Ok(Some(trainer.into_model().with_picture(experiment.observation_config().card())))
 }
 
-/// Says which epoch's model is kept, where that need not be the last one's.
-fn tell_best(trainer: &SkillTrainer) {
-    if let Some(best) = trainer.best_epoch() {
-        let done = counted(trainer.epochs_done(), "epoch");
-        tell!("of {done} number {best} was best on the episodes kept apart, so its model is kept");
+/// Says how the model that is kept does on the episodes that it has not learned from, if there are any: that of the best epoch,
+/// or else of the last one, after which that was `last`.
+fn tell_held_out(trainer: &SkillTrainer, last: Option<f32>) {
+    let done = trainer.epochs_done();
+    match (trainer.best_epoch().zip(trainer.best_nll()), last) {
+        (Some((best, nll)), _) => {
+            tell!("held-out NLL {nll:.2} after epoch {best}, the best of {done}, whose model is kept");
+        }
+        (None, Some(nll)) => tell!("held-out NLL {nll:.2} after epoch {done}, the last, whose model is kept"),
+        (None, None) => {}
     }
 }
 
@@ -235,12 +243,7 @@ fn begin(
     let Some(SkillCheckpoint { path, options }) = checkpoint.filter(|checkpoint| checkpoint.path.exists()) else {
         return Ok(SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?);
     };
-    let trainer = SkillTrainer::load(path, dataset, device).map_err(|error| match error {
-        FileError::Io { .. } => CliError::from(error),
-        _ => CliError::Usage(format!(
-            "{error}; go on with the recordings that it began with, or start anew with --force"
-        )),
-    })?;
+    let trainer = SkillTrainer::load(path, dataset, device).map_err(unusable)?;
     let begun = Experiment { skills: trainer.config().clone(), seed: trainer.seed(), ..experiment.clone() };
     if begun != *experiment {
         return Err(CliError::Usage(format!(
@@ -251,4 +254,17 @@ fn begin(
     }
     tell!("going on in epoch {} of {}", trainer.epochs_done() + 1, experiment.skills.epochs);
     Ok(trainer)
+}
+
+/// What to do about a checkpoint that cannot be gone on with: other recordings are no help against damage.
+fn unusable(error: FileError) -> CliError {
+    let next = match error {
+        FileError::Io { .. } => return error.into(),
+        FileError::CutOff { .. } | FileError::Damaged { .. } | FileError::Foreign { .. } => {
+            "nothing can go on from it: learn anew with --force"
+        }
+        FileError::Newer { .. } => "or start anew with --force",
+        _ => "go on with the recordings that it began with, or start anew with --force",
+    };
+    CliError::Usage(format!("{error}; {next}"))
 }

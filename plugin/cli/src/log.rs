@@ -13,14 +13,17 @@ use tracing::{
 };
 use tracing_subscriber::{
     EnvFilter, Layer,
+    field::RecordFields,
     fmt::{
         FmtContext, FormatEvent, FormatFields, MakeWriter,
-        format::{Format, Full, Writer},
+        format::{DefaultFields, Format, Full, Writer},
     },
     layer::{Context, SubscriberExt},
     registry::LookupSpan,
     util::SubscriberInitExt,
 };
+
+use super::tell::for_people;
 
 /// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
 /// to warn of; what a graphics card that failed could not do is told by the error that follows.
@@ -49,6 +52,7 @@ where
     // An error of writing the log could only be reported to the same place.
     let lines = Lines { is_plain, full: tracing_subscriber::fmt::format().without_time() };
     let format = tracing_subscriber::fmt().with_env_filter(filter).log_internal_errors(false).with_ansi(colours);
+    let format = format.fmt_fields(HarmlessFields(DefaultFields::new()));
     format.event_format(lines).with_writer(writer).finish().with(FilesOnce::default())
 }
 
@@ -72,6 +76,17 @@ where
         writer.write_str(if *event.metadata().level() == Level::ERROR { "error: " } else { "warning: " })?;
         context.field_format().format_fields(writer.by_ref(), event)?;
         writeln!(writer)
+    }
+}
+
+/// The words of an event and its values, as people may be told them: much of it comes from files.
+struct HarmlessFields(DefaultFields);
+
+impl<'writer> FormatFields<'writer> for HarmlessFields {
+    fn format_fields<R: RecordFields>(&self, mut writer: Writer<'writer>, fields: R) -> fmt::Result {
+        let mut words = String::new();
+        self.0.format_fields(Writer::new(&mut words), fields)?;
+        writer.write_str(&for_people(&words))
     }
 }
 
@@ -165,6 +180,22 @@ mod tests {
         assert!(text.starts_with("warning: a checkpoint is passed over: x: damaged\n"), "{text}");
         assert_eq!(text.lines().count(), 2, "{text}");
         assert!(text.contains("bevy_ecs: something of the engine"), "{text}");
+    }
+
+    #[test]
+    fn no_words_of_a_file_steer_the_terminal() {
+        for from_us in [true, false] {
+            let text = logged(|| {
+                let name = "a\u{1b}[2J\u{202e}b\u{9b}\u{7}\rc";
+                match from_us {
+                    true => tracing::warn!(target: "playbot_lab::train", file = name, "{name} is damaged"),
+                    false => tracing::error!(target: "bevy_asset", file = %name, "{name} is damaged"),
+                }
+            });
+            assert!(text.contains("is damaged") && text.contains("\\u{202e}b"), "{text:?}");
+            let steers = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+            assert!(!text.contains(steers), "{text:?}");
+        }
     }
 
     #[test]

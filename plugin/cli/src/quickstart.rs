@@ -214,8 +214,7 @@ fn skills(experiment: &Experiment, dataset: Dataset, args: &Args) -> Result<Opti
     interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", program::name()));
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
-        let line = json!({ "epoch": epoch, "loss": metrics.loss, "nll": metrics.nll, "kl": metrics.kl });
-        log.push_str(&format!("{line}\n"));
+        log.push_str(&format!("{}\n", learn_skills::epoch_json(epoch, metrics)));
         Ok(())
     })?;
     let Some(model) = model else { return Ok(None) };

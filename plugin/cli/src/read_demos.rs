@@ -2,12 +2,7 @@
 
 use std::path::Path;
 
-use playbot_lab::{
-    demo::dataset::Demonstrations,
-    game::Game,
-    games::Games,
-    train::Experiment,
-};
+use playbot_lab::{demo::dataset::Demonstrations, game::Game, games::Games, train::Experiment};
 use playbot_learner::{Dataset, Rollout};
 
 use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::counted, progress};

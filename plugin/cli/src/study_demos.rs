@@ -9,7 +9,7 @@ use playbot_learner::Dataset;
 use super::{
     error::CliError,
     experiment::ExperimentArgs,
-    read_demos::{check_demos, read_demos},
+    read_demos::{check_demos, read_demos, read_rollouts},
 };
 
 /// Reads recordings, and keeps the last ones for the runs that share them.
@@ -23,7 +23,7 @@ pub struct StudyDemos<'a> {
     last: Option<(RecordingsKey, Dataset)>,
 }
 
-/// What the contents of a dataset depend on.
+/// What the contents of a dataset depend on, or of what is trained on.
 #[derive(PartialEq)]
 struct RecordingsKey {
     game: String,
@@ -33,6 +33,8 @@ struct RecordingsKey {
     observation_config: ObservationConfig,
     /// How many steps at most.
     steps: Option<u64>,
+    /// Whether their rewards are wanted, for which all of them are replayed.
+    with_rewards: bool,
 }
 
 impl<'a> StudyDemos<'a> {
@@ -52,10 +54,10 @@ impl<'a> StudyDemos<'a> {
             return Ok(());
         }
         let game = self.games.get(&experiment.game)?;
-        if replays {
-            self.read(game, experiment)?;
-        } else {
-            check_demos(game, experiment, &self.from.recordings(experiment, self.games)?)?;
+        match (replays, key.with_rewards) {
+            (false, _) => check_demos(game, experiment, &self.from.recordings(experiment, self.games)?)?,
+            (true, false) => drop(self.read(game, experiment)?),
+            (true, true) => drop(read_rollouts(game, experiment, self.from, self.games, self.threads)?),
         }
         self.checked.push(key);
         Ok(())
@@ -68,6 +70,7 @@ impl<'a> StudyDemos<'a> {
             held_out: experiment.test.clone(),
             observation_config: experiment.observation_config(),
             steps: experiment.demo_steps,
+            with_rewards: experiment.algorithm.trains_on_demos(),
         })
     }
 

@@ -206,7 +206,7 @@ impl<'a> Runner<'a> {
         Ok(RunDir::begin(lock, &run.experiment, &info)?)
     }
 
-    /// Trains what has to be trained. What is to be replaced stays until its skills are there.
+    /// Trains what has to be trained. What is to be replaced stays until its skills and recordings are there.
     fn player(
         &mut self,
         game: &dyn Game,
@@ -225,6 +225,8 @@ impl<'a> Runner<'a> {
             },
             false => None,
         };
+        let demos =
+            if begun { Vec::new() } else { read_rollouts(game, experiment, self.from, self.games, self.threads)? };
         let dir = match run_folder {
             RunFolder::Begun(dir) => dir,
             RunFolder::New(lock) => self.begin(run, lock)?,
@@ -236,7 +238,6 @@ impl<'a> Runner<'a> {
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
         } else {
-            let demos = read_rollouts(game, experiment, self.from, self.games, self.threads)?;
             Trainer::with_demos(game, experiment, skills.as_ref(), &demos, self.device, self.threads)?
         };
         if !drive(&dir, &mut trainer, title, |report| on_step(report.step))? {

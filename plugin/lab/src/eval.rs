@@ -130,7 +130,7 @@ impl EvalPlan {
         }
     }
 
-    /// Checks that what comes of all episodes fits into the memory that is free.
+    /// Checks that Worlds and what comes of all episodes fit into the memory that is free.
     ///
     /// # Errors
     ///
@@ -140,7 +140,8 @@ impl EvalPlan {
         // What came of each, and its number in the list of those to play.
         let bytes = levels.saturating_mul(episodes).saturating_mul((size_of::<Trail>() + size_of::<u64>()) as u64);
         let what = format!("the results of {levels} levels × {episodes} episodes");
-        check_bytes(what, bytes, "the number of levels, or `eval.episodes_per_level`")
+        let worlds = Arrangement { worlds: self.worlds, arenas: self.arenas / self.worlds.max(1) };
+        check_bytes(what, bytes, "the number of levels, or `eval.episodes_per_level`", worlds)
     }
 }
 

@@ -22,6 +22,8 @@
 pub mod arrangement;
 pub mod assertions;
 pub mod benchmark;
+#[doc(hidden)]
+pub mod brief;
 pub mod bugs;
 pub mod calibration;
 pub mod defect;
@@ -58,6 +60,7 @@ pub mod shell_word;
 pub mod space_view;
 pub mod split;
 pub mod stage_clock;
+mod text_file;
 pub mod trace;
 pub mod train;
 pub mod verdict;

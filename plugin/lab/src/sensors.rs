@@ -98,13 +98,13 @@ impl GameSensors for ObservationConfig {
             entity.remove::<VectorSensor>();
             return;
         }
-        let Some(picture) = game.picture() else { return };
+        let Some(width) = game.picture().map(|picture| picture.width_on(&self.image)) else { return };
         match self.kind {
             ObservationKind::Vector => return,
-            ObservationKind::Raster => entity.insert(RasterSensor::following(agent, picture.width, self.image)),
+            ObservationKind::Raster => entity.insert(RasterSensor::following(agent, width, self.image)),
             #[cfg(feature = "camera")]
             ObservationKind::Camera => {
-                entity.insert(bevy_playbot::camera::CameraSensor::following(agent, picture.width, self.image))
+                entity.insert(bevy_playbot::camera::CameraSensor::following(agent, width, self.image))
             }
             #[cfg(not(feature = "camera"))]
             ObservationKind::Camera => return,

@@ -136,7 +136,15 @@ pub enum FileError {
         /// The cause.
         source: std::io::Error,
     },
-    /// The file is not safetensors, or its description cannot be used.
+    /// The file is none that this program has written, or nothing is left of what it was.
+    #[error("{path}: {detail}: it is another file; name one that playbot has written")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it lacks.
+        detail: String,
+    },
+    /// The description of the file cannot be used.
     #[error("{path}: {detail}")]
     Format {
         /// The file.

@@ -41,6 +41,17 @@ pub enum CameraError {
     /// The camera was despawned, or is none.
     #[error("the camera {0} of its sensor does not exist or is no camera; despawn the sensor with its camera")]
     NoCamera(Entity),
+    /// The game draws on something without pixels, at which the renderer would stop.
+    #[error(
+        "the camera {camera} draws on a target of {}x{} pixels, which has no room for a picture; give it a width and a height \
+         of at least 1", .size.x, .size.y
+    )]
+    EmptyTarget {
+        /// The camera.
+        camera: Entity,
+        /// Columns and rows of pixels.
+        size: UVec2,
+    },
     /// The game has no camera.
     #[error("the game has no active camera of its own to look through; spawn one when a level begins")]
     NoOwnCamera,

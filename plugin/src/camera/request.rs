@@ -1,6 +1,6 @@
 //! What the agents ask to see.
 
-use bevy::{prelude::*, render::renderer::RenderDevice};
+use bevy::{camera::RenderTarget, prelude::*, render::renderer::RenderDevice};
 
 use super::{CameraError, CameraSensor, CameraSource, SensorCamera};
 use crate::{
@@ -10,6 +10,9 @@ use crate::{
     fault::Faults,
     vision::{ImageOptions, ImageSensor, is_observed},
 };
+
+/// The cameras of the game.
+type GameCameras = QueryState<(Entity, &'static Camera), Without<SensorCamera>>;
 
 /// One agent's picture.
 #[derive(Clone, Copy, Debug)]
@@ -64,8 +67,9 @@ pub(super) fn gather_requests(world: &mut World) -> Requests {
     let limit =
         world.get_resource::<RenderDevice>().map_or(u32::MAX, |device| device.limits().max_texture_dimension_2d);
     let mut sensors = world.query::<((&Agent, &Control, &Episode), (&CameraSensor, &ImageSensor))>();
-    let mut cameras = world.query_filtered::<(Entity, &'static Camera), Without<SensorCamera>>();
+    let mut cameras: GameCameras = world.query_filtered();
     cameras.update_archetypes(world);
+    let targets = check_targets(world, &cameras);
     let mut requests = Requests::default();
     let mut refused = Vec::new();
     for &entity in world.resource::<AgentOrder>().entities() {
@@ -76,7 +80,8 @@ pub(super) fn gather_requests(world: &mut World) -> Requests {
         let size = UVec2::new(image.0.width, image.0.height);
         let (level, tick) = (episode.level, episode.tick);
         let request = Request { agent: entity, index: agent.index, level, tick, size };
-        let result = check_size(&image.0, limit).and_then(|()| match sensor.source {
+        let possible = targets.clone().and_then(|()| check_size(&image.0, limit));
+        let result = possible.and_then(|()| match sensor.source {
             CameraSource::Following { target, width } => check_target(world, target, width)
                 .map(|()| requests.following.push(FollowRequest { request, target, width })),
             CameraSource::OfGame => match own_camera(world, &cameras) {
@@ -98,9 +103,19 @@ pub(super) fn gather_requests(world: &mut World) -> Requests {
 }
 
 /// The game's own camera: of the active ones, the one that draws first.
-fn own_camera(world: &World, cameras: &QueryState<(Entity, &'static Camera), Without<SensorCamera>>) -> Option<Entity> {
+fn own_camera(world: &World, cameras: &GameCameras) -> Option<Entity> {
     let active = cameras.iter_manual(world).filter(|(_, camera)| camera.is_active);
     active.min_by_key(|(entity, camera)| (camera.order, *entity)).map(|(entity, _)| entity)
+}
+
+/// The renderer makes a texture of each image that cameras draw on, whoever looks through them, and cannot go on after one
+/// without pixels.
+fn check_targets(world: &World, cameras: &GameCameras) -> Result<(), CameraError> {
+    let Some(images) = world.get_resource::<Assets<Image>>() else { return Ok(()) };
+    let size = |camera| Some(images.get(world.get::<RenderTarget>(camera)?.as_image()?)?.size());
+    let targets = cameras.iter_manual(world).filter_map(|(camera, _)| Some((camera, size(camera)?)));
+    let first = targets.filter(|(_, size)| size.min_element() == 0).min_by_key(|(camera, _)| *camera);
+    first.map_or(Ok(()), |(camera, size)| Err(CameraError::EmptyTarget { camera, size }))
 }
 
 fn check_size(options: &ImageOptions, limit: u32) -> Result<(), CameraError> {
@@ -119,6 +134,11 @@ fn check_target(world: &World, target: Entity, width: f32) -> Result<(), CameraE
 fn check_camera(world: &World, requests: &Requests, request: &Request, camera: Entity) -> Result<(), CameraError> {
     if world.get::<Camera>(camera).is_none() || world.get::<Projection>(camera).is_none() {
         return Err(CameraError::NoCamera(camera));
+    }
+    if let Some(&RenderTarget::None { size }) = world.get::<RenderTarget>(camera)
+        && size.min_element() == 0
+    {
+        return Err(CameraError::EmptyTarget { camera, size });
     }
     let shared = requests.through.iter().any(|(other, used)| *used == camera && other.size != request.size);
     if shared { Err(CameraError::CameraShared(camera)) } else { Ok(()) }

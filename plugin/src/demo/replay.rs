@@ -56,6 +56,8 @@ pub struct Replay {
     episode: Arc<DemoEpisode>,
     divergence: Option<Divergence>,
     finished: bool,
+    /// Whether a reward that is not the recorded one is a divergence.
+    compares_rewards: bool,
 }
 
 /// A replay has stopped being the recorded game: triggered once in a replay, in the tick that differs.
@@ -82,19 +84,37 @@ pub struct Divergence {
 impl Replay {
     /// A replay of this episode. The agent's level queue must give the episode's level.
     pub fn new(episode: Arc<DemoEpisode>) -> Self {
-        Self { episode, divergence: None, finished: false }
+        Self { episode, divergence: None, finished: false, compares_rewards: true }
+    }
+
+    /// A replay that takes what the game pays now, whatever was recorded, as long as the game is in the recorded states. If no
+    /// state was ever hashed, rewards are all that tells one game from another, and are compared all the same.
+    // Hidden: for playbot_lab.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn paid_anew(self) -> Self {
+        let compares_rewards = self.episode.state_hashes.iter().all(|&hash| hash == 0);
+        Self { compares_rewards, ..self }
     }
 
     /// Hands an agent over to this recording, from its first tick on: whatever it was playing is left at once. Where levels
     /// are files, the level is the one that the recorded file has now.
     pub fn begin(episode: Arc<DemoEpisode>, agent: &mut EntityWorldMut) {
+        Self::new(episode).start(agent);
+    }
+
+    /// [`begin`](Self::begin) with this replay.
+    // Hidden: for playbot_lab.
+    #[doc(hidden)]
+    pub fn start(self, agent: &mut EntityWorldMut) {
+        let episode = &self.episode;
         if let Some(mut running) = agent.get_mut::<Episode>() {
             running.abandon();
         }
         let files = agent.world().get_resource::<LevelFiles>();
         let recorded = episode.level_file.as_ref().zip(files).and_then(|(file, files)| files.number_of(file));
         let queue = LevelQueue::Always(recorded.unwrap_or(episode.level_seed));
-        agent.insert((Control::Replay, queue, Self::new(episode), AgentStreams::new(0, 0)));
+        agent.insert((Control::Replay, queue, self, AgentStreams::new(0, 0)));
     }
 
     /// The first difference between the recording and the game, if one has been met. [`ReplayDiverged`] announces it.
@@ -151,7 +171,8 @@ pub(crate) fn check_replays(
         let demo = &*replay.episode;
         // Of another level nothing else needs to be said.
         let is_other = (tick == 0).then(|| other_level(demo, episode.level, files.as_deref())).flatten();
-        let what = is_other.or_else(|| difference(demo, tick as usize, reward.get(), hash.folded(), episode.end()));
+        let paid = replay.compares_rewards.then(|| reward.get());
+        let what = is_other.or_else(|| difference(demo, tick as usize, paid, hash.folded(), episode.end()));
         if replay.divergence.is_none()
             && let Some(what) = what
         {
@@ -172,8 +193,14 @@ fn other_level(demo: &DemoEpisode, level: u64, files: Option<&LevelFiles>) -> Op
     }
 }
 
-/// What is not as recorded in this tick.
-fn difference(demo: &DemoEpisode, tick: usize, reward: f32, hash: u32, end: Option<EpisodeEnd>) -> Option<String> {
+/// What is not as recorded in this tick; the reward only if it is given.
+fn difference(
+    demo: &DemoEpisode,
+    tick: usize,
+    reward: Option<f32>,
+    hash: u32,
+    end: Option<EpisodeEnd>,
+) -> Option<String> {
     let (recorded_hash, recorded_reward) = (*demo.state_hashes.get(tick)?, *demo.rewards.get(tick)?);
     let recorded_end = if tick + 1 < demo.len() {
         None
@@ -187,7 +214,7 @@ fn difference(demo: &DemoEpisode, tick: usize, reward: f32, hash: u32, end: Opti
     };
     if recorded_hash != hash {
         Some(format!("the state hash is {hash:08x}, recorded was {recorded_hash:08x}"))
-    } else if recorded_reward.to_bits() != reward.to_bits() {
+    } else if let Some(reward) = reward.filter(|reward| reward.to_bits() != recorded_reward.to_bits()) {
         Some(format!("the reward is {reward}, recorded was {recorded_reward}"))
     } else if recorded_end != end {
         Some(format!("the episode's end is {end:?}, recorded was {recorded_end:?}"))

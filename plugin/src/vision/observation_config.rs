@@ -65,6 +65,16 @@ pub struct ObservationConfig {
 pub struct Picture {
     /// World units from the left to the right edge of what an agent sees, centred on the agent.
     pub width: f32,
+    /// World units from top to bottom that an agent must see as well: a picture that is too low for them shows more on both
+    /// sides. 0 where it may see as little as its picture is low.
+    pub least_height: f32,
+}
+
+impl Picture {
+    /// World units from the left to the right edge of a picture of this size.
+    pub fn width_on(&self, image: &ImageOptions) -> f32 {
+        self.width.max(self.least_height * image.width as f32 / image.height as f32)
+    }
 }
 
 impl fmt::Display for ObservationConfig {

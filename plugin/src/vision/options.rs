@@ -5,7 +5,7 @@ use playbot_learner::{ImageShape, ObsKind};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Frame, blank::BlankEpisodes, stack::PictureStack};
+use super::{Frame, blank::BlankEpisodes, planes::edge_of_squares, stack::PictureStack};
 
 /// Largest width and height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 1024;
@@ -88,6 +88,12 @@ impl ImageOptions {
             }
         }
         Ok(())
+    }
+
+    /// Rows and columns at the top left in which velocity is painted, if it is.
+    pub fn painted_corner(&self) -> Option<[usize; 2]> {
+        let edge = |squares| edge_of_squares(squares, self.width as usize);
+        self.paint_velocity.then(|| [edge(1).min(self.height as usize), edge(2)])
     }
 
     /// Channels of one picture: 1 or 3.

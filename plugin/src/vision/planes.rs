@@ -26,12 +26,16 @@ fn brightness([red, green, blue, _]: [u8; 4]) -> u8 {
     ((r * u32::from(red) + g * u32::from(green) + b * u32::from(blue) + 0x8000) >> 16) as u8
 }
 
+/// Columns of so many squares beside each other: a pixel belongs to the square that its centre is in.
+pub(super) fn edge_of_squares(squares: usize, width: usize) -> usize {
+    (2 * squares * width + 5) / 10
+}
+
 /// Paints two squares at the top left, a fifth of the width each, as grey as the velocity is large: black for -1, white
 /// for 1. Brightness keeps grey, so this comes to the same before and after.
 pub(super) fn paint_velocity(velocity: [f32; 2], options: &ImageOptions, planes: &mut [u8]) {
     let (width, height) = (options.width as usize, options.height as usize);
-    // A pixel belongs to the square that its centre is in.
-    let edge = |squares: usize| (2 * squares * width + 5) / 10;
+    let edge = |squares: usize| edge_of_squares(squares, width);
     for (square, speed) in velocity.into_iter().enumerate() {
         let grey = (255.0 * (0.5 * speed.clamp(-1.0, 1.0) + 0.5)) as u8;
         for plane in planes.chunks_exact_mut(width * height) {
@@ -74,6 +78,7 @@ mod tests {
             // The squares have a side of 12.8 pixels.
             assert_eq!([at(0, 0), at(12, 12), at(13, 0), at(25, 12)], [153, 153, 127, 127]);
             assert_eq!([at(26, 0), at(0, 13), at(25, 13)], [7; 3]);
+            assert_eq!(options.painted_corner(), Some([13, 26]));
         }
         paint_velocity([-9.0, 9.0], &options, &mut planes);
         assert_eq!([planes[0], planes[20]], [0, 255], "no faster than the fastest");

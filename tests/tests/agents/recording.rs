@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
-        file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
+        file::{Decider, DemoActions, DemoEnd, DemoHeader, DemoReader, DemoWriter, EpisodeActions, repair},
         recorder::flush_unfinished,
         replay::{Divergence, ReplayDiverged},
     },
@@ -124,6 +124,30 @@ fn recordings_of_another_game_or_version_are_refused() {
         let error = verify_file(&Corridor, &path, |_| {}).expect_err("foreign").to_string();
         assert!(error.contains(words), "{error}");
     }
+}
+
+#[test]
+fn what_breaks_the_game_is_named_with_its_file_and_episode() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (whole, path) = (folder.path().join("whole.demo"), folder.path().join("walk.demo"));
+    record(&whole, header(), 5);
+    // Of a game that had more actions.
+    let header = DemoHeader { actions: DemoActions::Discrete(10), ..header() };
+    let mut writer = DemoWriter::create(&path, header).expect("fresh");
+    let episodes = DemoReader::open(&whole).expect("readable").read_all().expect("whole");
+    for (index, mut episode) in episodes.into_iter().enumerate() {
+        if index == 3
+            && let EpisodeActions::Discrete(actions) = &mut episode.actions
+        {
+            actions[0] = 9;
+        }
+        writer.push(&episode).expect("writable");
+    }
+    let error = verify_file(&Corridor, &path, |_| {}).expect_err("no such action").to_string();
+    assert!(error.contains("walk.demo, episode 3: ") && error.contains("action 9"), "{error}");
+    let demos = Demonstrations::read(&Corridor, &ObservationConfig::default(), &path, None).expect("readable");
+    let error = demos.dataset(&Corridor, 1, |_| {}).expect_err("no such action").to_string();
+    assert!(error.contains("walk.demo, episodes 0, 1, 2, 3, 4: ") && error.contains("action 9"), "{error}");
 }
 
 #[test]

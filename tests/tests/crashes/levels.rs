@@ -15,6 +15,8 @@ use playbot_tests::{
     power_cut::{PaperDisk, power_cuts},
 };
 
+use super::tree::tree;
+
 fn plan(seed: u64) -> TestPlan {
     let tester = Tester {
         record: TesterRecord::bot("random"),
@@ -53,7 +55,7 @@ fn a_test_in_the_place_of_another_gives_the_same_results_wherever_the_power_fail
     let recording = DiskRecording::of(folder.path());
     let new = test(&path, 2, Earlier::Replace).expect("replaceable");
     assert_ne!(old, new);
-    let operations = recording.operations();
+    let (operations, files) = (recording.operations(), tree(folder.path()));
     let (mut untouched, mut gone_on) = (0, 0);
     for cut in power_cuts(&operations) {
         let left = tempfile::tempdir().expect("a folder");
@@ -67,6 +69,7 @@ fn a_test_in_the_place_of_another_gives_the_same_results_wherever_the_power_fail
             Err(TestError::OtherPlan { .. }) => {
                 untouched += 1;
                 assert_eq!(test(&path, 1, Earlier::Resume).expect("whole"), old, "{cut:?}: the old test has changed");
+                assert_eq!(tree(left.path()), files, "{cut:?}: something is left over");
                 continue;
             }
             // Without the record of the old test its results are as good as gone.
@@ -74,6 +77,7 @@ fn a_test_in_the_place_of_another_gives_the_same_results_wherever_the_power_fail
             Err(error) => panic!("{cut:?}: {error}"),
         };
         assert!(results == new, "{cut:?}: other results");
+        assert_eq!(tree(left.path()), files, "{cut:?}: something is left over");
     }
     assert!(untouched > 0 && gone_on > 50, "{untouched}, {gone_on}");
 }

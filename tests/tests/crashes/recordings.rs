@@ -11,6 +11,8 @@ use playbot_tests::{
     recording::record_random,
 };
 
+use super::tree::tree;
+
 /// Episodes that are recorded, some of them in a second go.
 const EPISODES: u64 = 24;
 
@@ -33,6 +35,14 @@ fn record(path: &Path, given: &[DemoEpisode]) {
 fn left_by(before: &PaperDisk, operations: &[DiskOperation], cut: &PowerCut, from: &Path, to: &Path) -> PathBuf {
     before.clone().after(operations, cut).write(from, to);
     to.join("a.demo")
+}
+
+/// Beside a recording lie at most the damaged files that it was before each repair.
+fn check_left(folder: &Path, cut: &PowerCut) {
+    let known = ["a.demo", "a.demo.bak", "a.demo.bak2"];
+    let unknown: Vec<PathBuf> =
+        tree(folder).into_iter().filter(|path| !known.iter().any(|name| path == Path::new(name))).collect();
+    assert!(unknown.is_empty(), "{cut:?}: {unknown:?} are left over");
 }
 
 #[test]
@@ -74,6 +84,7 @@ fn a_recording_keeps_every_episode_that_was_finished() {
             std::fs::read(below.join("a.demo")).expect("there"),
             "{cut:?}"
         );
+        check_left(left.path(), cut);
     }
 }
 
@@ -96,5 +107,6 @@ fn a_repair_in_place_loses_nothing_sound() {
         let path = left_by(&before, &operations, &cut, folder.path(), left.path());
         repair(&path, &path, None).unwrap_or_else(|error| panic!("{cut:?}: {error}"));
         assert_eq!(episodes(&path), given[..3], "{cut:?}");
+        check_left(left.path(), &cut);
     }
 }

@@ -9,7 +9,10 @@ use playbot_tests::{
     training::{run_info, train, written},
 };
 
-use super::runs::{experiment, fresh};
+use super::{
+    runs::{experiment, fresh},
+    tree::tree,
+};
 
 /// Replaces what is there by a run with this seed.
 fn replace(run: &Path, seed: u64) {
@@ -22,9 +25,10 @@ fn a_run_that_is_replaced_is_the_old_one_or_the_new_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = folder.path().join("run");
     train(&run, fresh(1), None);
-    let (old, before) = (written(&run), PaperDisk::of(folder.path()));
+    let (old, before, old_files) = (written(&run), PaperDisk::of(folder.path()), tree(folder.path()));
     let recording = DiskRecording::of(folder.path());
     replace(&run, 2);
+    let new_files = tree(folder.path());
     let operations = recording.operations();
     assert!(operations.len() > 15, "{operations:?}");
     let (mut kept, mut replaced) = (0, 0);
@@ -36,15 +40,15 @@ fn a_run_that_is_replaced_is_the_old_one_or_the_new_one() {
         match opened.experiment.seed {
             1 => {
                 assert!(written(&run) == old, "{cut:?}: the old run has changed");
+                assert_eq!(tree(left.path()), old_files, "{cut:?}: something is left over");
                 kept += 1;
             }
             _ => {
                 assert!(opened.run.checkpoint(CheckpointChoice::Last).is_err(), "{cut:?}: a checkpoint of the old run");
+                assert_eq!(tree(left.path()), new_files, "{cut:?}: something is left over");
                 replaced += 1;
             }
         }
-        let leftovers = std::fs::read_dir(left.path()).expect("readable").count();
-        assert_eq!(leftovers, 1, "{cut:?}: parts of the old run lie beside the run");
     }
     assert!(kept > 10 && replaced > 10, "{kept}, {replaced}");
 }

@@ -1,9 +1,6 @@
 //! Trainings.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use playbot_lab::train::{
     Algorithm, Experiment, Trainer,
@@ -20,6 +17,8 @@ use playbot_tests::{
     power_cut::{PaperDisk, PowerCut, power_cuts},
     training::{run_info, train, written},
 };
+
+use super::tree::tree;
 
 /// Updates between checkpoints.
 const EVERY: u64 = 2;
@@ -95,7 +94,7 @@ fn a_training_goes_on_to_the_same_bytes_wherever_the_power_failed() {
     let recording = DiskRecording::of(folder.path());
     train_on(&run, fresh(1));
     let operations = recording.operations();
-    let undisturbed = written(&run);
+    let (undisturbed, files) = (written(&run), tree(folder.path()));
     let cuts = power_cuts(&operations);
     assert!(cuts.len() > 1000, "{} places", cuts.len());
     for cut in &cuts {
@@ -104,7 +103,6 @@ fn a_training_goes_on_to_the_same_bytes_wherever_the_power_failed() {
         let run = left.path().join("run");
         go_on(&run, &operations, cut);
         assert!(written(&run) == undisturbed, "{cut:?} after {:?}", operations[..cut.operations].last());
-        let leftovers = fs::read_dir(left.path()).expect("readable").count();
-        assert_eq!(leftovers, 1, "{cut:?}");
+        assert_eq!(tree(left.path()), files, "{cut:?}: something is left over");
     }
 }

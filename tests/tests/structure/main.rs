@@ -21,3 +21,4 @@ mod resolve;
 mod rules;
 mod tokens;
 mod use_tree;
+mod writes;

@@ -86,30 +86,6 @@ fn files_are_short() {
 
 /// `mod.rs` and `lib.rs` have documentation and attributes, `mod name;`, `use`, `extern crate`, modules in braces that keep
 /// to the same rule, and items for documentation tests (`#[cfg(doctest)]`); nothing else, not even for tests.
-/// What changes a disk, and belongs into one module.
-const WRITES: [&str; 7] =
-    ["fs::write(", "File::create", "fs::rename", "fs::remove_", "fs::create_dir", "fs::hard_link", "fs::copy("];
-
-#[test]
-fn all_that_is_written_goes_through_one_module() {
-    let (workspace, mut faults) = (workspace(), Vec::new());
-    for file in files(&workspace.join("plugin"), ".rs") {
-        let shown = shown(&workspace, &file);
-        if !shown.contains("/src/") && !shown.starts_with("plugin/src/") || shown.contains("/src/disk/") {
-            continue;
-        }
-        let text = fs::read_to_string(&file).expect("readable").replace("DiskFile::", "");
-        let code = text.split("#[cfg(test)]\n").next().unwrap_or_default();
-        let is_for_tests = shown.ends_with("tests.rs") || shown.ends_with("testing.rs");
-        let found = WRITES.iter().filter(|write| !is_for_tests && code.contains(**write));
-        faults.extend(found.map(|write| format!("{shown}: {write}")));
-    }
-    fail_if_any(
-        &faults,
-        "power cuts are tested on what goes through `playbot_learner::disk`: call the functions there",
-    );
-}
-
 #[test]
 fn mod_rs_and_lib_rs_only_declare() {
     let mut faults = Vec::new();

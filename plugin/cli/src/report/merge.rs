@@ -44,7 +44,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let Some(first) = shards.first() else {
         return Err(CliError::Usage("name the folders of the shards".to_owned()));
     };
-    let record = TestRecord { shard: None, ..ResultLines::open(first)?.record().clone() };
+    let record = TestRecord { shard: None, ..ResultLines::open_whole(first)?.record().clone() };
     // Without the game there are no pictures, and all else is the same.
     let game = games.get(&record.game).ok();
     let against = args.against.as_deref().map(results_folder);

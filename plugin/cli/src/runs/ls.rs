@@ -4,12 +4,15 @@ use std::{path::PathBuf, time::SystemTime};
 
 use playbot_lab::{
     report::{PlainTable, percent, readable, whole},
-    runs::{RunRecord, RunsError, find_runs},
+    runs::{FoundRuns, Leftover, RunRecord, RunsError},
     train::metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use serde_json::{Value, json};
 
-use super::super::error::{CliError, Outcome, print_line};
+use super::super::{
+    error::{CliError, Outcome, print_line},
+    program,
+};
 
 /// The folder of runs where none is named.
 const RUNS: &str = "runs";
@@ -17,7 +20,8 @@ const RUNS: &str = "runs";
 /// Stands where there is no number.
 pub const UNKNOWN: &str = "–";
 
-/// Lists the runs in a folder and the folders below it; exit code 1 if one is damaged.
+/// Lists the runs in a folder and the folders below it, and what is left of others that were to be replaced; exit code 1
+/// if one is damaged.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs ls
@@ -26,7 +30,7 @@ pub struct Args {
     /// The folder.
     #[arg(default_value = RUNS)]
     root: PathBuf,
-    /// One line of JSON per run.
+    /// One line of JSON per run, and per folder that is left of one.
     #[arg(long)]
     json: bool,
 }
@@ -39,7 +43,8 @@ impl Default for Args {
 
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let (mut table, mut damaged) = (table(), Vec::new());
-    for path in find_runs(&args.root)? {
+    let found = FoundRuns::at(&args.root)?;
+    for path in found.runs {
         match RunRecord::read(&path) {
             Ok(run) if args.json => print_line(to_json(&run))?,
             Ok(run) => table.rows.push(row(&run)),
@@ -53,6 +58,7 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     if !args.json {
         print_table(&table, &damaged)?;
     }
+    found.leftovers.iter().try_for_each(|leftover| print_leftover(leftover, args.json))?;
     Ok(if damaged.is_empty() { Outcome::Pass } else { Outcome::Findings })
 }
 
@@ -64,6 +70,16 @@ fn print_table(table: &PlainTable, damaged: &[RunsError]) -> Result<(), CliError
         print_line(format!("damaged: {error}"))?;
     }
     Ok(())
+}
+
+/// What is no run, and what to do about it.
+fn print_leftover(leftover: &Leftover, as_json: bool) -> Result<(), CliError> {
+    let words = program::named(&leftover.to_string());
+    if as_json {
+        print_line(json!({ "path": leftover.folder, "left_of": leftover.run, "advice": words }))
+    } else {
+        print_line(format!("left over: {words}"))
+    }
 }
 
 fn table() -> PlainTable {

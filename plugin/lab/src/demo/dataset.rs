@@ -4,13 +4,13 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations, Streams, rng::shuffle};
 
-use super::{
-    replay_observations::{ObservedEpisode, observe_replays},
-    verify::VerifyError,
-};
+use super::{replay_observations::ObservedEpisode, verify::VerifyError};
 use crate::sensors::GameSensors;
 use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment, train::free_memory::free_memory};
-use bevy_playbot::demo::file::{DemoEpisode, DemoReader, EpisodeActions, find_demos};
+use bevy_playbot::demo::{
+    file::{DemoEpisode, DemoReader, EpisodeActions, find_demos},
+    replay::Replay,
+};
 use bevy_playbot::vision::ObservationConfig;
 
 /// Recorded episodes of a game, read and checked, before each action is paired with what was seen.
@@ -28,9 +28,9 @@ pub struct Demonstrations {
 /// One episode and where it comes from.
 #[derive(Debug)]
 pub(super) struct Demonstration {
-    file: Arc<Path>,
-    index: usize,
-    mode: Arc<str>,
+    pub(super) file: Arc<Path>,
+    pub(super) index: usize,
+    pub(super) mode: Arc<str>,
     pub(super) episode: Arc<DemoEpisode>,
     /// Its file keeps the vectors that the game has now.
     pub(super) is_seen: bool,
@@ -167,24 +167,16 @@ impl Demonstrations {
     }
 
     /// The data set of what the sensor shows.
-    fn seen(
-        &self,
-        game: &dyn Game,
-        threads: usize,
-        progress: &(impl Fn(u64) + Sync),
-    ) -> Result<Dataset, VerifyError> {
-        let (steps, bytes, free) = (self.steps(), self.picture_bytes(), free_memory());
-        if bytes > free {
-            return Err(VerifyError::TooLarge { steps, observation_config: self.observation_config, bytes, free });
-        }
+    fn seen(&self, game: &dyn Game, threads: usize, progress: &(impl Fn(u64) + Sync)) -> Result<Dataset, VerifyError> {
+        self.check_room(free_memory())?;
         let originals = self.originals();
-        let mut observed = self.observe(game, threads, &originals, progress)?;
+        let mut observed = self.observe(game, threads, &originals, Replay::new, progress)?;
         let mut episodes = Vec::new();
         for (i, demo) in self.episodes.iter().enumerate() {
             let observations = if demo.is_seen {
                 progress(demo.episode.len() as u64);
                 Observations::Vector(demo.episode.observations.clone())
-            } else if let Some(observations) = observed.remove(&i) {
+            } else if let Some(ObservedEpisode { observations, .. }) = observed.remove(&i) {
                 observations
             } else {
                 // An earlier episode is the same.
@@ -198,6 +190,12 @@ impl Demonstrations {
         Ok(dataset.with_levels(self.levels())?)
     }
 
+    /// Nothing is replayed whose pictures have no room.
+    fn check_room(&self, free: u64) -> Result<(), VerifyError> {
+        let (steps, bytes, observation_config) = (self.steps(), self.picture_bytes(), self.observation_config);
+        if bytes > free { Err(VerifyError::TooLarge { steps, observation_config, bytes, free }) } else { Ok(()) }
+    }
+
     /// For each episode the index of the first one of the same level.
     fn levels(&self) -> Vec<usize> {
         let mut first = BTreeMap::new();
@@ -209,41 +207,6 @@ impl Demonstrations {
         let mut first = BTreeMap::new();
         let key = |demo: &Demonstration| (demo.level(), bits(&demo.episode.actions));
         self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(key(demo)).or_insert(i)).collect()
-    }
-
-    /// Episodes that were left before their first tick.
-    fn nothing_to_see(&self) -> impl Iterator<Item = usize> {
-        self.episodes.iter().enumerate().filter(|(_, demo)| demo.episode.is_empty()).map(|(i, _)| i)
-    }
-
-    /// Replays what no file keeps, mode by mode.
-    pub(super) fn observe(
-        &self,
-        game: &dyn Game,
-        threads: usize,
-        originals: &[usize],
-        progress: &(impl Fn(u64) + Sync),
-    ) -> Result<BTreeMap<usize, Observations>, VerifyError> {
-        let mut by_mode: BTreeMap<&str, Vec<(usize, Arc<DemoEpisode>)>> = BTreeMap::new();
-        for (i, demo) in self.episodes.iter().enumerate() {
-            if !demo.is_seen && originals[i] == i && !demo.episode.is_empty() {
-                by_mode.entry(&demo.mode).or_default().push((i, demo.episode.clone()));
-            }
-        }
-        let (mut all, kind) = (BTreeMap::new(), self.observation_config.obs_kind(game));
-        all.extend(self.nothing_to_see().map(|i| (i, Observations::empty(&kind))));
-        for (mode, jobs) in by_mode {
-            for ObservedEpisode { id, observations, divergence } in
-                observe_replays(game, &self.observation_config, mode, jobs, threads, progress)?
-            {
-                if let Some(divergence) = divergence {
-                    let Demonstration { file, index, .. } = &self.episodes[id];
-                    return Err(VerifyError::Diverged { path: file.to_path_buf(), episode: *index, divergence });
-                }
-                all.insert(id, observations);
-            }
-        }
-        Ok(all)
     }
 }
 
@@ -265,7 +228,11 @@ pub(super) fn learner_actions(episode: &DemoEpisode) -> Actions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy_playbot::{demo::file::DemoActions, level_files::LevelFile};
+    use bevy_playbot::{
+        demo::file::DemoActions,
+        level_files::LevelFile,
+        vision::{ImageOptions, ObservationKind},
+    };
 
     fn all(episodes: impl Iterator<Item = DemoEpisode>) -> Demonstrations {
         let demo = |(index, episode)| Demonstration {
@@ -292,6 +259,19 @@ mod tests {
         }));
         assert_eq!(demos.levels(), [0, 1, 0, 3, 4, 3]);
         assert_eq!(demos.originals(), [0, 1, 0, 3, 4, 3], "all of them were left before their first action");
+    }
+
+    #[test]
+    fn pictures_that_have_no_room_are_refused() {
+        let episode = DemoEpisode { state_hashes: vec![0; 10], ..DemoEpisode::new(0, DemoActions::Discrete(2)) };
+        let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
+        let observation_config = ObservationConfig { kind: ObservationKind::Raster, image };
+        let demos = Demonstrations { observation_config, ..all(std::iter::once(episode)) };
+        assert!(demos.check_room(10 * 48 << 20).is_ok());
+        let error = demos.check_room((10 * 48 << 20) - 1).expect_err("too large").to_string();
+        for words in ["0.5 GiB", "`demo_steps`", "1024×1024 colour pictures of the raster, 16 in a stack"] {
+            assert!(error.contains(words), "{error}");
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 pub mod dataset;
 pub mod demonstration;
+mod observe;
 mod replay_observations;
+mod replayed;
 mod rollouts;
 pub mod verify;

@@ -1,40 +1,62 @@
-//! Observations of recordings: they are played again, many at a time, and what the agents see is kept.
-
-use std::sync::Arc;
+//! Observations of recordings: they are played again, many at a time, and what the agents see and earn is kept.
 
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations};
 
-use super::verify::VerifyError;
 use crate::sensors::GameSensors;
 use crate::{arrangement::at_most, game::Game, parallel::on_threads, worlds::build_observing_world};
-use bevy_playbot::demo::{
-    file::DemoEpisode,
-    replay::{Divergence, Replay},
+use bevy_playbot::demo::replay::{Divergence, Replay};
+use bevy_playbot::{
+    control::Control,
+    fault::Fault,
+    headless::tick_world,
+    observation::Observation,
+    reward::Reward,
+    vision::{ObservationConfig, VisionError},
 };
-use bevy_playbot::{control::Control, headless::tick_world, observation::Observation, vision::ObservationConfig};
 
 /// Recordings that one World replays at the same time: shares the cost of a tick, and a camera's.
 const SIDE_BY_SIDE: usize = 16;
 
-/// An episode to be replayed, with a number to know it by.
-type Job = (usize, Arc<DemoEpisode>);
+/// A replay that is to be played, with a number to know it by.
+pub(super) type Job = (usize, Replay);
 
-/// What an agent saw in an episode.
+/// What an agent saw and earned in an episode.
 pub(super) struct ObservedEpisode {
     /// Number of the job.
     pub id: usize,
     /// The observation before each action.
     pub observations: Observations,
+    /// What the game paid for each action.
+    pub rewards: Vec<f32>,
     /// Where the episode stopped being the recorded one, if it did.
     pub divergence: Option<Divergence>,
+}
+
+/// Why replays came to no end.
+pub(super) enum ReplayError {
+    /// The game broke its contract while these jobs were played side by side.
+    Fault {
+        /// Numbers of the jobs.
+        ids: Vec<usize>,
+        /// What happened.
+        fault: Fault,
+    },
+    /// The game cannot be seen this way.
+    Vision(VisionError),
+}
+
+impl From<VisionError> for ReplayError {
+    fn from(error: VisionError) -> Self {
+        Self::Vision(error)
+    }
 }
 
 /// Replays episodes of one mode on at most `threads` threads. What is seen does not depend on their number.
 ///
 /// # Errors
 ///
-/// [`VerifyError`] if the game breaks its contract or cannot be seen this way.
+/// [`ReplayError`] if the game breaks its contract or cannot be seen this way.
 pub(super) fn observe_replays(
     game: &dyn Game,
     observation_config: &ObservationConfig,
@@ -42,7 +64,7 @@ pub(super) fn observe_replays(
     jobs: Vec<Job>,
     threads: usize,
     progress: &(impl Fn(u64) + Sync),
-) -> Result<Vec<ObservedEpisode>, VerifyError> {
+) -> Result<Vec<ObservedEpisode>, ReplayError> {
     let side_by_side = at_most(game, SIDE_BY_SIDE);
     let threads = threads.clamp(1, jobs.len().div_ceil(side_by_side).max(1));
     let mut shares: Vec<Vec<Job>> = vec![Vec::new(); threads];
@@ -75,13 +97,13 @@ impl ReplayWorld {
         observation_config: &ObservationConfig,
         mode: &str,
         count: usize,
-    ) -> Result<Self, VerifyError> {
+    ) -> Result<Self, ReplayError> {
         let (world, agents) = build_observing_world(game, mode, observation_config, 0, 0, count as u32)?;
         let replaying = agents.iter().map(|_| None).collect();
         Ok(Self { world, agents, replaying, kind: observation_config.obs_kind(game) })
     }
 
-    fn play(mut self, jobs: Vec<Job>, progress: &impl Fn(u64)) -> Result<Vec<ObservedEpisode>, VerifyError> {
+    fn play(mut self, jobs: Vec<Job>, progress: &impl Fn(u64)) -> Result<Vec<ObservedEpisode>, ReplayError> {
         let mut jobs = jobs.into_iter();
         let mut done = Vec::new();
         loop {
@@ -94,7 +116,10 @@ impl ReplayWorld {
             if busy == 0 {
                 return Ok(done);
             }
-            tick_world(&mut self.world)?;
+            if let Err(fault) = tick_world(&mut self.world) {
+                let ids = self.replaying.iter().flatten().map(|observed| observed.id).collect();
+                return Err(ReplayError::Fault { ids, fault });
+            }
             done.extend((0..self.agents.len()).filter_map(|agent| self.note(agent)));
             progress(busy as u64);
         }
@@ -103,21 +128,22 @@ impl ReplayWorld {
     /// Hands an agent the next episode; it stands still if there is none.
     fn begin(&mut self, agent: usize, job: Option<Job>) {
         let mut entity = self.world.entity_mut(self.agents[agent]);
-        let Some((id, episode)) = job else {
+        let Some((id, replay)) = job else {
             entity.insert(Control::Idle);
             return;
         };
-        let observations = Observations::with_capacity(&self.kind, episode.len());
-        Replay::begin(episode, &mut entity);
-        self.replaying[agent] = Some(ObservedEpisode { id, observations, divergence: None });
+        let observations = Observations::with_capacity(&self.kind, replay.episode().len());
+        replay.start(&mut entity);
+        self.replaying[agent] = Some(ObservedEpisode { id, observations, rewards: Vec::new(), divergence: None });
     }
 
-    /// Keeps what an agent saw in this tick; gives out the episode if that was its last.
+    /// Keeps what an agent saw and earned in this tick; gives out the episode if that was its last.
     fn note(&mut self, agent: usize) -> Option<ObservedEpisode> {
         let observed = self.replaying[agent].as_mut()?;
         let entity = self.world.entity(self.agents[agent]);
         // What an agent carries after a tick is still what it acted on.
         entity.get::<Observation>()?.push_to(&mut observed.observations);
+        observed.rewards.push(entity.get::<Reward>()?.get());
         let replay = entity.get::<Replay>().filter(|replay| replay.is_finished())?;
         observed.divergence = replay.divergence().cloned();
         self.replaying[agent].take()

@@ -1,22 +1,27 @@
 //! Turning recordings into what an algorithm trains on beside its own play.
 
-use bevy_playbot::demo::file::{DemoEnd, DemoEpisode};
-use playbot_learner::{ActionSpace, Actions, LearnError, ObsKind, Observations, Rollout};
+use bevy_playbot::demo::{
+    file::{DemoEnd, DemoEpisode},
+    replay::Replay,
+};
+use playbot_learner::{ActionSpace, Actions, LearnError, ObsKind, Rollout};
 
 use super::{
     dataset::{Demonstrations, learner_actions},
+    replay_observations::ObservedEpisode,
     verify::VerifyError,
 };
 use crate::{game::Game, sensors::GameSensors};
 
 impl Demonstrations {
-    /// What was played, with its rewards, as rollouts of one environment each. Every episode is replayed, so that what it
-    /// earned is what it earns today. The last step of an episode that did not end by the rules is left out: nobody has
+    /// What was played, with its rewards, as rollouts of one environment each. Every episode is replayed, and what it earns is
+    /// what the game pays today: recordings that know of no reward, or of an earlier one, serve as well, as long as the game
+    /// still comes to the recorded states. The last step of an episode that did not end by the rules is left out: nobody has
     /// recorded what came after it.
     ///
     /// # Errors
     ///
-    /// [`VerifyError`] if an episode does not replay.
+    /// [`VerifyError`] if an episode does not replay: nobody knows what it would earn.
     pub fn rollouts(
         mut self,
         game: &dyn Game,
@@ -25,12 +30,13 @@ impl Demonstrations {
     ) -> Result<Vec<Rollout>, VerifyError> {
         self.episodes.iter_mut().for_each(|demo| demo.is_seen = false);
         let originals = self.originals();
-        let observed = self.observe(game, threads, &originals, &progress)?;
+        let observed =
+            self.observe(game, threads, &originals, |episode| Replay::new(episode).paid_anew(), &progress)?;
         let kind = self.observation_config.obs_kind(game);
         let mut rollouts = Vec::new();
         for (demo, original) in self.episodes.iter().zip(originals) {
-            if let Some(observations) = observed.get(&original) {
-                rollouts.extend(rollout(&demo.episode, observations, &kind, &game.actions())?);
+            if let Some(observed) = observed.get(&original) {
+                rollouts.extend(rollout(&demo.episode, observed, &kind, &game.actions())?);
             }
         }
         Ok(rollouts)
@@ -40,7 +46,7 @@ impl Demonstrations {
 /// The steps of an episode whose outcome is known, if there are any.
 fn rollout(
     episode: &DemoEpisode,
-    observations: &Observations,
+    ObservedEpisode { observations, rewards, .. }: &ObservedEpisode,
     kind: &ObsKind,
     space: &ActionSpace,
 ) -> Result<Option<Rollout>, LearnError> {
@@ -53,7 +59,7 @@ fn rollout(
     actions.extend_rows(&learner_actions(episode), 0, steps)?;
     let mut rollout = Rollout { steps, actions, ..Rollout::new(1, *kind, 0, space) };
     rollout.obs.push(observations.rows(0..steps, width))?;
-    rollout.rewards = episode.rewards[..steps].to_vec();
+    rollout.rewards = rewards[..steps].to_vec();
     (rollout.log_probs, rollout.values, rollout.final_values) = (vec![0.0; steps], vec![0.0; steps], vec![0.0; steps]);
     (rollout.terminated, rollout.truncated) = (vec![false; steps], vec![false; steps]);
     rollout.terminated[steps - 1] = is_terminated;

@@ -9,6 +9,7 @@ use bevy::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
+pub use super::replayed::Replayed;
 use crate::{game::Game, mode::ModeError, split::LevelSplit, worlds::build_world};
 use bevy_playbot::demo::{
     file::{DemoEpisode, DemoFileError, DemoReader},
@@ -38,8 +39,13 @@ pub enum VerifyError {
     #[error(transparent)]
     File(#[from] DemoFileError),
     /// The game broke its contract while it was replayed.
-    #[error("while replaying: {0}")]
-    Fault(#[from] Fault),
+    #[error("while replaying {replayed}: {fault}; if the game has changed since, record it again or leave it out")]
+    Fault {
+        /// What was replayed.
+        replayed: Replayed,
+        /// What happened.
+        fault: Fault,
+    },
     /// A recording is not of this game any more.
     #[error("{}: episode {episode} does not replay ({divergence}): record it again", path.display())]
     Diverged {
@@ -113,7 +119,11 @@ pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) 
     let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
     for episode in reader {
         let episode = Arc::new(episode?);
-        if let Some(divergence) = replayer.play(episode.clone(), |_, _| {})? {
+        let played = replayer.play(episode.clone(), |_, _| {}).map_err(|fault| {
+            let replayed = Replayed::new([(path.to_owned(), report.episodes as usize)]);
+            VerifyError::Fault { replayed, fault }
+        })?;
+        if let Some(divergence) = played {
             report.divergences.push((report.episodes, divergence.to_string()));
         }
         report.episodes += 1;

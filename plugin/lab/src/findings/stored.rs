@@ -3,10 +3,7 @@
 //! A file is a recording of one episode, in the format that all recordings have ([`bevy_playbot::demo::file`]): framed,
 //! checksummed, and shown by every program that shows recordings. The head of the finding is the recording's note.
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
+use std::{io, path::Path};
 
 use bevy_playbot::{
     action::ActionValue,
@@ -129,7 +126,7 @@ impl StoredFinding {
     ///
     /// The disk fails.
     pub fn write(&self, path: &Path) -> Result<(), FindingError> {
-        let fresh = beside(path);
+        let fresh = disk::temporary_name(path);
         let written = self.write_new(&fresh).and_then(|()| disk::rename(&fresh, path).map_err(io_error("write", path)));
         if written.is_err() {
             // The first error is the one to report.
@@ -156,13 +153,6 @@ fn head_of(path: &Path, header: &DemoHeader) -> Result<FindingHead, FindingError
         return Err(FindingError::NewerForm { path: path.into(), found: finding, newest: HEAD_FORMAT });
     }
     ron::from_str(note).map_err(none)
-}
-
-/// A temporary name in the same folder.
-fn beside(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".tmp{}", std::process::id()));
-    path.with_file_name(name)
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
-    io::Read,
+    path::Path,
     sync::{Arc, Mutex, PoisonError},
 };
 
@@ -13,6 +12,7 @@ use super::{
     find::find_level_files,
     text_error::LevelTextError,
 };
+use crate::text_file::{TextFileError, read_text_file};
 
 /// Most bytes of a level file: the largest levels there are, with some room between their letters.
 const MOST_BYTES: u64 = 32 << 20;
@@ -96,28 +96,12 @@ fn understand(path: &str, text: &str, parse: Parse) -> Result<DrawnLevel, LevelF
 }
 
 fn read_text(path: &str) -> Result<String, LevelFileError> {
-    let unreadable =
-        |error: std::io::Error| LevelFileError::Unreadable { path: path.to_owned(), why: error.to_string() };
-    // Opening a pipe waits for somebody who writes into it.
-    if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(LevelFileError::NotAFile { path: path.to_owned() });
-    }
-    let file = File::open(path).map_err(unreadable)?;
-    let bytes = file.metadata().map_err(unreadable)?.len();
-    if bytes > MOST_BYTES {
-        return Err(LevelFileError::TooLarge { path: path.to_owned(), bytes, most: MOST_BYTES });
-    }
-    let mut read = Vec::new();
-    // Some files do not know how long they are.
-    file.take(MOST_BYTES + 1).read_to_end(&mut read).map_err(unreadable)?;
-    if read.len() as u64 > MOST_BYTES {
-        return Err(LevelFileError::TooLarge { path: path.to_owned(), bytes: read.len() as u64, most: MOST_BYTES });
-    }
-    String::from_utf8(read).map_err(|error| {
-        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
-        let byte = 1 + before.iter().rev().take_while(|&&byte| byte != b'\n').count();
-        LevelFileError::NoText { path: path.to_owned(), line, byte }
+    let path = path.to_owned();
+    read_text_file(Path::new(&path), MOST_BYTES).map_err(|error| match error {
+        TextFileError::Unreadable(error) => LevelFileError::Unreadable { path, why: error.to_string() },
+        TextFileError::NotAFile => LevelFileError::NotAFile { path },
+        TextFileError::TooLarge { bytes, most } => LevelFileError::TooLarge { path, bytes, most },
+        TextFileError::NoText { line, byte } => LevelFileError::NoText { path, line, byte },
     })
 }
 

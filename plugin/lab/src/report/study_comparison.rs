@@ -41,10 +41,12 @@ impl StudyReport {
         )
     }
 
-    /// Interquartile means, and how probable it is that the first variant does better.
+    /// Interquartile means, and how probable it is that the first variant does better. Of a variant with a single seed nothing
+    /// follows for others, so that it has neither.
     pub(super) fn intervals(&self) -> String {
         let variants = self.variants();
-        let first = variants.first().map_or(Vec::new(), |first| self.level_returns(first));
+        let seeds = |variant: &str| Some(self.level_returns(variant)).filter(|returns| returns.len() > 1);
+        let first = variants.first().and_then(|first| seeds(first));
         let cell = |found: Option<Estimate>| {
             found.map_or(UNKNOWN.to_owned(), |Estimate { value, low, high }| {
                 format!("{} [{}, {}]", fixed(value, 2), fixed(low, 2), fixed(high, 2))
@@ -54,9 +56,10 @@ impl StudyReport {
             .iter()
             .enumerate()
             .filter_map(|(number, variant)| {
-                let returns = self.level_returns(variant);
+                let returns = seeds(variant)?;
                 let mean = interquartile_mean(&returns)?;
-                let improvement = (number > 0).then(|| probability_of_improvement(&first, &returns)).flatten();
+                let first = first.as_ref().filter(|_| number > 0);
+                let improvement = first.and_then(|first| probability_of_improvement(first, &returns));
                 Some(vec![(*variant).to_owned(), cell(Some(mean)), cell(improvement)])
             })
             .collect();
@@ -65,9 +68,10 @@ impl StudyReport {
         }
         let above = format!("{} above it", variants[0]);
         format!(
-            "The interquartile mean of the held-out returns over levels and seeds, and the probability that a run of **{}** has a \
-             higher return on a level than a run of the variant, where equal returns count half. In brackets are 95 % intervals by \
-             a bootstrap over seeds and levels.\n\n{}\n",
+            "The interquartile mean over the seeds: that of the middle half of the runs, each with its mean held-out return over \
+             all levels. And the probability that a run of **{}** has a higher return on a level than a run of the variant, where \
+             equal returns count half. In brackets are 95 % intervals by a bootstrap over seeds and levels; variants with a \
+             single seed have none.\n\n{}\n",
             variants[0],
             markdown_table(&["variant", "interquartile mean", &above], rows.into_iter())
         )

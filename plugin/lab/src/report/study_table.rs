@@ -228,11 +228,26 @@ mod tests {
         // The seeds differ by 3 and 1, the levels by nothing: a mean square of 2 · 2, over four cells.
         let difference = page.lines().find(|line| line.starts_with("| cloned ") && line.contains("2.00 ± 1.00"));
         assert!(difference.is_some_and(|line| line.contains("no difference that is clear")), "{page}");
-        // The middle half of 5, 7, 7 and 9; and each run of the first is above those of the other on both levels.
+        // The middle half of the seeds' 8 and 6; and each run of the first is above those of the other on both levels.
         let middle = page.lines().find(|line| line.starts_with("| full ") && line.contains(" 7.00 ["));
         assert!(middle.is_some(), "{page}");
         assert!(page.lines().any(|line| line.starts_with("| cloned ") && line.contains("1.00 [1.00, 1.00]")), "{page}");
         assert!(page.contains("- **cloned**: `algorithm=bc`") && page.contains("variants: []"), "{page}");
+    }
+
+    #[test]
+    fn a_single_seed_has_no_interval() {
+        let alone = |variants: &[&str]| {
+            let mut report = report();
+            report.results.retain(|run| run.seed == 1 || !variants.contains(&run.variant.as_str()));
+            report.to_markdown().expect("Unicode")
+        };
+        let page = alone(&["full", "cloned"]);
+        assert!(!page.contains("95 %") && !page.contains("interquartile"), "{page}");
+        assert!(page.contains("not to be told from one seed"), "{page}");
+        let page = alone(&["cloned"]);
+        assert!(page.lines().any(|line| line.starts_with("| full ") && line.contains(" 7.00 [")), "{page}");
+        assert!(!page.lines().any(|line| line.starts_with("| cloned ") && line.contains('[')), "{page}");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use super::error::RunsError;
 use crate::train::{
+    checkpoint,
     json_lines::JsonLines,
     metrics_log::{EPISODE_MEANS, EPISODES, MetricsLog, SPS, scalars},
     progress::RECENT,
@@ -20,7 +21,8 @@ pub struct RunCurves {
 
 impl RunCurves {
     /// Reads `metrics.jsonl` and `timing.jsonl` of the run in `folder`. Lines that a crash tore, or that are just being
-    /// written, are left out with a warning; files that do not exist are empty.
+    /// written, are left out with a warning; files that do not exist are empty, and of those that end before the last
+    /// checkpoint it is said.
     ///
     /// # Errors
     ///
@@ -28,8 +30,16 @@ impl RunCurves {
     pub fn read(folder: &Path) -> Result<Self, RunsError> {
         let log = MetricsLog::new(folder);
         let mut read = Self::default();
+        // Asked before: a training that goes on may save meanwhile.
+        let saved = checkpoint::list(folder).ok().and_then(|all| Some(all.last()?.summary.step)).unwrap_or(0);
         for file in [log.metrics_file(), log.timing_file()] {
             let lines = JsonLines::read(file).map_err(|source| RunsError::Io { path: file.into(), source })?;
+            let last = lines.lines.last().map_or(0, |line| line.step);
+            if last < saved && lines.damaged.is_empty() && file.exists() {
+                // It was cut off between two lines, and looks whole.
+                let words = format!("{}: nothing is left of the steps {last} to {saved}", file.display());
+                read.warnings.push(words);
+            }
             let damaged = |number| format!("{}: line {number} is damaged and left out", file.display());
             read.warnings.extend(lines.damaged.into_iter().map(damaged));
             for line in lines.lines {

@@ -5,43 +5,69 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::error::RunsError;
-use crate::train::replaced_run::is_leftover;
+use super::{error::RunsError, leftover::Leftover};
 
 /// Files and folders that only a run has. One of them is enough, so that a run that lost the others is found as well.
 const SIGNS: [&str; 3] = ["run.json", "metrics.jsonl", "checkpoints"];
 
-/// The folders of runs at `root`: itself, or all below it, sorted by path, whole or damaged. Runs are not searched for
-/// further runs, and links to folders are not followed.
+/// What lies at a place or below it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FoundRuns {
+    /// The folders of runs, sorted by path, whole or damaged.
+    pub runs: Vec<PathBuf>,
+    /// What is left of runs that were to be replaced, sorted by path. It is no run: the next training there ends it.
+    pub leftovers: Vec<Leftover>,
+}
+
+impl FoundRuns {
+    /// Looks at `root` and, if it is no run, at all folders below it. Runs are not searched for further runs, and links to
+    /// folders are not followed.
+    ///
+    /// # Errors
+    ///
+    /// [`RunsError::Missing`]; [`RunsError::NoRuns`] if there is nothing of a run; or [`RunsError::Io`] for a folder that
+    /// cannot be listed.
+    pub fn at(root: &Path) -> Result<Self, RunsError> {
+        if !root.is_dir() {
+            return Err(RunsError::Missing(root.into()));
+        }
+        let (mut found, mut folders) = (Self::default(), vec![root.to_owned()]);
+        while let Some(folder) = folders.pop() {
+            if SIGNS.iter().any(|sign| folder.join(sign).exists()) {
+                found.runs.push(folder);
+                continue;
+            }
+            for below in folders_in(&folder).map_err(|source| RunsError::Io { path: folder, source })? {
+                match Leftover::of(&below) {
+                    Some(leftover) => found.leftovers.push(leftover),
+                    None => folders.push(below),
+                }
+            }
+        }
+        if found == Self::default() {
+            return Err(RunsError::NoRuns(root.into()));
+        }
+        found.runs.sort();
+        found.leftovers.sort_by(|one, other| one.folder.cmp(&other.folder));
+        Ok(found)
+    }
+}
+
+/// The folders of runs at `root`: itself, or all below it, see [`FoundRuns::at`].
 ///
 /// # Errors
 ///
-/// [`RunsError::Missing`], [`RunsError::NoRuns`], or [`RunsError::Io`] for a folder that cannot be listed.
+/// As there, and [`RunsError::NoRuns`] if there are but parts of runs.
 pub fn find_runs(root: &Path) -> Result<Vec<PathBuf>, RunsError> {
-    if !root.is_dir() {
-        return Err(RunsError::Missing(root.into()));
-    }
-    let (mut found, mut folders) = (Vec::new(), vec![root.to_owned()]);
-    while let Some(folder) = folders.pop() {
-        if SIGNS.iter().any(|sign| folder.join(sign).exists()) {
-            found.push(folder);
-            continue;
-        }
-        folders.extend(folders_in(&folder).map_err(|source| RunsError::Io { path: folder, source })?);
-    }
-    if found.is_empty() {
-        return Err(RunsError::NoRuns(root.into()));
-    }
-    found.sort();
-    Ok(found)
+    let runs = FoundRuns::at(root)?.runs;
+    if runs.is_empty() { Err(RunsError::NoRuns(root.into())) } else { Ok(runs) }
 }
 
 fn folders_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut folders = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        // What a process that was killed left of a run is no run: the next training there ends it.
-        if entry.file_type()?.is_dir() && !is_leftover(&entry.path()) {
+        if entry.file_type()?.is_dir() {
             folders.push(entry.path());
         }
     }
@@ -67,5 +93,25 @@ mod tests {
         assert_eq!(find_runs(&root.join("a")).expect("itself"), [root.join("a")]);
         assert!(matches!(find_runs(&root.join("empty")), Err(RunsError::NoRuns(_))));
         assert!(matches!(find_runs(&root.join("missing")), Err(RunsError::Missing(_))));
+    }
+
+    #[test]
+    fn what_is_left_of_a_run_is_named_and_is_no_run() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let root = folder.path();
+        for path in ["b/seed-1", "b/seed-1.replaced-7", "a.replaced-31", "c.replaced-it"] {
+            fs::create_dir_all(root.join(path)).expect("created");
+            fs::write(root.join(path).join("run.json"), "").expect("written");
+        }
+        let found = FoundRuns::at(root).expect("found");
+        assert_eq!(found.runs, ["b/seed-1", "c.replaced-it"].map(|name| root.join(name)));
+        let folders: Vec<&Path> = found.leftovers.iter().map(|leftover| leftover.folder.as_path()).collect();
+        assert_eq!(folders, [root.join("a.replaced-31"), root.join("b/seed-1.replaced-7")]);
+        assert_eq!(find_runs(root).expect("found"), found.runs);
+        // What alone is there is named all the same.
+        fs::remove_dir_all(root.join("b")).expect("removed");
+        fs::remove_dir_all(root.join("c.replaced-it")).expect("removed");
+        assert!(FoundRuns::at(root).expect("found").runs.is_empty());
+        assert!(matches!(find_runs(root), Err(RunsError::NoRuns(_))));
     }
 }

@@ -75,7 +75,7 @@ pub enum RestoreError {
         /// Arenas of the experiment.
         wanted: usize,
     },
-    /// A generator state cannot be read.
+    /// A generator state cannot be read, or an action is none of the game's.
     #[error(transparent)]
     Stream(#[from] playbot_learner::LearnError),
 }
@@ -121,6 +121,12 @@ pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result
         return Err(RestoreError::Count { saved: saved.len(), wanted: agents.len() });
     }
     let world = collector.world_mut();
+    for (&agent, state) in agents.iter().zip(saved) {
+        if let Some(agent) = world.get::<Agent>(agent) {
+            // A game is promised actions of its own space, whatever a file says.
+            agent.actions.check(&state.actions)?;
+        }
+    }
     let queues: Vec<_> = agents.iter().map(|&agent| world.get::<LevelQueue>(agent).cloned()).collect();
     for (&agent, state) in agents.iter().zip(saved) {
         let control = if state.level.is_some() { Control::Replay } else { Control::Idle };

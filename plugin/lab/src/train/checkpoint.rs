@@ -158,6 +158,11 @@ pub(super) fn set_aside_after(run: &Path, step: u64) -> Result<(), RunError> {
     Ok(())
 }
 
+/// Removes the halves of checkpoints that a process left which was killed while it wrote or removed one.
+pub(super) fn remove_halves(run: &Path) -> Result<(), RunError> {
+    [UNFINISHED, REMOVED].iter().try_for_each(|half| remove_if_there(&folder(run).join(half)))
+}
+
 /// Moves a checkpoint, if there is one, where no one looks for it but a person.
 fn put_aside(path: &Path) -> Result<(), RunError> {
     if !path.exists() {

@@ -8,9 +8,10 @@ use std::{
 use thiserror::Error;
 
 use super::{config::ExperimentError, config_keys::Keys, ron_keys::word};
+use crate::brief::brief;
 use bevy_playbot::unknown_name::nearest;
 
-/// An experiment cannot be used.
+/// An experiment cannot be used. What the words quote of it is cut short where it is very long.
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
@@ -22,7 +23,7 @@ pub enum ConfigError {
         source: io::Error,
     },
     /// The text is not an experiment.
-    #[error("{}:{line}:{column}: {message}", path.display())]
+    #[error("{}:{line}:{column}: {}", path.display(), brief(message))]
     Syntax {
         /// The file.
         path: PathBuf,
@@ -34,7 +35,7 @@ pub enum ConfigError {
         message: String,
     },
     /// A text `key=value` does not fit.
-    #[error("`{set}`: {message}")]
+    #[error("`{}`: {}", brief(set), brief(message))]
     Set {
         /// The text.
         set: String,
@@ -42,7 +43,7 @@ pub enum ConfigError {
         message: String,
     },
     /// What `key=value` changes does not go with the rest, which was sound before.
-    #[error("{}", of_sets(sets, source))]
+    #[error("{}", brief(&of_sets(sets, source)))]
     Sets {
         /// The texts, those that are to blame if it can be told.
         sets: Vec<String>,
@@ -50,7 +51,7 @@ pub enum ConfigError {
         source: Box<ExperimentError>,
     },
     /// The values do not go together.
-    #[error("{}:{}:{}: {source}", path.display(), at.0, at.1)]
+    #[error("{}:{}:{}: {}", path.display(), at.0, at.1, brief(&source.to_string()))]
     Values {
         /// The file.
         path: PathBuf,

@@ -2,7 +2,8 @@
 //!
 //! `base: ["coinrun-ppo", "mine.ron"]` at the top of a file names what it is built on: presets by name, files by their
 //! path from the file's own folder. Each is laid over the ones before it, and the file's own keys over all of them, key by
-//! key; a list is one value. A base may have a base of its own.
+//! key; a list is one value. A base may have a base of its own. How many there may be is limited, and how long a file may be,
+//! so that nobody waits for a file that was made to take forever.
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +12,27 @@ use super::{
     config_keys::{Keys, Origin},
     presets::Preset,
 };
+use crate::text_file::read_text_file;
 
 pub use super::config_error::ConfigError;
 
 /// Files below one another, at most.
 const MAX_DEPTH: usize = 8;
+
+/// Files and presets that an experiment is built on, at most, each as often as it is named.
+const MAX_BASES: usize = 64;
+
+/// Bytes of a file, at most. The longest experiments have a few thousand.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// The files that are being read for one experiment.
+#[derive(Default)]
+struct Reading {
+    /// Those that are built on the one at hand, the outermost first.
+    users: Vec<PathBuf>,
+    /// Files and presets read so far, beside the experiment itself.
+    bases: usize,
+}
 
 /// Reads and checks an experiment.
 ///
@@ -23,7 +40,7 @@ const MAX_DEPTH: usize = 8;
 ///
 /// [`ConfigError`] with file, line and column.
 pub fn read_experiment(path: &Path) -> Result<Experiment, ConfigError> {
-    parse_experiment_with::<&str>(&read(path)?, path, &[])
+    parse_experiment_with::<&str>(&read_experiment_text(path)?, path, &[])
 }
 
 /// Reads an experiment, puts each `key=value` into it (see [`Experiment::with_set`]) and checks the result.
@@ -32,7 +49,7 @@ pub fn read_experiment(path: &Path) -> Result<Experiment, ConfigError> {
 ///
 /// [`ConfigError`] with file, line and column, or with the `key=value` that does not fit.
 pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Experiment, ConfigError> {
-    parse_experiment_with(&read(path)?, path, sets)
+    parse_experiment_with(&read_experiment_text(path)?, path, sets)
 }
 
 /// As [`read_experiment_with`], from a text; `path` as for [`parse_experiment`].
@@ -41,7 +58,7 @@ pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Ex
 ///
 /// [`ConfigError`].
 pub fn parse_experiment_with<S: AsRef<str>>(text: &str, path: &Path, sets: &[S]) -> Result<Experiment, ConfigError> {
-    let keys = gather(text, path, &mut Vec::new())?;
+    let keys = gather(text, path, &mut Reading::default())?;
     let own = keys.parse(&Origin::start_of(path))?;
     let experiment = own.with_set(sets)?;
     match experiment.check() {
@@ -66,7 +83,7 @@ pub fn locate<S: AsRef<str>>(text: &str, path: &Path, sets: &[S], source: Experi
         keys.iter().any(|key| name == *key || is_within(key, name) || is_within(name, key))
     };
     let sets = sets.iter().map(AsRef::as_ref).filter(sets_it).map(str::to_owned).collect();
-    placed(&gather(text, path, &mut Vec::new()).unwrap_or_default(), sets, source, path)
+    placed(&gather(text, path, &mut Reading::default()).unwrap_or_default(), sets, source, path)
 }
 
 /// An error of the sets to blame, or of the place in a file if there are none.
@@ -94,16 +111,21 @@ fn blame<S: AsRef<str>>(sets: &[S], fails: impl Fn(&[&str]) -> bool) -> Vec<Stri
 ///
 /// [`ConfigError::Syntax`], also for what it is built on; [`ConfigError::Read`] if that cannot be read.
 pub fn parse_experiment(text: &str, path: &Path) -> Result<Experiment, ConfigError> {
-    gather(text, path, &mut Vec::new())?.parse(&Origin::start_of(path))
+    gather(text, path, &mut Reading::default())?.parse(&Origin::start_of(path))
 }
 
-fn read(path: &Path) -> Result<String, ConfigError> {
-    std::fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.into(), source })
+/// The text of an experiment file, of at most 1 MiB.
+///
+/// # Errors
+///
+/// [`ConfigError::Read`] if there is no regular file, or a longer one, or it is no text.
+pub fn read_experiment_text(path: &Path) -> Result<String, ConfigError> {
+    read_text_file(path, MAX_BYTES).map_err(|error| ConfigError::Read { path: path.into(), source: error.into() })
 }
 
 /// The keys of a file over those of what it is built on. Each file is checked alone, so that a wrong value is found even
-/// if a later one hides it. `users` are the files that are built on this one.
-fn gather(text: &str, path: &Path, users: &mut Vec<PathBuf>) -> Result<Keys, ConfigError> {
+/// if a later one hides it.
+fn gather(text: &str, path: &Path, reading: &mut Reading) -> Result<Keys, ConfigError> {
     let start = Origin::start_of(path);
     let mut own = Keys::of_text(text, path)?;
     let base = own.take("base");
@@ -115,16 +137,17 @@ fn gather(text: &str, path: &Path, users: &mut Vec<PathBuf>) -> Result<Keys, Con
             let message = "`base` must be a list of presets and files, such as [\"coinrun-ppo\", \"mine.ron\"]";
             base.origin.error((1, 1), message.to_owned())
         })?;
-        users.push(path.into());
+        reading.users.push(path.into());
         for name in names {
-            keys = keys.overlaid(&gather_base(&name, users, &base.origin)?);
+            keys = keys.overlaid(&gather_base(&name, reading, &base.origin)?);
         }
-        users.pop();
+        reading.users.pop();
     }
     Ok(keys.overlaid(&own))
 }
 
-fn gather_base(name: &str, users: &mut Vec<PathBuf>, origin: &Origin) -> Result<Keys, ConfigError> {
+fn gather_base(name: &str, reading: &mut Reading, origin: &Origin) -> Result<Keys, ConfigError> {
+    let users = &reading.users;
     let user = users.last().cloned().unwrap_or_default();
     let path =
         if name.ends_with(".ron") { user.with_file_name(name) } else { format!("assets/presets/{name}.ron").into() };
@@ -141,16 +164,25 @@ fn gather_base(name: &str, users: &mut Vec<PathBuf>, origin: &Origin) -> Result<
     if users.len() > MAX_DEPTH {
         return Err(origin.error((1, 1), format!("`base` goes more than {MAX_DEPTH} files deep: {}", chain())));
     }
+    if reading.bases == MAX_BASES {
+        let first = users.first().cloned().unwrap_or_default();
+        let message =
+            format!("{} is built on more than {MAX_BASES} files and presets: `base` may name fewer", first.display());
+        return Err(origin.error((1, 1), message));
+    }
+    reading.bases += 1;
     if name.ends_with(".ron") {
-        let text = std::fs::read_to_string(&path).map_err(|error| {
+        let text = read_text_file(&path, MAX_BYTES).map_err(|error| {
             origin.error((1, 1), format!("`base` names {}, which cannot be read: {error}", path.display()))
         })?;
-        return gather(&text, &path, users);
+        return gather(&text, &path, reading);
     }
     let preset = Preset::find(name)
         .map_err(|error| origin.error((1, 1), format!("{error}; or a file, by its path ending in .ron")))?;
-    gather(preset.text, &path, users)
+    gather(preset.text, &path, reading)
 }
 
+#[cfg(test)]
+mod limits_tests;
 #[cfg(test)]
 mod tests;

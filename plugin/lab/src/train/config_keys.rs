@@ -2,65 +2,17 @@
 //! another: key by key, the later one wins. Types are looked at once, when the result is parsed; errors are then traced
 //! back to where the value was written.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    sync::LazyLock,
-};
+use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
 use ron::{Options, error::SpannedError, extensions::Extensions};
 use serde::de::IgnoredAny;
 
+pub(super) use super::config_origin::Origin;
 use super::{
     config::Experiment,
     config_error::{ConfigError, missing_key, syntax_message, type_message, unknown_key},
-    ron_keys::{fields, position},
+    ron_keys::{fields, line_feeds, position},
 };
-
-/// Where a value was written.
-#[derive(Clone, Debug)]
-pub(super) enum Origin {
-    /// In a file, at these lines and columns.
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Line and column of the key.
-        key: (usize, usize),
-        /// Line and column of the value.
-        value: (usize, usize),
-    },
-    /// In a text `key=value`.
-    Set(String),
-}
-
-impl Origin {
-    pub(super) fn start_of(path: &Path) -> Self {
-        Self::File { path: path.into(), key: (1, 1), value: (1, 1) }
-    }
-
-    /// An error at a line and column of the value, both from 1.
-    pub(super) fn error(&self, (line, column): (usize, usize), message: String) -> ConfigError {
-        match self {
-            Self::File { path, value, .. } => ConfigError::Syntax {
-                path: path.clone(),
-                line: value.0 + line - 1,
-                column: if line == 1 { value.1 + column - 1 } else { column },
-                message,
-            },
-            Self::Set(set) => ConfigError::Set { set: set.clone(), message },
-        }
-    }
-
-    /// An error of the key itself.
-    pub(super) fn key_error(&self, message: String) -> ConfigError {
-        match self {
-            Self::File { path, key, .. } => {
-                ConfigError::Syntax { path: path.clone(), line: key.0, column: key.1, message }
-            }
-            Self::Set(set) => ConfigError::Set { set: set.clone(), message },
-        }
-    }
-}
 
 /// A value as text.
 #[derive(Clone, Debug)]
@@ -73,11 +25,15 @@ pub(super) struct Value {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Keys(BTreeMap<String, Value>);
 
+/// More keys than any section has, or the experiment outside its sections. Those of a text with more are not looked at, which
+/// would take long.
+const MOST_KEYS: usize = 200;
+
 /// All keys there are, with an example of each value.
 static ALL: LazyLock<Keys> = LazyLock::new(|| {
     // With keys that are not written as long as they do nothing.
     let least = r#"(game: "-", train: "-:0..0", test: "-:1..1", demos: "-", steps: 1, skills: (
-        augment: [Translate(1)], weight_decay: 0.1, held_out: 0.1, patience: Some(1)))"#;
+        augment: [Translate(1)], weight_decay: 0.1, held_out: 0.1, patience: Some(1), state_weight: 1.0))"#;
     let example: Experiment = reader().from_str(least).expect("every required key is there");
     Keys::of_experiment(&example, &Origin::start_of(Path::new("example"))).expect("it was just read")
 });
@@ -163,6 +119,11 @@ impl Keys {
             let message = "an experiment is a list of keys in round brackets: (key: value, ...)";
             return Err(origin(at, at).key_error(message.to_owned()));
         };
+        if fields.len() > MOST_KEYS {
+            let message =
+                format!("{} keys in one place: no part of an experiment has as many as {MOST_KEYS}", fields.len());
+            return Err(origin(at, at).key_error(message));
+        }
         for (index, field) in fields.iter().enumerate() {
             let key = format!("{prefix}{}", field.key);
             let origin_here = origin(field.key_at, field.value_at);
@@ -249,6 +210,7 @@ impl Keys {
     /// One RON text. Every value begins on a line of its own, which is returned with its key.
     fn join(&self) -> (String, Vec<(usize, &str)>) {
         let (mut text, mut lines, mut open) = (String::from("("), Vec::new(), Vec::new());
+        let mut line = 1;
         for (path, value) in &self.0 {
             let mut sections: Vec<&str> = path.split('.').collect();
             let key = sections.pop().unwrap_or_default();
@@ -256,8 +218,9 @@ impl Keys {
             text.push_str(&"),".repeat(open.len() - shared));
             text.extend(sections[shared..].iter().map(|section| format!("{section}:(")));
             open = sections;
-            lines.push((text.matches('\n').count() + 2, path.as_str()));
+            lines.push((line + 1, path.as_str()));
             text.push_str(&format!("{key}:\n{}\n,", value.text));
+            line += 2 + line_feeds(&value.text);
         }
         text.push_str(&")".repeat(open.len() + 1));
         (text, lines)

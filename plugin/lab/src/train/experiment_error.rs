@@ -42,7 +42,7 @@ pub enum ExperimentError {
         example: &'static str,
     },
     /// What a training keeps is more than the machine has room for.
-    #[error("{what} need {:.1} GiB, and {:.1} GiB of memory are free: lower {keys}", gib(.needed), gib(.free))]
+    #[error("{what} need {}, and {} of memory are free: lower {keys}", amount(*needed), amount(*free))]
     Memory {
         /// What it is, with the factors.
         what: String,
@@ -90,8 +90,10 @@ impl ExperimentError {
     }
 }
 
-fn gib(bytes: &u64) -> f64 {
-    *bytes as f64 / f64::from(1 << 30)
+/// Bytes in the unit that makes a number of them that can be read.
+fn amount(bytes: u64) -> String {
+    let (unit, name) = if bytes < 1 << 30 { (1 << 20, "MiB") } else { (1 << 30, "GiB") };
+    format!("{:.1} {name}", bytes as f64 / f64::from(unit))
 }
 
 /// What a learner has against its settings; that they are settings goes without saying. It begins with the name of one,

@@ -1,6 +1,6 @@
 //! Whether an experiment fits its game: levels, actions and observations.
 
-use playbot_learner::ActionSpace;
+use playbot_learner::{ActionSpace, Augmentation};
 
 use super::{
     Algorithm,
@@ -70,6 +70,7 @@ impl Experiment {
     /// does.
     fn check_observation(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         let kind = self.observation_config().obs_kind(game);
+        self.check_painted_velocity()?;
         if self.algorithm.needs_skills() {
             self.skills.check_observation(kind).map_err(settings)?;
             if self.skills.state_weight > 0.0 && game.observation().len() == 0 {
@@ -81,6 +82,22 @@ impl Experiment {
             LearnerKind::Ppo if self.algorithm.is_trained() => self.ppo.check_observation(&kind).map_err(settings),
             _ => Ok(()),
         }
+    }
+
+    /// Painted velocity is no part of the scene: changed with it, it would tell another velocity.
+    fn check_painted_velocity(&self) -> Result<(), ExperimentError> {
+        let config = self.observation_config();
+        let Some([rows, columns]) = config.image.painted_corner().filter(|_| config.is_image()) else { return Ok(()) };
+        for (key, augment) in [("skills.augment", &self.skills.augment), ("ppo.augment", &self.ppo.augment)] {
+            let keeps = matches!(augment.last(), Some(Augmentation::Keep(r, c)) if *r >= rows && *c >= columns);
+            if !augment.is_empty() && !keeps {
+                let why = format!(
+                    "would change the velocity that `image.paint_velocity` paints: end the list with Keep({rows}, {columns})"
+                );
+                return refuse(key, format!("{augment:?}"), why);
+            }
+        }
+        Ok(())
     }
 
     /// Checks what goes with the game's actions.

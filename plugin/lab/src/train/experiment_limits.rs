@@ -5,6 +5,7 @@ use playbot_learner::EntropyCoef;
 use super::{
     config::Experiment,
     experiment_error::{ExperimentError, refuse},
+    free_threads::MOST_WORLDS,
 };
 
 /// Most steps of one rollout, over all arenas.
@@ -18,6 +19,12 @@ impl Experiment {
     ///
     /// [`ExperimentError::Value`] with the key.
     pub(super) fn check_limits(&self) -> Result<(), ExperimentError> {
+        if u64::from(self.worlds) > MOST_WORLDS {
+            let why = format!(
+                "must be at most {MOST_WORLDS}, since each World plays on a thread of its own; `arenas` can share Worlds"
+            );
+            return refuse("worlds", self.worlds, why);
+        }
         let rows = u64::from(self.arenas).checked_mul(self.rollout_steps() as u64);
         if rows.is_none_or(|rows| rows > MOST_ROWS) {
             let key = if self.algorithm.learner().key() == "ppo" { "ppo.num_steps" } else { "sac.num_steps" };
@@ -73,6 +80,7 @@ impl Experiment {
             ("skills.beta", skills.beta, WEIGHT),
             ("skills.latent_reg", skills.latent_reg, WEIGHT),
             ("skills.weight_decay", skills.weight_decay, RATE),
+            ("skills.state_weight", skills.state_weight, WEIGHT),
             ("score.kl_coef", self.score.kl_coef, WEIGHT),
             ("spirl.kl_coef", self.spirl.kl_coef, WEIGHT),
         ];
@@ -106,6 +114,8 @@ mod tests {
             ("ppo: (epochs: 18446744073709551615)", "ppo.epochs"),
             ("ppo: (num_steps: 18446744073709551615)", "ppo.num_steps"),
             ("ppo: (num_steps: 4611686018427387904, minibatches: 3)", "ppo.num_steps"),
+            ("arenas: 100000, worlds: 100000, ppo: (num_steps: 8)", "worlds"),
+            ("arenas: 100000, worlds: 100000, ppo: (num_steps: 1000000000)", "worlds"),
             ("ppo: (ent_coef: -1)", "ppo.ent_coef"),
             ("ppo: (adam_eps: 1e308)", "ppo.adam_eps"),
             ("ppo: (max_grad_norm: 1e308)", "ppo.max_grad_norm"),

@@ -1,31 +1,21 @@
 //! How much memory a training needs, so that nobody finds out when the machine stands still.
 //!
-//! What is added up is a lower bound: whatever is refused here could not have worked.
+//! What is added up is a lower bound: whatever is refused here could not have worked. Address space, which `ulimit -v` limits,
+//! must have room for what threads set aside as well: whether they get by with less is a matter of chance.
 
 use playbot_learner::{ActionSpace, ObsKind};
 
 use super::{
     config::{Experiment, ExperimentError, LearnerKind},
-    free_memory::free_memory,
+    experiment_error::refuse,
+    free_memory::{free_memory, space_left},
+    free_threads::ThreadLimit,
+    memory_parts::{Part, Room, check_parts, product, threads_part, worlds_part},
 };
-use crate::game::Game;
-use crate::sensors::GameSensors;
+use crate::{arrangement::Arrangement, game::Game, sensors::GameSensors};
 
 /// Bytes of a number that is learned: the number, its gradient and the two moments of Adam.
 const LEARNED: u64 = 16;
-
-/// Bytes that a World without agents takes at least, and those of an agent.
-const WORLD: u64 = 128 << 10;
-const ARENA: u64 = 1 << 10;
-
-/// Something that is kept.
-struct Part {
-    /// It, with the factors of its size.
-    what: String,
-    bytes: u64,
-    /// The keys to lower.
-    keys: String,
-}
 
 /// Sizes of what the game shows and takes.
 struct Sizes {
@@ -41,13 +31,14 @@ struct Sizes {
 
 impl Experiment {
     /// Checks that what a training keeps fits into the memory that is free: networks with their gradients and moments,
-    /// minibatches, rollouts, the replay buffer of SAC, and Worlds.
+    /// minibatches, rollouts, the replay buffer of SAC, and Worlds, each of which plays on a thread of its own.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Memory`] with the largest part and the keys to lower.
+    /// [`ExperimentError::Memory`] with the largest part and the keys to lower, [`ExperimentError::Value`] if there are more
+    /// Worlds than the system starts threads.
     pub fn check_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        self.check_memory_within(game, free_memory())
+        self.check_memory_within(game, &Room::now())
     }
 
     /// [`check_memory`](Self::check_memory) of what learning skills keeps.
@@ -56,24 +47,46 @@ impl Experiment {
     ///
     /// As there.
     pub fn check_skill_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        check_parts(&self.skill_parts(&self.sizes(game)), free_memory())
+        let mut parts = Vec::from(self.skill_parts(&self.sizes(game)));
+        check_parts(&parts, free_memory())?;
+        parts.push(threads_part(0));
+        check_parts(&parts, space_left())
     }
 
-    fn check_memory_within(&self, game: &dyn Game, free: u64) -> Result<(), ExperimentError> {
+    fn check_memory_within(&self, game: &dyn Game, room: &Room) -> Result<(), ExperimentError> {
         let sizes = self.sizes(game);
         // Skills are learned before, and their moments forgotten.
         if self.algorithm.needs_skills() {
-            check_parts(&self.skill_parts(&sizes), free)?;
+            check_parts(&self.skill_parts(&sizes), room.free())?;
         }
         if !self.algorithm.is_trained() {
             return Ok(());
         }
-        let mut parts = vec![self.worlds_part(), self.rollout_part(&sizes)];
+        let arrangement = Arrangement::new(game, self.arenas, self.worlds);
+        self.check_threads(arrangement, room.threads)?;
+        let mut parts = vec![worlds_part(arrangement), self.rollout_part(&sizes)];
         match self.algorithm.learner() {
             LearnerKind::Ppo => parts.extend(self.ppo_parts(&sizes)),
             LearnerKind::Sac => parts.extend(self.sac_parts(&sizes)),
         }
-        check_parts(&parts, free)
+        check_parts(&parts, room.free())?;
+        parts.push(threads_part(if arrangement.worlds == 1 { 0 } else { arrangement.worlds }));
+        check_parts(&parts, room.space)
+    }
+
+    /// Worlds play on a thread each, since they wait for one another.
+    fn check_threads(&self, arrangement: Arrangement, limit: ThreadLimit) -> Result<(), ExperimentError> {
+        let (worlds, ThreadLimit { most, whose }) = (arrangement.worlds, limit);
+        if worlds == 1 || u64::from(worlds) <= most {
+            return Ok(());
+        }
+        let why =
+            format!("{worlds} Worlds play on a thread each, and {whose} leaves room for {most} threads: lower it");
+        // Of a game that bears few arenas in a World, these decide how many Worlds there are.
+        match worlds == self.worlds {
+            true => refuse("worlds", worlds, why),
+            false => refuse("arenas", self.arenas, why),
+        }
     }
 
     fn sizes(&self, game: &dyn Game) -> Sizes {
@@ -86,15 +99,6 @@ impl Experiment {
         };
         let (observation, inputs) = if is_image { (numbers, 0) } else { (numbers.saturating_mul(4), numbers) };
         Sizes { is_image, observation, inputs, action, outputs }
-    }
-
-    fn worlds_part(&self) -> Part {
-        let (arenas, worlds) = (u64::from(self.arenas), u64::from(self.worlds));
-        Part {
-            what: format!("{worlds} Worlds with {arenas} arenas"),
-            bytes: product(&[worlds, WORLD]).saturating_add(product(&[arenas, ARENA])),
-            keys: "`worlds`, `arenas`".to_owned(),
-        }
     }
 
     fn rollout_part(&self, sizes: &Sizes) -> Part {
@@ -174,30 +178,13 @@ impl Experiment {
     }
 }
 
-/// Checks that bytes of `what` fit into the memory that is free.
+/// Checks that bytes of `what` fit into the memory that is free, beside the Worlds that it comes from.
 ///
 /// # Errors
 ///
 /// [`ExperimentError::Memory`] with the keys to lower.
-pub(crate) fn check_bytes(what: String, bytes: u64, keys: &str) -> Result<(), ExperimentError> {
-    check_parts(&[Part { what, bytes, keys: keys.to_owned() }], free_memory())
-}
-
-fn check_parts(parts: &[Part], free: u64) -> Result<(), ExperimentError> {
-    let needed = parts.iter().fold(0u64, |sum, part| sum.saturating_add(part.bytes));
-    match parts.iter().max_by_key(|part| part.bytes) {
-        Some(largest) if needed > free => {
-            let beside = if largest.bytes > free { "" } else { ", and what else is kept," };
-            let (what, keys) = (format!("{}{beside}", largest.what), largest.keys.clone());
-            Err(ExperimentError::Memory {
-                what,
-                needed: if beside.is_empty() { largest.bytes } else { needed },
-                free,
-                keys,
-            })
-        }
-        _ => Ok(()),
-    }
+pub(crate) fn check_bytes(what: String, bytes: u64, keys: &str, worlds: Arrangement) -> Result<(), ExperimentError> {
+    check_parts(&[Part { what, bytes, keys: keys.to_owned() }, worlds_part(worlds)], free_memory())
 }
 
 fn networks(numbers: u64, keys: &str) -> Part {
@@ -222,10 +209,6 @@ fn layers(inputs: u64, hidden: &[usize], outputs: u64) -> u64 {
 
 fn sum(widths: &[usize]) -> u64 {
     widths.iter().fold(0, |sum, width| sum.saturating_add(*width as u64))
-}
-
-fn product(factors: &[u64]) -> u64 {
-    factors.iter().fold(1, |product, factor| product.saturating_mul(*factor))
 }
 
 #[cfg(test)]

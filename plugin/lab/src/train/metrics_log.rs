@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use super::{
     json_lines::{JsonLines, append_json_line},
+    log_gaps::gaps,
     run_dir::{RunError, io_error, write_atomically},
     tensorboard::{Event, EventFolder, EventKind},
     update_report::UpdateReport,
@@ -93,14 +94,15 @@ impl MetricsLog {
         folder.append(&event(step, metrics, Some(timing))).map_err(io_error("write", &self.events))
     }
 
-    /// Drops what was logged after `step`, and whatever a crash tore.
+    /// Drops what was logged after `step`, and whatever a crash tore. Lines of the `updates` up to there that are damaged or
+    /// missing are warned of.
     ///
     /// # Errors
     ///
     /// [`RunError::Io`]; a file is as it was, or done.
-    pub fn rewind(&self, step: u64) -> Result<(), RunError> {
-        let metrics = keep_until(&self.metrics, step)?;
-        let timing: BTreeMap<u64, Value> = keep_until(&self.timing, step)?.into_iter().collect();
+    pub fn rewind(&self, step: u64, updates: u64) -> Result<(), RunError> {
+        let metrics = keep_until(&self.metrics, step, updates)?;
+        let timing: BTreeMap<u64, Value> = keep_until(&self.timing, step, updates)?.into_iter().collect();
         let events: Vec<Event> = metrics.iter().map(|(step, line)| event(*step, line, timing.get(step))).collect();
         let folder = EventFolder::new(self.events.clone());
         folder.rewrite(&events, wall_time()).map_err(io_error("write", &self.events))
@@ -142,27 +144,17 @@ fn event(step: u64, metrics: &Value, timing: Option<&Value>) -> Event {
     Event { wall_time: timing.and_then(|line| line["wall_time"].as_f64()).unwrap_or(0.0), step, kind }
 }
 
-/// Cuts a file behind `step`, and returns what is left.
-fn keep_until(path: &Path, step: u64) -> Result<Vec<(u64, Value)>, RunError> {
+/// Cuts a file behind `step`, and returns what is left. Whatever should be there and is not is said.
+fn keep_until(path: &Path, step: u64, updates: u64) -> Result<Vec<(u64, Value)>, RunError> {
     let mut read = JsonLines::read(path).map_err(io_error("read", path))?;
     read.lines.retain(|line| line.step <= step);
-    warn_of_damage(path, &read, step);
+    if let Some(words) = gaps(&read, step, updates) {
+        tracing::warn!("{}: {words}", path.display());
+    }
     let lines = read.lines;
     let text: String = lines.iter().flat_map(|line| [&line.text, "\n"]).collect();
     write_atomically(path, text.as_bytes())?;
     Ok(lines.into_iter().map(|line| (line.step, line.value)).collect())
-}
-
-/// Names the damaged lines, which are left out, but for one that a kill tore behind `step`: that is written anew.
-fn warn_of_damage(path: &Path, read: &JsonLines, step: u64) {
-    let is_whole_until = read.lines.last().map_or(0, |line| line.step) == step;
-    let harmless = usize::from(read.is_torn && is_whole_until);
-    let damaged = &read.damaged[..read.damaged.len().saturating_sub(harmless)];
-    if !damaged.is_empty() {
-        let numbers: Vec<String> = damaged.iter().map(usize::to_string).collect();
-        let (lines, are) = if damaged.len() == 1 { ("line", "is") } else { ("lines", "are") };
-        tracing::warn!("{}: {lines} {} {are} damaged and left out", path.display(), numbers.join(", "));
-    }
 }
 
 #[cfg(test)]
@@ -197,7 +189,7 @@ mod tests {
         for (file, whole) in [&log.metrics, &log.timing].into_iter().zip(&all) {
             fs::write(file, &whole[..whole.len() - 9]).expect("writable");
         }
-        log.rewind(16).expect("writable");
+        log.rewind(16, 2).expect("writable");
         assert!(content(&log) == before);
         write(&log, [24, 32]);
         assert!(content(&log) == all);
@@ -207,11 +199,11 @@ mod tests {
     fn event_files_are_made_anew_from_the_lines() {
         let folder = tempfile::tempdir().expect("a folder");
         let log = MetricsLog::new(folder.path());
-        log.rewind(0).expect("nothing is there yet");
+        log.rewind(0, 0).expect("nothing is there yet");
         write(&log, [8, 16]);
         let before = content(&log);
         fs::remove_dir_all(&log.events).expect("deleted");
-        log.rewind(16).expect("writable");
+        log.rewind(16, 2).expect("writable");
         assert!(content(&log) == before);
         let lines = JsonLines::read(&log.metrics).expect("readable").lines;
         let (tags, values): (Vec<_>, Vec<_>) = scalars(&lines[0].value).unzip();

@@ -101,16 +101,11 @@ pub fn end_replacement(run: &Path) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Whether a folder is what is left of a run that is being replaced.
-pub(crate) fn is_leftover(folder: &Path) -> bool {
-    replaced_name(folder).is_some()
-}
-
-/// The name of the run whose parts a folder holds.
-fn replaced_name(folder: &Path) -> Option<String> {
+/// The run whose parts a folder holds that is left of one which was replaced; `None` for any other folder.
+pub(crate) fn run_of_leftover(folder: &Path) -> Option<PathBuf> {
     let name = folder.file_name()?.to_string_lossy();
     let (run, process) = name.rsplit_once(MARK)?;
-    (!run.is_empty() && process.parse::<u32>().is_ok()).then(|| run.to_owned())
+    (!run.is_empty() && process.parse::<u32>().is_ok()).then(|| folder.with_file_name(run))
 }
 
 /// Whether parts of a run lie beside it.
@@ -120,8 +115,8 @@ pub(super) fn is_being_replaced(run: &Path) -> bool {
 
 /// The folders beside a run that hold parts of what it was.
 fn leftovers(run: &Path) -> Vec<PathBuf> {
-    let run_name = run.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let own = |folder: &PathBuf| replaced_name(folder).as_ref() == Some(&run_name);
+    let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let own = |folder: &PathBuf| run_of_leftover(folder).is_some_and(|of| name_of(&of) == name_of(run));
     let parent = run.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let names = names_in(parent).unwrap_or_default();
     names.into_iter().map(|name| run.with_file_name(name)).filter(own).collect()
@@ -150,7 +145,7 @@ pub fn is_unstarted(path: &Path) -> bool {
     let first = |name: &str| {
         name == LOCK_FILE
             || name == COST
-            || ["experiment.ron", "run.json.tmp"].iter().any(|known| name.starts_with(known))
+            || ["experiment.ron", "run.json.tmp", "cost.json.tmp"].iter().any(|known| name.starts_with(known))
     };
     names_in(path).is_ok_and(|names| names.iter().all(|name| name.to_str().is_some_and(first)))
 }
@@ -196,7 +191,7 @@ mod tests {
                 let run = run_with(root.path(), &FILES);
                 let aside = ReplacedRun::put_aside(&run).expect("movable");
                 let folder = aside.folder.clone().expect("there was something");
-                assert!(is_leftover(&folder) && !is_leftover(&run));
+                assert_eq!((run_of_leftover(&folder), run_of_leftover(&run)), (Some(run.clone()), None));
                 match is_begun {
                     // Killed while the old run was moved, or after the first file of the new one.
                     false => {
@@ -222,6 +217,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_folder_where_a_run_was_to_begin_is_free_whatever_a_kill_left_in_it() {
+        let root = tempfile::tempdir().expect("a folder");
+        let run =
+            run_with(root.path(), &["run.lock", "cost.json", "cost.json.tmp7", "experiment.ron.tmp7", "run.json.tmp7"]);
+        assert!(is_free(&run) && check_replaceable(&run).is_ok());
+        fs::write(run.join("notes.txt"), "mine").expect("writable");
+        assert!(!is_free(&run) && check_replaceable(&run).is_err());
     }
 
     #[test]

@@ -29,6 +29,7 @@ use super::{
     run_error::{FOLDER, unreadable},
     run_lock::RunLock,
     sealed_file::{check_text_seal, read_sealed, warn_of_no_seal, write_sealed},
+    tidy::tidy,
     train_error::TrainError,
     trainer::{self, Trainer},
     update_report::UpdateReport,
@@ -173,13 +174,14 @@ impl RunDir {
         Self::open_with(RunLock::take(path)?)
     }
 
-    /// [`open`](Self::open) in a folder that is locked, to go on with it.
+    /// [`open`](Self::open) in a folder that is locked, to go on with it. What killed processes left in it is removed.
     ///
     /// # Errors
     ///
     /// As for [`open`](Self::open).
     pub fn open_with(lock: RunLock) -> Result<OpenedRun, RunError> {
         let OpenedRun { run, experiment, info } = Self::open(lock.folder())?;
+        tidy(&lock);
         Ok(OpenedRun { run: Self { _lock: Some(lock), ..run }, experiment, info })
     }
 
@@ -262,7 +264,7 @@ impl RunDir {
         }
         trainer.progress = state.progress;
         checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;
-        self.metrics_log().rewind(trainer.progress.steps)?;
+        self.metrics_log().rewind(trainer.progress.steps, trainer.progress.updates)?;
         Ok(trainer)
     }
 

@@ -64,6 +64,17 @@ pub enum TrainError {
     /// The file of the skill model says of its pictures what this version does not know.
     #[error(transparent)]
     UnknownObservation(#[from] UnknownObservation),
+    /// The system does not start a thread for each World.
+    #[error(
+        "{worlds} Worlds play on a thread each, and the system does not start so many: {source}; lower `worlds`, or raise what \
+         limits threads or address space (`ulimit -u`, `ulimit -v`, or that of the container)"
+    )]
+    Threads {
+        /// How many there are.
+        worlds: usize,
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// The game broke its contract.
     #[error(transparent)]
     Fault(#[from] Fault),

@@ -19,7 +19,12 @@ use super::{
     train_error::TrainError,
     update_report::{Timing, UpdateReport},
 };
-use crate::{arrangement::Arrangement, game::Game, parallel::on_threads, sensors::GameSensors};
+use crate::{
+    arrangement::Arrangement,
+    game::Game,
+    parallel::{on_own_threads, on_threads},
+    sensors::GameSensors,
+};
 use bevy_playbot::panics::PanicReports;
 
 /// Rows on which the first policy is compared with the decoder.
@@ -138,7 +143,7 @@ impl Trainer {
         let columns = obs.columns(&self.obs_kind, steps, &shares);
         let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
         let collected = if work.len() > self.threads || !policy.is_on_host() {
-            collect_together(work, self.threads, policy, latent, steps)
+            collect_together(work, self.threads, policy, latent, steps)?
         } else {
             // With a core of its own a World gains nothing from waiting for others.
             on_threads(&mut work, self.threads, |(collector, columns)| {
@@ -231,14 +236,18 @@ fn collect_together(
     policy: &Policy,
     latent: usize,
     steps: usize,
-) -> Vec<Collected> {
-    let seats = SharedBatch::seats(policy, worlds.len(), threads);
+) -> Result<Vec<Collected>, TrainError> {
+    let count = worlds.len();
+    let seats = SharedBatch::seats(policy, count, threads);
     let mut work: Vec<_> = worlds.into_iter().zip(seats).collect();
     // Most of them wait, for the others or for their turn.
-    let waiting_threads = work.len();
-    on_threads(&mut work, waiting_threads, |((collector, columns), seat)| {
-        collector.collect_at(seat, columns, policy, latent, steps)
-    })
+    let collected = on_own_threads(
+        &mut work,
+        |((collector, columns), seat)| collector.collect_at(seat, columns, policy, latent, steps),
+        // Whoever has sat down and leaves is not waited for.
+        |(_, seat)| drop(seat.play()),
+    );
+    collected.map_err(|source| TrainError::Threads { worlds: count, source })
 }
 
 /// Whether the experiment can be run on this game.

@@ -74,7 +74,7 @@ impl Comparison {
     /// [`TestError::Incomparable`] for those of another game or version, or without a level or a tester in common; or they
     /// cannot be read.
     pub fn read(before: &Path, now: &Path) -> Result<Self, TestError> {
-        let mut lines = ResultLines::open(now)?;
+        let mut lines = ResultLines::open_whole(now)?;
         let Comparable { mut earlier, common, other_detectors, left_out } = comparable(before, lines.record())?;
         let mut known = BTreeMap::new();
         while let Some(level) = earlier.next_level()? {
@@ -177,7 +177,8 @@ impl Comparison {
         let alarms = benjamini_hochberg(&probabilities, FALSE_DISCOVERY_RATE);
         for (Doubtful { change, .. }, _) in doubtful.into_iter().zip(alarms).filter(|(_, is_alarm)| *is_alarm) {
             let Change { before, now, .. } = &change;
-            let (was, is) = (before.successes * now.trials, now.successes * before.trials);
+            let times = |one: u64, other: u64| u128::from(one) * u128::from(other);
+            let (was, is) = (times(before.successes, now.trials), times(now.successes, before.trials));
             match is.cmp(&was) {
                 std::cmp::Ordering::Greater => self.easier.push(change),
                 std::cmp::Ordering::Less => self.harder.push(change),
@@ -213,8 +214,8 @@ impl Known {
 }
 
 fn add(sum: &mut Trials, more: Trials) {
-    sum.successes += more.successes;
-    sum.trials += more.trials;
+    sum.successes = sum.successes.saturating_add(more.successes);
+    sum.trials = sum.trials.saturating_add(more.trials);
 }
 
 /// Earlier results, and what they have in common with others.
@@ -227,7 +228,7 @@ struct Comparable {
 }
 
 fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestError> {
-    let earlier = ResultLines::open(before)?;
+    let earlier = ResultLines::open_whole(before)?;
     let mut differences = earlier.record().differences_of_game(record);
     if differences.is_empty() && !may_have_common_levels(earlier.record(), record) {
         differences.push(no_common_level(earlier.record(), record));

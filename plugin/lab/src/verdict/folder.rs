@@ -20,7 +20,10 @@ use super::{
     plan::TestRecord,
     results::{RESULTS, ResultWriter},
 };
-use crate::findings::clear_findings;
+use crate::{
+    findings::{FINDINGS, clear_findings},
+    train::tidy::remove_temporaries,
+};
 
 /// Name of the file that says what is tested.
 const RECORD: &str = "test.json";
@@ -66,6 +69,8 @@ impl TestFolder {
             _ => {}
         }
         let (mut journal, cut) = Journal::open(path)?;
+        remove_temporaries(path);
+        remove_temporaries(&path.join(FINDINGS));
         let goes_on = is_known && earlier == Earlier::Resume;
         if !goes_on {
             // Without what was tested, old levels mean nothing.

@@ -24,7 +24,8 @@ use crate::findings::gather_findings;
 pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
     let mut shards = Vec::new();
     for folder in folders {
-        let lines = ResultLines::open(folder)?;
+        // What their heads say is compared before their levels are read.
+        let lines = ResultLines::open_whole(folder)?;
         let shard = lines.record().shard.ok_or_else(|| TestError::NotAShard(folder.clone()))?;
         shards.push((folder, shard, lines));
     }
@@ -69,16 +70,17 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
     // The writer knows errors of the system alone.
     let mut damaged = None;
     let written = write_atomically_with(&path, |file| {
+        let mut set_aside = |error: TestError| {
+            damaged = Some(error);
+            io::Error::other("a shard is damaged")
+        };
         let mut results = ResultWriter::begin(file, record)?;
         for index in 0..record.range.len() {
-            match shards[(index % count) as usize].line_of(index) {
-                Ok(line) => results.push(&line)?,
-                Err(error) => {
-                    damaged = Some(error);
-                    return Err(io::Error::other("a shard is damaged"));
-                }
-            }
+            let line = shards[(index % count) as usize].line_of(index).map_err(&mut set_aside)?;
+            results.push(&line)?;
         }
+        // What gets a checksum of its own now has to be what theirs are of.
+        shards.iter_mut().try_for_each(ResultLines::expect_end).map_err(&mut set_aside)?;
         results.end()
     });
     let written = match (written, damaged) {
@@ -176,12 +178,66 @@ mod tests {
         ] {
             assert!(parts.iter().all(|part| words.contains(part)), "{words}");
         }
-        let path = one.join(RESULTS);
-        let cut = String::from_utf8(results(&one)).expect("text").replace("\"index\":4", "\"index\":5");
-        fs::write(path, cut).expect("writable");
+        // Older versions wrote no checksum.
+        let text = String::from_utf8(results(&one)).expect("text").replace("\"index\":4", "\"index\":5");
+        let (levels, _) = text.rsplit_once("],").expect("an end");
+        fs::write(one.join(RESULTS), format!("{levels}]}}\n")).expect("writable");
         let two = folder("two", &record(Some("2/3")));
         let words = said(&[&zero, &one, &two]);
         assert!(words.contains("results.json, line 3: this is not the level with index 4"), "{words}");
         assert!(!parent.path().join("out").exists(), "nothing is half there");
+    }
+
+    /// Two shards of two levels, and the results of the second one.
+    fn two_shards(parent: &Path) -> (Vec<PathBuf>, Vec<u8>) {
+        let shard = |name: &str, shard: &str| {
+            let range = "hard:0..1".parse().expect("a split");
+            tested(parent, name, &TestRecord { range, ..record(Some(shard)) })
+        };
+        let folders = vec![shard("zero", "0/2"), shard("one", "1/2")];
+        let whole = results(&folders[1]);
+        (folders, whole)
+    }
+
+    #[test]
+    fn no_flipped_bit_gets_a_new_checksum() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let (folders, whole) = two_shards(parent.path());
+        let (damaged, out) = (folders[1].join(RESULTS), parent.path().join("out"));
+        for at in 0..whole.len() * 8 {
+            let mut bytes = whole.clone();
+            bytes[at / 8] ^= 1 << (at % 8);
+            fs::write(&damaged, bytes).expect("writable");
+            let error = merge(&folders, &out).expect_err("damaged").to_string();
+            assert!(error.contains("one") && !out.exists(), "bit {at}: {error}");
+        }
+        fs::write(&damaged, &whole).expect("writable");
+        merge(&folders, &out).expect("sound again");
+    }
+
+    #[test]
+    fn no_part_of_a_shard_is_taken_for_whole() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let (folders, whole) = two_shards(parent.path());
+        // Without the last line feed nothing is missing.
+        for length in 0..whole.len() - 1 {
+            fs::write(folders[1].join(RESULTS), &whole[..length]).expect("writable");
+            let error = merge(&folders, &parent.path().join("out")).expect_err("cut off").to_string();
+            assert!(error.contains(RESULTS) && !parent.path().join("out").exists(), "{length}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_shard_with_more_levels_than_it_says_is_refused() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let (folders, _) = two_shards(parent.path());
+        let record = TestRecord { range: "hard:0..1".parse().expect("a split"), ..record(Some("1/2")) };
+        let (mut folder, _) = TestFolder::open(&folders[1], &record, Earlier::Replace).expect("there");
+        [1, 3].iter().for_each(|index| folder.keep(&verdict(*index, 1, 1)).expect("writable"));
+        folder.finish().expect("writable");
+        drop(folder);
+        let error = merge(&folders, &parent.path().join("out")).expect_err("too many").to_string();
+        assert!(error.contains("results.json, line 3: there are more levels than were tested"), "{error}");
+        assert!(!parent.path().join("out").exists());
     }
 }

@@ -90,8 +90,9 @@ impl Overview {
         for (total, tester) in self.testers.iter_mut().zip(&level.testers) {
             total.levels.trials += 1;
             total.levels.successes += u64::from(tester.score.solved > 0);
-            total.episodes.trials += tester.score.episodes;
-            total.episodes.successes += tester.score.solved;
+            let Trials { successes, trials } = &mut total.episodes;
+            *trials = trials.saturating_add(tester.score.episodes);
+            *successes = successes.saturating_add(tester.score.solved);
             total.places.add(tester.places);
         }
         if !level.is_perfect() {

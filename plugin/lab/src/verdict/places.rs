@@ -26,8 +26,8 @@ impl Places {
     /// Adds those of another level.
     pub(super) fn add(&mut self, other: Option<Self>) {
         let other = other.unwrap_or_default();
-        self.visited += other.visited;
-        self.open += other.open;
+        self.visited = self.visited.saturating_add(other.visited);
+        self.open = self.open.saturating_add(other.open);
     }
 }
 

@@ -120,6 +120,17 @@ impl ResultLines {
         Ok(Self { path, record, lines, number: 1, is_over: false, hasher })
     }
 
+    /// [`open`](Self::open), after the whole file was read once: what was tested is what was written.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open`](Self::open); and the file ends before its end, or its checksum is another one.
+    pub fn open_whole(folder: &Path) -> Result<Self, TestError> {
+        let mut lines = Self::open(folder)?;
+        while lines.next_line()?.is_some() {}
+        Self::open(folder)
+    }
+
     /// What was tested.
     pub fn record(&self) -> &TestRecord {
         &self.record
@@ -141,6 +152,10 @@ impl ResultLines {
             Some(line) if line.starts_with(']') => {
                 if line != END && line != end(&self.hasher) {
                     return Err(self.damaged(&BrokenSeal.to_string()));
+                }
+                if self.lines.next().is_some() {
+                    self.number += 1;
+                    return Err(self.damaged("the file goes on behind its end"));
                 }
                 self.is_over = true;
                 Ok(None)
@@ -177,6 +192,19 @@ impl ResultLines {
         }
     }
 
+    /// Reads the end, behind which nothing may follow: only there is known whether the levels before it are those that were
+    /// written.
+    ///
+    /// # Errors
+    ///
+    /// Another level follows, or the checksum is that of other levels.
+    pub(super) fn expect_end(&mut self) -> Result<(), TestError> {
+        match self.next_line()? {
+            None => Ok(()),
+            Some(_) => Err(self.damaged("there are more levels than were tested")),
+        }
+    }
+
     fn damaged(&self, message: &str) -> TestError {
         TestError::Damaged { path: self.path.clone(), line: self.number, message: message.to_owned() }
     }
@@ -188,86 +216,4 @@ fn hash_line(hasher: &mut Hasher, line: &str) {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use super::*;
-    use crate::verdict::{MapScope, TesterRecord};
-
-    fn record() -> TestRecord {
-        TestRecord {
-            game: "garden".to_owned(),
-            game_version: 3,
-            range: "bed:2..3".parse().expect("a split"),
-            files: None,
-            seed: 5,
-            testers: vec![TesterRecord::bot("random")],
-            episodes: 2,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: Some("0/2".parse().expect("a shard")),
-        }
-    }
-
-    fn written(lines: &[&str]) -> String {
-        let mut bytes = Vec::new();
-        let mut writer = ResultWriter::begin(&mut bytes, &record()).expect("writable");
-        lines.iter().for_each(|line| writer.push(line).expect("writable"));
-        writer.end().expect("writable");
-        String::from_utf8(bytes).expect("text")
-    }
-
-    #[test]
-    fn the_file_is_one_object_and_reads_back_line_by_line() {
-        let text = written(&[r#"{"index":0,"a":1}"#, r#"{"index":1}"#]);
-        let value: Value = serde_json::from_str(&text).expect("JSON");
-        assert_eq!((value["game"].as_str(), value["range"].as_str()), (Some("garden"), Some("bed:2..3")));
-        assert_eq!(value["levels"].as_array().map(Vec::len), Some(2));
-        serde_json::from_str::<Value>(&written(&[])).expect("without levels too");
-
-        let folder = tempfile::tempdir().expect("a folder");
-        fs::write(folder.path().join(RESULTS), &text).expect("writable");
-        let mut lines = ResultLines::open(folder.path()).expect("whole");
-        assert_eq!(*lines.record(), record());
-        assert_eq!(lines.line_of(0).expect("the first"), r#"{"index":0,"a":1}"#);
-        assert!(lines.line_of(2).is_err(), "the next one has index 1");
-        assert_eq!(lines.next_line().expect("the end"), None);
-        assert_eq!(lines.next_line().expect("still the end"), None);
-    }
-
-    #[test]
-    fn what_is_no_result_is_named_with_its_line() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let open = || ResultLines::open(folder.path());
-        assert!(matches!(open(), Err(TestError::NoResults(path)) if path == folder.path()));
-        let text = written(&[r#"{"index":0}"#]);
-        let head = text.lines().next().expect("a head");
-        let cut = format!("{head}\n{{\"index\":0}}");
-        for (text, line) in [("{}", 1), ("{\"a\":1,\"levels\":[", 1), (head, 2), (cut.as_str(), 3)] {
-            fs::write(folder.path().join(RESULTS), text).expect("writable");
-            let all = open().and_then(|mut lines| {
-                while lines.next_line()?.is_some() {}
-                Ok(())
-            });
-            let found = all.expect_err(text).to_string();
-            assert!(found.contains(&format!("{RESULTS}, line {line}: ")), "{found}");
-        }
-        fs::write(folder.path().join(RESULTS), written(&[r#"{"index":0}"#, r#"{"index":1,]"#])).expect("writable");
-        let mut lines = open().expect("a head");
-        lines.next_line().expect("a level");
-        let found = lines.next_level().expect_err("no level").to_string();
-        assert!(found.contains(&format!("{RESULTS}, line 3: ")) && found.contains("(column 1"), "{found}");
-        assert!(!found.contains("at line"), "one line is enough: {found}");
-    }
-
-    #[test]
-    fn the_file_stands_for_its_folder() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join(RESULTS);
-        assert_eq!(results_folder(&file), file, "there is none");
-        fs::write(&file, "").expect("writable");
-        assert_eq!(results_folder(&file), folder.path());
-        assert_eq!(results_folder(folder.path()), folder.path());
-    }
-}
+mod tests;

@@ -76,17 +76,19 @@ fn blocks(
     let mut runs: Vec<(u64, u64, u64, usize)> = Vec::new();
     for (&(row, column), &look) in squares {
         match runs.last_mut() {
-            Some((last, _, end, same)) if *last == row && *end == column && *same == look => *end = column + 1,
-            _ => runs.push((row, column, column + 1, look)),
+            Some((last, _, end, same)) if *last == row && *end == column && *same == look => {
+                *end = column.saturating_add(1);
+            }
+            _ => runs.push((row, column, column.saturating_add(1), look)),
         }
     }
     let mut blocks = vec![Vec::new(); looks];
     let corner = |column: u64, row: u64| {
-        let place = Vec2::new((column * step) as f32, (row * step) as f32);
+        let place = Vec2::new(column.saturating_mul(step) as f32, row.saturating_mul(step) as f32);
         Vec2::new(maps.x, maps.y) + place * maps.side
     };
     for (row, begin, end, look) in runs {
-        let block = grid.block(Rect::from_corners(corner(begin, row), corner(end, row + 1)));
+        let block = grid.block(Rect::from_corners(corner(begin, row), corner(end, row.saturating_add(1))));
         if let Some(known) = blocks.get_mut(look) {
             known.extend(block);
         }

@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use super::{DiskFile, remove_file, rename};
+use super::{DiskFile, remove_file, rename, temporary_name};
 
 /// Puts `bytes` at `path` so that a reader sees the old contents or the new, never a part: under a temporary name first,
 /// flushed to the disk, then renamed.
@@ -22,9 +22,7 @@ pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<DiskFile>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".tmp{}", std::process::id()));
-    let temporary = path.with_file_name(name);
+    let temporary = temporary_name(path);
     let written = DiskFile::create(&temporary).and_then(|file| {
         let mut file = BufWriter::new(file);
         write(&mut file)?;

@@ -71,6 +71,16 @@ impl DiskFile {
         Ok(())
     }
 
+    /// Gives the file another name; a file that has it is replaced. See [`rename`](super::rename).
+    ///
+    /// # Errors
+    /// What the system says; the file has its old name then.
+    pub fn rename_to(&mut self, path: &Path) -> io::Result<()> {
+        super::rename(&self.path, path)?;
+        self.path = path.into();
+        Ok(())
+    }
+
     /// Waits until the contents are on the disk.
     ///
     /// # Errors

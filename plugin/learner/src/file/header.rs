@@ -22,6 +22,23 @@ struct Identity<'a> {
     version: u32,
 }
 
+/// A description that is no JSON.
+const NO_JSON: &str = "the description in its header is damaged, or something else has written it: take the file from a copy, \
+                       or make it again";
+
+/// Most characters of an error that quotes the file.
+const QUOTED: usize = 200;
+
+/// A description that lacks something, or has what this version does not know.
+fn misfit(error: &str) -> String {
+    let more = if error.chars().nth(QUOTED).is_some() { "…" } else { "" };
+    let error: String = error.chars().take(QUOTED).collect();
+    format!(
+        "the description in its header is not what this version of playbot writes ({error}{more}): make the file again \
+         with it"
+    )
+}
+
 impl TensorFile {
     /// An empty file for `path`, whose header holds the entries `kind` and `version`, then those of `header`.
     pub(crate) fn new(path: &Path, kind: FileKind, header: &impl Serialize) -> Result<Self, FileError> {
@@ -38,8 +55,10 @@ impl TensorFile {
     /// The header without `kind` and `version`, if the file calls itself of this kind. That is looked at first, so that
     /// what a newer version added is not taken for a fault.
     pub(crate) fn header<T: DeserializeOwned>(&self, kind: FileKind) -> Result<T, FileError> {
-        let parse = |e: serde_json::Error| self.format(format!("the description in its header cannot be used: {e}"));
-        let mut header: serde_json::Map<String, Value> = serde_json::from_str(&self.description).map_err(parse)?;
+        // Where in the description it stops being JSON helps nobody: no person has written it.
+        let mut header: serde_json::Map<String, Value> =
+            serde_json::from_str(&self.description).map_err(|_| self.format(NO_JSON.to_owned()))?;
+        let parse = |error: serde_json::Error| self.format(misfit(&error.to_string()));
         // It was looked at when the file was read.
         header.remove(SEAL);
         let identity =
@@ -51,7 +70,8 @@ impl TensorFile {
     fn check_kind(&self, kind: FileKind, found: &Identity<'_>) -> Result<(), FileError> {
         let FileKind { name, version } = kind;
         if found.kind != name {
-            return Err(self.format(format!("is of the kind `{}`, expected `{name}`", found.kind)));
+            let kind: String = found.kind.chars().take(QUOTED).collect();
+            return Err(self.format(format!("is of the kind `{kind}`, expected `{name}`")));
         }
         match found.version.cmp(&version) {
             Ordering::Equal => Ok(()),
@@ -64,6 +84,40 @@ impl TensorFile {
                  with this one",
                 found.version
             ))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Kept {
+        #[serde(rename = "a")]
+        _a: u32,
+    }
+
+    #[test]
+    fn a_description_that_cannot_be_used_is_said_in_few_plain_words() {
+        let said = |description: &str| {
+            let file = TensorFile::empty(Path::new("skills"), description.to_owned());
+            let header = file.header::<Kept>(FileKind { name: "thing", version: 1 });
+            header.map(drop).expect_err("unusable").to_string()
+        };
+        let damaged = said(r#"{kind:"thing","version":1,"a":1}"#);
+        assert_eq!(damaged, format!("skills: {NO_JSON}"));
+        let lacking = said(r#"{"kind":"thing","version":1}"#);
+        assert!(lacking.contains("(missing field `a`): make the file again with it"), "{lacking}");
+        let long = "k".repeat(10_000_000);
+        for description in [
+            format!(r#"{{"kind":"thing","version":1,"a":1,"{long}":2}}"#),
+            format!(r#"{{"kind":"{long}","version":1}}"#),
+            format!(r#"{{"{long}":2"#),
+        ] {
+            let words = said(&description);
+            assert!(words.len() < 1024 && words.starts_with("skills: "), "{} bytes", words.len());
         }
     }
 }

@@ -23,9 +23,6 @@ const NO_SUM: &[u8; 8] = b"00000000";
 /// Bytes that say how long the header is.
 const LENGTH: usize = 8;
 
-/// What to do with a file that something else has written.
-const FOREIGN: &str = "it is another file; name one that playbot has written";
-
 /// A tensor in host memory.
 #[derive(Clone, Debug)]
 struct StoredTensor {
@@ -115,7 +112,7 @@ impl TensorFile {
     /// those that older versions wrote have none.
     pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
         let is_whole = is_whole(bytes);
-        let format = |detail: String| FileError::Format { path: path.to_owned(), detail };
+        let other = |detail: String| FileError::Foreign { path: path.to_owned(), detail };
         let foreign = |error: SafeTensorError| match error {
             SafeTensorError::HeaderTooSmall
             | SafeTensorError::InvalidHeaderLength
@@ -124,9 +121,9 @@ impl TensorFile {
             SafeTensorError::HeaderTooLarge
             | SafeTensorError::InvalidHeader(_)
             | SafeTensorError::InvalidHeaderDeserialization(_) => {
-                format(format!("not safetensors, the form of policies and skill models: {FOREIGN}"))
+                other("not safetensors, the form of policies and skill models".to_owned())
             }
-            error => format(format!("not safetensors ({error}): {FOREIGN}")),
+            error => other(format!("not safetensors ({error})")),
         };
         let damaged = || FileError::Damaged { path: path.to_owned(), advice: "" };
         let metadata = match SafeTensors::read_metadata(bytes).map_err(foreign) {
@@ -138,7 +135,7 @@ impl TensorFile {
             .metadata()
             .as_ref()
             .and_then(|map| map.get(DESCRIPTION).cloned())
-            .ok_or_else(|| format(format!("the header has no `{DESCRIPTION}` entry: {FOREIGN}")))?;
+            .ok_or_else(|| other(format!("the header has no `{DESCRIPTION}` entry")))?;
         if is_whole.is_none() {
             if description.starts_with(r#"{"crc32"#) {
                 return Err(damaged());

@@ -62,6 +62,19 @@ impl RewardNormalizer {
         self.each_step(rewards, done, envs, |_, _| {})
     }
 
+    /// [`Self::update`] with episodes of others, such as recordings: the returns of those that are played go on as they were, and
+    /// there may be another number of environments.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] if the lengths differ or are no multiple of `envs`; [`LearnError::Config`] if that is 0. Nothing is
+    /// taken in then.
+    pub fn update_apart(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<(), LearnError> {
+        let mut others = Self { returns: Vec::new(), ..self.clone() };
+        others.update(rewards, done, envs)?;
+        self.stats = others.stats;
+        Ok(())
+    }
+
     /// A reward by the present variance: clip(r/√(var + 1e-8), ±10).
     pub fn scale(&self, reward: f32) -> f32 {
         let scale = 1.0 / (self.stats.var[0] + EPS).sqrt();
@@ -105,6 +118,18 @@ impl RewardNormalizer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn episodes_of_others_change_the_variance_and_no_return() {
+        let mut normalizer = RewardNormalizer::new(0.5);
+        normalizer.update(&[1.0, 2.0], &[false; 2], 2).expect("two environments");
+        let (returns, mut both) = (normalizer.returns.clone(), normalizer.clone());
+        normalizer.update_apart(&[4.0, 0.0], &[false, true], 1).expect("one other");
+        // Returns of 4 and 2, which begin with nothing.
+        [4.0, 2.0].iter().for_each(|g| both.stats.update(std::iter::once(*g), 1));
+        assert_eq!((&normalizer.returns, &normalizer.stats), (&returns, &both.stats));
+        assert!(normalizer.update_apart(&[1.0], &[], 1).is_err() && normalizer.stats == both.stats);
+    }
 
     #[test]
     fn what_does_not_fit_is_refused_and_leaves_nothing_behind() {

@@ -17,6 +17,9 @@ pub enum Augmentation {
     ColorJitter(f32),
     /// Covers a rectangle of up to this share of each side with one colour.
     Cutout(f32),
+    /// Puts so many rows and columns at the top left back as they were before all changes: what is written there, such as
+    /// painted velocity, is no part of the scene, and who plays must be able to read it.
+    Keep(usize, usize),
 }
 
 impl Augmentation {
@@ -37,13 +40,17 @@ impl Augmentation {
             Self::ColorJitter(share) if !(share > 0.0 && share < 1.0) => {
                 bad("needs a share above 0 and below 1".into())
             }
+            Self::Keep(rows, columns) if !((1..=shape.height).contains(&rows) && (1..=shape.width).contains(&columns)) => {
+                bad(format!("must keep 1 to {} rows and 1 to {} columns", shape.height, shape.width))
+            }
             Self::Cutout(share) if !(share > 0.0 && share <= 1.0) => bad("needs a share above 0 and up to 1".into()),
             _ => Ok(()),
         }
     }
 
-    fn apply(self, image: &mut [u8], shape: &ImageShape, rng: &mut ChaCha8Rng) {
+    fn apply(self, image: &mut [u8], original: &[u8], shape: &ImageShape, rng: &mut ChaCha8Rng) {
         match self {
+            Self::Keep(rows, columns) => put_back(image, original, shape, [rows, columns]),
             Self::Translate(most) => translate(image, shape, [offset(most, rng), offset(most, rng)]),
             Self::ColorJitter(share) => jitter(image, shape, share, rng),
             Self::Cutout(share) => cut_out(image, shape, share, rng),
@@ -63,11 +70,20 @@ pub(crate) fn augmented(
     let seeds: Vec<u64> = rows.iter().map(|_| rng.next_u64()).collect();
     let mut changed = vec![0; rows.len() * size];
     changed.par_chunks_mut(size.max(1)).zip(rows).zip(seeds).for_each(|((image, &row), seed)| {
-        image.copy_from_slice(&pixels[row * size..(row + 1) * size]);
+        let original = &pixels[row * size..(row + 1) * size];
+        image.copy_from_slice(original);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        augmentations.iter().for_each(|augmentation| augmentation.apply(image, shape, &mut rng));
+        augmentations.iter().for_each(|augmentation| augmentation.apply(image, original, shape, &mut rng));
     });
     changed
+}
+
+fn put_back(image: &mut [u8], original: &[u8], shape: &ImageShape, [rows, columns]: [usize; 2]) {
+    let size = shape.height * shape.width;
+    for (channel, before) in image.chunks_exact_mut(size).zip(original.chunks_exact(size)) {
+        let pairs = channel.chunks_exact_mut(shape.width).zip(before.chunks_exact(shape.width));
+        pairs.take(rows).for_each(|(row, before)| row[..columns].copy_from_slice(&before[..columns]));
+    }
 }
 
 /// Whole pixels in -most..=most.
@@ -184,6 +200,26 @@ mod tests {
     }
 
     #[test]
+    fn what_is_written_at_the_top_left_is_kept_and_nothing_else() {
+        let all = [
+            Augmentation::Translate(3),
+            Augmentation::ColorJitter(0.9),
+            Augmentation::Cutout(1.0),
+            Augmentation::Keep(2, 4),
+        ];
+        for draw in 0..20 {
+            let stream = || Streams::new(5).stream("augment", draw);
+            let kept = augmented(&image(), &SHAPE, &[0], &all, &mut stream());
+            let lost = augmented(&image(), &SHAPE, &[0], &all[..3], &mut stream());
+            for (i, pixel) in kept.iter().enumerate() {
+                let (row, column) = (i % 63 / 7, i % 7);
+                let expected = if row < 2 && column < 4 { image()[i] } else { lost[i] };
+                assert_eq!(*pixel, expected, "row {row}, column {column}");
+            }
+        }
+    }
+
+    #[test]
     fn each_row_draws_its_own() {
         let both = [image(), image()].concat();
         let mut rng = Streams::new(4).stream("augment", 0);
@@ -204,6 +240,7 @@ mod tests {
             assert!(error(Augmentation::ColorJitter(share), SHAPE.into()).contains("share"));
             assert!(error(Augmentation::Cutout(share), SHAPE.into()).contains("share"));
         }
+        assert!(error(Augmentation::Keep(2, 8), SHAPE.into()).contains("1 to 9 rows and 1 to 7 columns"));
         assert!(Augmentation::Translate(6).check("ppo augment", &SHAPE.into()).is_ok());
     }
 }

@@ -148,3 +148,42 @@ impl Pool {
         if self == Self::Mean { pooled / count } else { pooled }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{Activation, host, matrix};
+    use crate::rng::Streams;
+
+    /// Width of the hidden layers.
+    const WIDTH: usize = 16;
+
+    fn critics(layer_norm: bool, device: &Device) -> Critics {
+        let net = NetShape { obs_dim: 3, latent: 0, hidden: vec![WIDTH, WIDTH], activation: Activation::Relu };
+        let shape = EnsembleShape { net, space: ActionSpace::Continuous(1), critics: 3, layer_norm };
+        let mut rng = Streams::new(1).stream("critics", 0);
+        let Ok(critics) = Critics::build(&mut RandomInit { rng: &mut rng, device }, "", &shape);
+        critics
+    }
+
+    #[test]
+    fn normalised_layers_bound_what_is_far_from_all_that_was_seen() {
+        let device = DeviceKind::Flex.plain();
+        let values = |critics: &Critics, far: f32| -> Vec<f32> {
+            let states = matrix(vec![far, -2.0 * far, 3.0 * far], 1, 3, &device);
+            let q = critics.of_vectors(states, matrix(vec![far], 1, 1, &device));
+            q.into_iter().map(|q| host(q).expect("readable")[0]).collect()
+        };
+        let (plain, normalised) = (critics(false, &device), critics(true, &device));
+        let [near, far] = [1.0, 1000.0].map(|size| (values(&plain, size), values(&normalised, size)));
+        for (i, q) in normalised.nets.iter().enumerate() {
+            assert!((far.0[i] / (1000.0 * near.0[i]) - 1.0).abs() < 0.01, "as far as states are: {near:?}, {far:?}");
+            assert!((far.1[i] - near.1[i]).abs() < 1e-3, "whatever the distance: {near:?}, {far:?}");
+            // No row of a normalised layer is longer than the root of its width, before the activation or behind it.
+            let head = host(q.net.head.weight.clone().reshape([WIDTH])).expect("readable");
+            let bound = (WIDTH as f32 * head.iter().map(|weight| weight * weight).sum::<f32>()).sqrt();
+            assert!(far.1[i].abs() <= bound, "{} over {bound}", far.1[i]);
+        }
+    }
+}

@@ -82,7 +82,8 @@ impl SacLearner {
         Self::fresh(config, spec, None, seed, device)
     }
 
-    /// RLPD: SAC with recordings, each a rollout of one environment with its rewards and ends, in a share of each batch.
+    /// RLPD: SAC with recordings, each a rollout of one environment with its rewards and ends, in a share of each batch. Both
+    /// normalisers begin with what was recorded: play may long earn nothing, and would make all of a recorded reward.
     ///
     /// # Errors
     /// [`LearnError::Config`] for settings that cannot work, or recordings that were never rewarded; else as
@@ -102,6 +103,9 @@ impl SacLearner {
             check_ends(episode)?;
             if let Some(normalizer) = &mut learner.base.observations {
                 normalizer.update(episode.obs.as_slice().vectors("RLPD")?);
+            }
+            if let Some(normalizer) = &mut learner.base.rewards {
+                normalizer.update_apart(&episode.rewards, &episode.done(), episode.envs)?;
             }
         }
         learner.demos = Some(Demos::new(demos, rlpd.demo_share, spec.obs.numbers(), &spec.action_space)?);

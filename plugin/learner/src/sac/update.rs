@@ -110,7 +110,7 @@ impl SacLearner {
     }
 
     /// The transitions of gradient step `number`: of what was played, and of what was recorded if there is anything.
-    fn draw(&self, number: u64) -> Result<ReplayBuffer, LearnError> {
+    pub(super) fn draw(&self, number: u64) -> Result<ReplayBuffer, LearnError> {
         let recorded = self.demos.as_ref().map_or(0, |demos| demos.of_batch(&self.config));
         let mut rng = self.base.streams.stream("sac.batch", number);
         let played = self.buffer.draw(self.config.batch - recorded, &mut rng);

@@ -29,7 +29,7 @@ struct Header {
     /// A hash of the demonstrations; the first checkpoints had none.
     #[serde(default)]
     demo_hash: Option<u64>,
-    /// The epoch that was best on demonstrations kept apart, and the loss there.
+    /// The epoch that was best on demonstrations kept apart, and the NLL there; the first checkpoints had the whole loss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     best: Option<(u64, f32)>,
 }
@@ -51,7 +51,7 @@ impl SkillTrainer {
             demo_episodes: self.extent.0,
             demo_steps: self.extent.1,
             demo_hash: Some(self.fingerprint),
-            best: self.best.as_ref().map(|best| (best.epoch, best.loss)),
+            best: self.best.as_ref().map(|best| (best.epoch, best.nll)),
         };
         let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("", &self.nets)?;
@@ -100,9 +100,9 @@ impl SkillTrainer {
         }
         let best = match header.best {
             None => None,
-            Some((epoch, loss)) => {
+            Some((epoch, nll)) => {
                 let nets = SkillNets::stored(&skill, &mut file, "best", &device.plain())?;
-                Some(Best { epoch, loss, nets })
+                Some(Best { epoch, nll, nets })
             }
         };
         let trainer = Self::with_nets(skill.config, dataset, &nets, header.seed, device);

@@ -93,8 +93,8 @@ pub struct SkillConfig {
     /// Share of the episodes that is not learned from, but measured after each epoch.
     #[serde(skip_serializing_if = "is_zero")]
     pub held_out: f64,
-    /// Epochs without progress on those after which learning stops; the model is then that of the best epoch. `None` learns
-    /// for all epochs, and the model is that of the last.
+    /// Epochs without a lower NLL on those after which learning stops; the model is then that of the epoch with the least.
+    /// `None` learns for all epochs, and the model is that of the last.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patience: Option<usize>,
 }
@@ -178,7 +178,12 @@ impl SkillConfig {
             }
             _ => {}
         }
-        let weights = [("beta", self.beta), ("latent_reg", self.latent_reg), ("weight_decay", self.weight_decay), ("state_weight", self.state_weight)];
+        let weights = [
+            ("beta", self.beta),
+            ("latent_reg", self.latent_reg),
+            ("weight_decay", self.weight_decay),
+            ("state_weight", self.state_weight),
+        ];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
             return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
         }

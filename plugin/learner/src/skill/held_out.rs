@@ -32,8 +32,8 @@ pub(super) struct HeldOut {
 pub(super) struct Best {
     /// Epochs done by then.
     pub(super) epoch: u64,
-    /// The loss on them.
-    pub(super) loss: f32,
+    /// The NLL on them.
+    pub(super) nll: f32,
     pub(super) nets: SkillNets,
 }
 
@@ -77,8 +77,9 @@ impl Dataset {
 }
 
 impl SkillTrainer {
-    /// What the networks make of the demonstrations kept apart, if there are any; remembers the networks if they were never
-    /// better. The draws of skills are the same each time.
+    /// What the networks make of the demonstrations kept apart, if there are any; remembers the networks if their NLL was never
+    /// lower. The rest of the loss does not count: it says how skills are told apart, not how well they are played. The draws of
+    /// skills are the same each time.
     pub(super) fn measure_held_out(&mut self) -> Result<Option<HeldOutMetrics>, LearnError> {
         let Some(held_out) = &self.held_out else { return Ok(None) };
         let mut sums = [0.0f64; 4];
@@ -98,9 +99,9 @@ impl SkillTrainer {
                 steps: None,
             });
         }
-        if self.config.patience.is_some() && self.best.as_ref().is_none_or(|best| loss < best.loss) {
+        if self.config.patience.is_some() && self.best.as_ref().is_none_or(|best| nll < best.nll) {
             let nets = SkillNets { state_heads: None, ..frozen(&self.nets) };
-            self.best = Some(Best { epoch: self.epoch, loss, nets });
+            self.best = Some(Best { epoch: self.epoch, nll, nets });
         }
         let state_error = self.nets.state_heads.as_ref().map(|_| state_error);
         Ok(Some(HeldOutMetrics { loss, nll, kl, state_error }))
@@ -112,9 +113,14 @@ impl SkillTrainer {
         best.is_some_and(|(best, patience)| self.epoch >= best.epoch + patience as u64)
     }
 
-    /// After which epoch the networks were best on the demonstrations kept apart; `None` where nobody looks.
+    /// After which epoch the networks had the least NLL on the demonstrations kept apart; `None` where nobody looks.
     pub fn best_epoch(&self) -> Option<u64> {
         self.best.as_ref().map(|best| best.epoch)
+    }
+
+    /// The NLL on the demonstrations kept apart after [`Self::best_epoch`].
+    pub fn best_nll(&self) -> Option<f32> {
+        self.best.as_ref().map(|best| best.nll)
     }
 
     /// The networks that the model gets: the best ones, or those there are now.

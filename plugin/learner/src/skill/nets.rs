@@ -106,14 +106,7 @@ impl SkillNets {
         let decoder_features = self.decoder.observe(states)?;
         let decoded = self.decoder.forward_held(decoder_latent.clone(), decoder_features.clone(), steps);
         let nll_per_step = decoded.log_prob(actions)?.neg();
-        Ok(SkillForward {
-            nll_per_step,
-            kl_per_sequence,
-            decoder_latent,
-            decoded,
-            decoder_features,
-            prior_features,
-        })
+        Ok(SkillForward { nll_per_step, kl_per_sequence, decoder_latent, decoded, decoder_features, prior_features })
     }
 }
 

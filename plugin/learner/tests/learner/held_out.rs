@@ -76,18 +76,37 @@ fn learning_stops_in_time_and_the_best_model_is_kept() {
     let mut trainer = trainer(patient, coins());
     let (mut best, mut model) = (f32::INFINITY, None);
     while !trainer.is_over() {
-        let loss = epoch(&mut trainer).held_out.expect("some are kept apart").loss;
-        if loss < best {
-            (best, model) = (loss, Some(trainer.model()));
+        let nll = epoch(&mut trainer).held_out_nll().expect("some are kept apart");
+        if nll < best {
+            (best, model) = (nll, Some(trainer.model()));
         }
         assert!(trainer.epochs_done() < 60, "it never stops");
     }
-    assert_eq!(trainer.best_epoch(), Some(trainer.epochs_done() - 4));
+    assert_eq!((trainer.best_epoch(), trainer.best_nll()), (Some(trainer.epochs_done() - 4), Some(best)));
     let says = |model: &playbot_learner::SkillModel| model.policy().forward(&[0.1; 2], &[0.5; 6], 1).expect("finite");
     let kept = trainer.model();
     assert_eq!(says(&kept), says(&model.expect("there was a best one")));
     epoch(&mut trainer);
     assert_eq!(says(&trainer.into_model()), says(&kept), "what comes later is not better");
+}
+
+#[test]
+fn the_best_epoch_is_that_of_the_least_nll_whatever_the_loss_says() {
+    // The divergence weighs so much that the loss still falls where the decoder begins to know the actions by heart.
+    let mut trainer = trainer(SkillConfig { beta: 100.0, patience: Some(4), ..config() }, coins());
+    let (mut nlls, mut losses) = (Vec::new(), Vec::new());
+    while !trainer.is_over() {
+        let held_out = epoch(&mut trainer).held_out.expect("some are kept apart");
+        nlls.push(held_out.nll);
+        losses.push(held_out.loss);
+        assert!(trainer.epochs_done() < 60, "it never stops");
+    }
+    let least = |values: &[f32]| {
+        let at = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b])).expect("some epochs");
+        Some(at as u64 + 1)
+    };
+    assert_eq!(trainer.best_epoch(), least(&nlls), "{nlls:?}");
+    assert_ne!(trainer.best_epoch(), least(&losses), "the loss would have told the same: {losses:?}");
 }
 
 #[test]
@@ -100,7 +119,8 @@ fn a_stopped_training_remembers_the_best_model() {
     }
     whole.save(&path).expect("written");
     let mut loaded = SkillTrainer::load(&path, coins(), DeviceKind::Flex).expect("read");
-    assert_eq!((loaded.best_epoch(), loaded.is_over()), (whole.best_epoch(), whole.is_over()));
+    let best = |trainer: &SkillTrainer| (trainer.best_epoch(), trainer.best_nll(), trainer.is_over());
+    assert_eq!(best(&loaded), best(&whole));
     assert_eq!(epoch(&mut loaded), epoch(&mut whole));
     let bytes = |trainer: &SkillTrainer| {
         trainer.save(&path).expect("written");

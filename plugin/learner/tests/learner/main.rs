@@ -4,6 +4,7 @@ mod augmentation;
 mod checkpoint;
 mod clock;
 mod corridor;
+mod critic_trunk;
 mod damaged_files;
 mod determinism;
 mod errors;

@@ -1,10 +1,10 @@
 //! Writing demonstration files, one whole episode at a time.
 
-use std::fs::OpenOptions;
+use std::fs::{self, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use playbot_learner::disk::{DiskFile, remove_file};
+use playbot_learner::disk::{DiskFile, remove_file, temporary_name};
 
 use super::episode::DemoEpisode;
 use super::error::{DemoFault, DemoFileError};
@@ -55,15 +55,45 @@ impl DemoWriter {
         })
     }
 
-    /// Like [`create`](Self::create), but replaces a file that exists: its episodes are lost.
+    /// Like [`create`](Self::create), but replaces a file that exists: its episodes are lost. It is there until the header of the
+    /// new one is on the disk.
     ///
     /// # Errors
     ///
     /// Those of [`create`](Self::create) except [`DemoFault::Exists`], and [`DemoFault::Locked`] while
     /// another program records to the file.
     pub fn replace(path: impl AsRef<Path>, header: DemoHeader) -> Result<Self, DemoFileError> {
-        // The old content goes only once the file is known to be ours: see `start`.
-        Self::start(path.as_ref(), header, OpenOptions::new().write(true).create(true).truncate(false))
+        let path = path.as_ref();
+        match fs::canonicalize(path) {
+            // A link stays one: what it leads to is replaced.
+            Ok(old) if old.is_file() => Self::start_in_place_of(&old, path, header),
+            // Devices and pipes hold nothing that could be lost.
+            _ => Self::start(path, header, OpenOptions::new().write(true).create(true).truncate(false)),
+        }
+    }
+
+    /// Starts under a temporary name, and takes that of the old file when the header is on the disk: whatever happens, one
+    /// of the two is there.
+    fn start_in_place_of(old: &Path, path: &Path, header: DemoHeader) -> Result<Self, DemoFileError> {
+        let fresh = temporary_name(old);
+        let attempt = || {
+            let bytes = preamble::encode(&header)?;
+            let replaced = DiskFile::open(old, OpenOptions::new().write(true));
+            let replaced = replaced.map_err(DemoFault::io("create the file"))?;
+            lock(replaced.as_file())?;
+            let mut file = DiskFile::create(&fresh).map_err(DemoFault::io("create the file"))?;
+            lock(file.as_file())?;
+            let written = file.write_all(&bytes).and_then(|()| Store::sync(&mut file));
+            written.and_then(|()| file.rename_to(old)).map_err(DemoFault::io("write the header"))?;
+            Ok((file, bytes.len() as u64))
+        };
+        let started = attempt().map_err(|fault: DemoFault| DemoFileError::new(path, fault));
+        let (file, length) = started.inspect_err(|error| {
+            if matches!(error.fault, DemoFault::Io { action: "write the header", .. }) {
+                let _ = remove_file(&fresh);
+            }
+        })?;
+        Ok(Self { path: path.to_owned(), header, store: Box::new(file), length, episodes: 0, torn: false })
     }
 
     fn start(path: &Path, header: DemoHeader, options: &OpenOptions) -> Result<Self, DemoFileError> {

@@ -19,3 +19,15 @@ fn no_file_is_missed() {
     let (_, messages) = ended(shell.command(&["doctor", "breakout", "--ticks", "60"]), 0);
     assert!(!messages.contains("ERROR"), "{messages}");
 }
+
+/// A training would refuse it as well.
+#[test]
+fn an_experiment_that_asks_for_pictures_which_there_are_none_of_is_not_shown() {
+    let shell = Shell::new(GAME.program);
+    let own = format!("{}/experiment.ron", GAME.folder);
+    let show = ["config", "show", "--experiment", &own, "--set", "skills.norm_obs=false"];
+    ended(shell.command(&show), 0);
+    let (shown, messages) = ended(shell.command(&[&show[..], &["--set", "observation=Raster"]].concat()), 3);
+    assert!(messages.contains("`observation=Raster`: ") && messages.contains("breakout cannot be drawn"), "{messages}");
+    assert_eq!(shown, "");
+}

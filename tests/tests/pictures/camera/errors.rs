@@ -1,12 +1,16 @@
 //! What cannot be seen is said clearly.
 
-use bevy::prelude::*;
+use bevy::{
+    camera::{ImageRenderTarget, RenderTarget},
+    prelude::*,
+    render::render_resource::TextureFormat,
+};
 use bevy_playbot::{
-    camera::CameraSensorPlugin,
-    vision::{BlankEpisodes, TileLayer, VisionError},
+    camera::{CameraSensor, CameraSensorPlugin},
+    vision::{BlankEpisodes, ImageOptions, TileLayer, VisionError},
 };
 use playbot_lab::prelude::*;
-use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
+use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
 
 /// Set for a copy of this program that finds no adapter.
 const CHILD: &str = "PLAYBOT_TEST_WITHOUT_ADAPTER";
@@ -78,6 +82,51 @@ fn a_target_that_is_gone_is_named() {
     assert!(fault.contains("agent 6") && fault.contains(&format!("the target {gone}")), "{fault}");
     let frame = world.get::<bevy_playbot::vision::Frame>(other).expect("a frame");
     assert_eq!(frame.tick, Some(world.resource::<bevy_playbot::tick::Tick>().0), "others go on seeing");
+}
+
+/// The renderer of Bevy would stop for good at an image without pixels.
+#[test]
+fn a_camera_on_a_target_without_pixels_is_named_and_seeing_goes_on_once_it_is_gone() {
+    let mut world = camera_world(|_| {});
+    let red = world.resource_mut::<Assets<Image>>().add(image(1, &[[255, 0, 0, 255]]));
+    let here =
+        world.spawn((Sprite { image: red, custom_size: Some(Vec2::ONE), ..default() }, Transform::default())).id();
+    let eye = spawn_eye(&mut world, 0, here, 4.0, [8, 8]);
+    world.tick().expect("sound");
+    let screen = |world: &mut World, [width, height]: [u32; 2]| {
+        let screen = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
+        world.resource_mut::<Assets<Image>>().add(screen)
+    };
+    for size in [[0, 0], [0, 50], [100, 0]] {
+        for is_image in [true, false] {
+            let handle = is_image.then(|| screen(&mut world, size));
+            let target = match &handle {
+                Some(handle) => RenderTarget::Image(ImageRenderTarget { handle: handle.clone(), scale_factor: 1.0 }),
+                None => RenderTarget::None { size: size.into() },
+            };
+            let camera = world.spawn((Camera2d, target, Msaa::Off)).id();
+            let options = ImageOptions { width: 8, height: 8, ..default() };
+            let through = world.spawn((player(1), CameraSensor::of(camera, options))).id();
+            for _ in 0..2 {
+                let told = fault(&mut world);
+                let words = format!("the camera {camera} draws on a target of {}x{} pixels", size[0], size[1]);
+                assert!(told.contains(&words) && told.starts_with("agent "), "{told}");
+            }
+            world.despawn(camera);
+            world.despawn(through);
+            if let Some(handle) = handle {
+                world.resource_mut::<Assets<Image>>().remove(&handle);
+            }
+            world.tick().expect("sound again");
+            assert_eq!([pixel(&world, eye, 4, 4), pixel(&world, eye, 0, 0)], [[255, 0, 0], [0, 0, 0]]);
+        }
+    }
+    // An image that nobody looks at makes the renderer stop as well.
+    let handle = screen(&mut world, [0, 0]);
+    let target = RenderTarget::Image(ImageRenderTarget { handle, scale_factor: 1.0 });
+    let camera = world.spawn((Camera2d, target, Msaa::Off)).id();
+    let told = fault(&mut world);
+    assert!(told.starts_with("agent 0, ") && told.contains(&format!("the camera {camera}")), "{told}");
 }
 
 #[test]

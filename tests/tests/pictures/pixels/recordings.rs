@@ -39,16 +39,3 @@ fn a_part_of_the_recordings_is_spread_over_all_of_them() {
     assert_eq!(read().at_most(1).episodes(), 1, "at least one");
     assert_eq!(read().at_most(all).episodes(), 72);
 }
-
-#[test]
-fn pictures_without_end_are_refused_before_anything_is_replayed() {
-    let folder = tempfile::tempdir().expect("a folder");
-    record(folder.path());
-    let image = ImageOptions { width: 2048, height: 2048, stack: 16, ..ImageOptions::default() };
-    let observation_config = ObservationConfig { kind: ObservationKind::Raster, image };
-    let demos = demonstrations(folder.path(), &observation_config);
-    let error = demos.dataset(&PaintedCorridor, 1, |_| {}).expect_err("too large").to_string();
-    for words in ["GiB", "`demo_steps`", "2048×2048 colour pictures of the raster, 16 in a stack"] {
-        assert!(error.contains(words), "{error}");
-    }
-}

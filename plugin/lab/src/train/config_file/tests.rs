@@ -205,3 +205,22 @@ fn a_file_that_is_not_there_is_named_with_the_command_that_begins_one() {
     let text = read_experiment(Path::new("none.ron")).expect_err("not there").to_string();
     assert!(text.starts_with("cannot read none.ron: ") && text.ends_with("`playbot config show > none.ron`"), "{text}");
 }
+
+#[test]
+fn a_key_or_value_of_ten_megabytes_is_named_with_its_place_in_less_than_a_kilobyte() {
+    let big = "k".repeat(10_000_000);
+    for (good, bad, place, words) in [
+        ("steps: 1000", format!("steps: 1000, {big}: 3"), "x.ron:3:18: ", "unknown key `kkk"),
+        ("gamma: 0.99", format!("{big}: 3"), "x.ron:4:11: ", "unknown key `ppo.kkk"),
+        ("gamma: 0.99", format!("{big}: 3, {big}: 4"), "x.ron:4:", "k` is there twice"),
+        ("gamma: 0.99", format!("gamma: {big}"), "x.ron:4:", "`ppo.gamma` must be a number"),
+        ("gamma: 0.99", format!("activation: {big}"), "x.ron:4:", "`ppo.activation` cannot be `kkk"),
+        ("\"hard:0..63\"", format!("\"{big}\""), "x.ron:2:", "`train`: `kkk"),
+        ("game:", format!("base: [\"{big}\"], game:"), "x.ron:2:", "unknown preset `kkk"),
+        ("game:", format!("base: [\"{big}.ron\"], game:"), "x.ron:2:", ".ron, which cannot be read"),
+    ] {
+        let text = error(&GOOD.replace(good, &bad));
+        assert!(text.len() < 1024, "{} bytes: {}", text.len(), &text[..1000]);
+        assert!(text.starts_with(place) && text.contains(words), "{text}");
+    }
+}

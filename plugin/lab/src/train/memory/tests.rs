@@ -36,13 +36,53 @@ impl Game for Ten {
     }
 }
 
+/// The same game, of which a World bears a single arena.
+struct Alone;
+
+impl Game for Alone {
+    fn name(&self) -> &'static str {
+        "alone"
+    }
+    fn version(&self) -> u32 {
+        1
+    }
+    fn modes(&self) -> &'static [&'static str] {
+        &["a"]
+    }
+    fn tick_hz(&self) -> f64 {
+        15.0
+    }
+    fn actions(&self) -> ActionSpace {
+        Ten.actions()
+    }
+    fn observation(&self) -> ObservationSpace {
+        Ten.observation()
+    }
+    fn build(&self, _app: &mut App, _mode: &str) {}
+    fn spawn_agent(&self, world: &mut World, _index: u32) -> Entity {
+        world.spawn_empty().id()
+    }
+    fn arenas_per_world(&self) -> Option<u32> {
+        Some(1)
+    }
+}
+
+/// A machine with so many bytes of memory, and more threads and address space than anybody needs.
+fn machine(memory: u64) -> Room {
+    Room { memory, space: u64::MAX, threads: ThreadLimit { most: u64::MAX, whose: "nobody" } }
+}
+
 fn check(algorithm: &str, changes: &str, free: u64) -> Result<(), String> {
+    check_on(&Ten, algorithm, changes, &machine(free))
+}
+
+fn check_on(game: &dyn Game, algorithm: &str, changes: &str, room: &Room) -> Result<(), String> {
     let arenas = if changes.contains("arenas") { "" } else { "arenas: 64," };
     let text = format!(
-        r#"(game: "ten", train: "a:0..3", test: "a:4..7", steps: 9000, {arenas} algorithm: "{algorithm}", {changes})"#
+        r#"(game: "ten", train: "a:0..3", test: "a:4..7", steps: 90000, {arenas} algorithm: "{algorithm}", {changes})"#
     );
     let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
-    experiment.check_memory_within(&Ten, free).map_err(|error| error.to_string())
+    experiment.check_memory_within(game, room).map_err(|error| error.to_string())
 }
 
 #[test]
@@ -63,11 +103,39 @@ fn rollouts_must_fit() {
 
 #[test]
 fn the_replay_buffer_must_fit_as_far_as_it_is_filled() {
-    // 9000 transitions × 80 bytes = 703 KiB, and a rollout of one tick.
+    // 90,000 transitions × 80 bytes = 6.9 MiB, a World of 1 MiB, and a rollout of one tick.
     let sac = "worlds: 1, sac: (num_steps: 1, buffer: 1000000, hidden: [8], batch: 8)";
-    assert_eq!(check("sac", sac, 1000 << 10), Ok(()));
-    let text = check("sac", sac, 700 << 10).expect_err("too large");
-    assert!(text.contains("9000 transitions × 2 × 40 bytes") && text.contains("`sac.buffer`"), "{text}");
+    assert_eq!(check("sac", sac, 9 << 20), Ok(()));
+    let text = check("sac", sac, 6 << 20).expect_err("too large");
+    assert!(text.contains("90000 transitions × 2 × 40 bytes") && text.contains("`sac.buffer`"), "{text}");
+}
+
+#[test]
+fn worlds_must_fit_with_their_threads() {
+    // Each takes 1 MiB, and each arena 1 KiB.
+    let many = "arenas: 1000, worlds: 1000, ppo: (num_steps: 1, minibatches: 1, hidden: [8])";
+    assert_eq!(check("ppo", many, 1010 << 20), Ok(()));
+    let text = check("ppo", many, 990 << 20).expect_err("too large");
+    assert!(text.contains("1000 Worlds with 1000 arenas need 1001.0 MiB, and 990.0 MiB") && text.contains("`worlds`"));
+    // A thread each, of which the machine lets nobody have so many, however much memory it has.
+    let limited = |most| Room { threads: ThreadLimit { most, whose: "the kernel" }, ..machine(u64::MAX) };
+    assert_eq!(check_on(&Ten, "ppo", many, &limited(1000)), Ok(()));
+    let text = check_on(&Ten, "ppo", many, &limited(999)).expect_err("too many");
+    assert!(
+        text.starts_with("`worlds` is 1000: ") && text.contains("the kernel leaves room for 999 threads"),
+        "{text}"
+    );
+    let one = "arenas: 1000, worlds: 1, ppo: (num_steps: 1, minibatches: 1, hidden: [8])";
+    assert_eq!(check_on(&Ten, "ppo", one, &limited(0)), Ok(()), "it plays on the thread that is there");
+    let text = check_on(&Alone, "ppo", one, &limited(999)).expect_err("a World for each arena");
+    assert!(text.starts_with("`arenas` is 1000: 1000 Worlds play on a thread each"), "{text}");
+    // The stacks of a thousand threads are 2 GiB of address space.
+    let narrow = |space| Room { space, ..machine(u64::MAX) };
+    let text = check_on(&Ten, "ppo", many, &narrow(2 << 30)).expect_err("too little");
+    assert!(
+        text.contains("1000 of them for Worlds") && text.contains("`ulimit -v`") && text.contains("lower `worlds`")
+    );
+    assert_eq!(check_on(&Ten, "ppo", many, &narrow(1 << 50)), Ok(()));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use crate::{
     verdict::{
         Finding, LevelOutcome, MapScope, TesterRecord,
         folder::{Earlier, TestFolder},
+        results::RESULTS,
         testing::{tester, verdict},
     },
 };
@@ -158,4 +159,22 @@ fn findings_of_detectors_that_did_not_look_before_are_no_news() {
     let found: Vec<&str> = comparison.new_findings.iter().map(|finding| finding.detector.as_str()).collect();
     assert_eq!(found, ["panic", "runaway"]);
     assert_eq!(comparison.left_out.len(), 2, "{:?}", comparison.left_out);
+}
+
+#[test]
+fn earlier_results_with_a_flipped_bit_are_refused_before_anybody_plays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let before = folder.path().join("before");
+    written(&before, &record(&["random"]), &[verdict(0, 1, 1)]);
+    let path = before.join(RESULTS);
+    let whole = std::fs::read(&path).expect("results");
+    Comparison::check(&before, &record(&["random"])).expect("the same levels");
+    for at in 0..whole.len() * 8 {
+        let mut bytes = whole.clone();
+        bytes[at / 8] ^= 1 << (at % 8);
+        std::fs::write(&path, bytes).expect("writable");
+        let error = Comparison::check(&before, &record(&["random"])).expect_err("damaged");
+        let is_of_file = matches!(error, TestError::Damaged { .. } | TestError::Io { .. });
+        assert!(is_of_file && error.to_string().contains(RESULTS), "bit {at}: {error}");
+    }
 }
