@@ -12,14 +12,16 @@ use super::{
     error::{CliError, Outcome},
     interrupt,
     number::counted,
+    player::{Chosen, PlayerArgs},
     progress,
     recording::OverwriteArgs,
 };
 
-/// Record the game's demonstrator.
+/// Record the game's demonstrator, or another player.
 ///
-/// That is a bot of the game's own; --noise replaces some of its actions, so that recordings show how to go on from
-/// there.
+/// The demonstrator is a bot of the game's own; --policy, --run and --bot name others, such as a policy that has learned the
+/// game from vectors and shall teach one that sees pixels. --noise replaces some of the actions, so that recordings show how
+/// to go on from there.
 ///
 /// Recordings may show training levels and any others, but no held-out level, on which bots are tested: `learn-skills`
 /// refuses those, and any level that looks like one. Held-out levels are the experiment's `test`; leave them out with
@@ -29,7 +31,8 @@ use super::{
   playbot record GAME --levels MODE:0..9 --out my.demo
   playbot record GAME --levels MODE:128..499 --noise 0.2 --steps 100000 --out demos/GAME/noisy.demo
   playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
-  playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo")]
+  playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo
+  playbot record GAME --run runs/first --checkpoint best --levels MODE:1000..1999 --noise 0.1 --out learned.demo")]
 pub struct Args {
     /// Name of the game.
     game: String,
@@ -43,6 +46,8 @@ pub struct Args {
     /// File to write.
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    player: PlayerArgs,
     /// Discrete actions: probability with which one is replaced by a uniformly random one. Continuous actions: standard
     /// deviation of the normal noise on each value, before it is clipped.
     #[arg(long, default_value_t = 0.0)]
@@ -68,7 +73,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
     levels.check(game)?;
-    check_demonstrator(game)?;
+    let chosen_player = args.player.load(game)?;
+    if chosen_player.is_none() {
+        check_demonstrator(game)?;
+    }
     check_noise(game, args.noise)?;
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
@@ -90,8 +98,17 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         steps: args.steps,
         keep_observations: args.observations,
     };
-    let writer = args.overwrite.open(&args.out, plan.header(game))?;
-    let (mut world, agent) = plan.build_world(game, writer);
+    let mut header = plan.header(game);
+    if let Some(chosen) = &chosen_player {
+        header.demonstrator.clone_from(&chosen.name);
+    }
+    let writer = args.overwrite.open(&args.out, header)?;
+    let (mut world, agent) = match &chosen_player {
+        Some(Chosen { player, observation_config, .. }) => {
+            plan.build_world_of(game, player, observation_config, writer)?
+        }
+        None => plan.build_world(game, writer),
+    };
     let finished = play(&mut world, agent, count, args.steps)?;
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");

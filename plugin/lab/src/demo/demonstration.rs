@@ -1,4 +1,4 @@
-//! A game's demonstrator, about to be recorded.
+//! A game's demonstrator, or another player, about to be recorded.
 //!
 //! ```no_run
 //! use bevy_playbot::demo::file::DemoWriter;
@@ -26,9 +26,15 @@ use bevy::prelude::*;
 use bevy_playbot::{
     demo::file::{DemoHeader, DemoWriter},
     prelude::*,
+    vision::{ObservationConfig, VisionError},
 };
 
-use crate::{game::Game, worlds::build_world};
+use super::action_noise::ActionNoise;
+use crate::{
+    eval::Player,
+    game::Game,
+    worlds::{build_observing_world, build_world},
+};
 
 /// What of a game's demonstrator is recorded.
 #[derive(Clone, Debug)]
@@ -66,13 +72,43 @@ impl DemonstrationPlan {
         let (mut world, agents) = build_world(game, &self.mode, self.seed, 0, 1);
         let agent = agents[0];
         game.attach_demonstrator(&mut world, agent, self.noise);
+        self.record(&mut world, agent, Control::Bot, writer);
+        (world, agent)
+    }
+
+    /// [`build_world`](Self::build_world) with another player, such as a policy that has learned the game, which sees as
+    /// `observation_config` says. [`header`](Self::header) names the demonstrator: put the player's name there.
+    ///
+    /// # Errors
+    ///
+    /// What it sees cannot be made: see [`VisionError`].
+    pub fn build_world_of(
+        &self,
+        game: &dyn Game,
+        player: &Player,
+        observation_config: &ObservationConfig,
+        writer: DemoWriter,
+    ) -> Result<(World, Entity), VisionError> {
+        let (mut world, agents) = build_observing_world(game, &self.mode, observation_config, self.seed, 0, 1)?;
+        let agent = agents[0];
+        player.install(&mut world);
+        let control = player.seat(game, &mut world, agent);
+        if self.noise > 0.0 {
+            ActionNoise::install(&mut world);
+            world.entity_mut(agent).insert(ActionNoise::new(self.noise, self.seed));
+        }
+        self.record(&mut world, agent, control, writer);
+        Ok((world, agent))
+    }
+
+    /// Lets the agent play the levels and `writer` record it.
+    fn record(&self, world: &mut World, agent: Entity, control: Control, writer: DemoWriter) {
         let recorder = Recorder::new(writer);
         let (recorder, levels) = match self.steps {
             Some(steps) => (recorder.with_step_limit(steps), LevelQueue::rounds(self.levels.clone())),
             None => (recorder, LevelQueue::list(self.levels.clone())),
         };
         world.insert_resource(recorder);
-        world.entity_mut(agent).insert((Control::Bot, Recording::default(), levels));
-        (world, agent)
+        world.entity_mut(agent).insert((control, Recording::default(), levels));
     }
 }

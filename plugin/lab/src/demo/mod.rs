@@ -1,5 +1,6 @@
 //! Recordings in the laboratory: making them of a demonstrator, checking them by replay, and reading them back for learning.
 
+mod action_noise;
 pub mod dataset;
 pub mod demonstration;
 mod observe;

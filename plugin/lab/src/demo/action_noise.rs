@@ -1,0 +1,39 @@
+//! Noise on what a recorded player does, so that recordings show how to go on from elsewhere.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    bot::with_noise,
+    placement::{TickSchedules, is_tick},
+    prelude::*,
+};
+use playbot_learner::{Streams, rng::ChaCha8Rng};
+
+/// Replaces some of an agent's actions, or shakes them, whoever decided.
+#[derive(Component, Clone, Debug)]
+pub(super) struct ActionNoise {
+    noise: f64,
+    rng: ChaCha8Rng,
+}
+
+impl ActionNoise {
+    /// The share of random actions, or the standard deviation of the noise on continuous ones, drawn from `seed`.
+    pub(super) fn new(noise: f64, seed: u64) -> Self {
+        Self { noise, rng: Streams::new(seed).stream("demo.noise", 0) }
+    }
+
+    /// Lets agents of a World carry it: it comes after whoever decides, and before the game hears of the action.
+    pub(super) fn install(world: &mut World) {
+        let TickSchedules { decide, .. } = *world.resource::<TickSchedules>();
+        let system = add_noise.after(PlaybotSystems::Decide).before(PlaybotSystems::Act).run_if(is_tick);
+        world.resource_mut::<Schedules>().add_systems(decide, system);
+    }
+}
+
+fn add_noise(mut agents: Query<(&Agent, &Episode, &mut ActionNoise, &mut Action)>) {
+    for (agent, episode, mut noise, mut action) in &mut agents {
+        if episode.is_running() {
+            let share = noise.noise;
+            action.0 = with_noise(action.0.clone(), &agent.actions, share, &mut noise.rng);
+        }
+    }
+}
