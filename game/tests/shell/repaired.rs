@@ -21,7 +21,8 @@ fn a_recording_without_a_header_is_repaired_with_that_of_another_one() {
 
     let repair = ["demo", "repair", "damaged.demo", "--out", "mended.demo"];
     let (_, helpless) = ended(folder, &repair, 3);
-    assert!(helpless.contains("not a demonstration file") && helpless.contains("--header-from"), "{helpless}");
+    assert!(helpless.contains("not a demonstration file"), "{helpless}");
+    assert!(helpless.contains("`playbot demo repair damaged.demo --header-from OTHER`"), "{helpless}");
     let (_, missing) = ended(folder, &[&repair[..], &["--header-from", "none.demo"]].concat(), 3);
     assert!(missing.contains("none.demo"), "{missing}");
     assert!(!folder.join("mended.demo").exists(), "nothing was written");

@@ -19,7 +19,7 @@ use playbot_learner::waited;
 use serde_json::{Value, json};
 
 use super::{
-    compute::Device,
+    compute::{Device, MOST_THREADS},
     error::{CliError, Outcome, print_line},
     experiment::ExperimentArgs,
 };
@@ -74,6 +74,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if arenas == 0 || threads == 0 {
         let which = if arenas == 0 { "--arenas" } else { "--threads" };
         return Err(CliError::Usage(format!("{which} must be at least 1")));
+    }
+    if threads > MOST_THREADS {
+        return Err(CliError::Usage(format!("--threads must be at most {MOST_THREADS}")));
     }
     if !(arenas as usize).is_multiple_of(threads) {
         return Err(CliError::Usage(format!(

@@ -11,6 +11,7 @@ use super::{
     demo_merge::merge,
     demo_show::show,
     error::{CliError, Outcome, print_line},
+    interrupt::{self, NothingToSave},
     number::counted,
     open, program, progress,
 };
@@ -159,7 +160,9 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
         files.extend(find_demos(path).map_err(open::missing_recording)?);
     }
     let mut outcome = Outcome::Pass;
-    for file in &files {
+    let _replaying = NothingToSave::listen();
+    for (done, file) in files.iter().enumerate() {
+        interrupt::leave(format!("{done} of {} checked: name the others", counted(files.len() as u64, "recording")));
         let checked = replay(file, games);
         // A verdict is never vacuous: nothing replayed proves nothing.
         if !checked.as_ref().is_ok_and(|report| report.divergences.is_empty() && report.episodes > 0) {

@@ -29,7 +29,7 @@ use playbot_lab::{
 use playbot_learner::{FileError, LearnError};
 use thiserror::Error;
 
-use super::tell::without_controls;
+use super::tell::for_programs;
 
 /// How a command that worked ended.
 pub enum Outcome {
@@ -269,7 +269,7 @@ fn train_code(error: &TrainError) -> u8 {
 pub fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
     use io::Write;
     let line = line.to_string();
-    writeln!(io::stdout().lock(), "{}", without_controls(&line)).map_err(|error| match error.kind() {
+    writeln!(io::stdout().lock(), "{}", for_programs(&line)).map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
         _ => CliError::Io(format!("cannot write to standard output: {error}")),
     })

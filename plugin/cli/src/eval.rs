@@ -27,6 +27,7 @@ use super::{
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
     footprints::Footprints,
+    interrupt::{self, NothingToSave},
     methods, open,
     player::Chosen,
 };
@@ -89,6 +90,10 @@ pub struct Args {
     json: bool,
 }
 
+/// What is left of measurements that are stopped.
+const KEPT_LINES: &str = "what is printed was measured to its end, and nothing else is kept: measure the rest again";
+const KEPT_NOTHING: &str = "nothing is kept of what was measured: call it again";
+
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty() && args.bot.is_empty() {
         return Err(CliError::Usage(
@@ -111,6 +116,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let plan_of = |split| EvalPlan::of(&experiment, split, args.compute.threads());
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
     let players = players(game, &experiment, &args, games)?;
+    let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
+    interrupt::leave(kept.to_owned());
+    let measuring = NothingToSave::listen();
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
@@ -130,6 +138,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             rows.push(measured.into_row());
         }
     }
+    drop(measuring);
     if !args.json {
         print_line(to_text_table(&rows))?;
     }

@@ -14,9 +14,14 @@ use std::{
 pub const EXIT_CODE: u8 = 130;
 
 /// How long work may look for a good place to stop. Whoever asks waits for two seconds at most, some of which the end needs.
-const PATIENCE: Duration = Duration::from_millis(1600);
+const PATIENCE: Duration = Duration::from_millis(1400);
 
+/// Somebody asked to stop; whoever asks again does not want to wait.
+static HEARD: AtomicBool = AtomicBool::new(false);
+/// Work is to stop.
 static ASKED: AtomicBool = AtomicBool::new(false);
+/// Work need not look for a good place to stop.
+static NOTHING_TO_SAVE: AtomicBool = AtomicBool::new(false);
 static INSTALLED: OnceLock<()> = OnceLock::new();
 static REMAINS: Mutex<Remains> = Mutex::new(Remains { left: None, command: None });
 
@@ -39,17 +44,46 @@ impl Remains {
 /// Listens for Ctrl-C and for a polite kill from now on.
 pub fn listen() {
     INSTALLED.get_or_init(|| {
-        let installed = ctrlc::set_handler(|| {
-            if ASKED.swap(true, Ordering::SeqCst) {
-                stop("stopped at once");
-            }
-            tell!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
-            thread::spawn(stop_in_time);
-        });
-        if let Err(error) = installed {
+        if let Err(error) = ctrlc::set_handler(hear) {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");
         }
     });
+}
+
+/// Work that has nothing to save: while there is this, the first Ctrl-C ends the program where it is. What was saved before, if
+/// anything, is told.
+pub struct NothingToSave(());
+
+impl NothingToSave {
+    /// Listens for Ctrl-C from now on.
+    pub fn listen() -> Self {
+        NOTHING_TO_SAVE.store(true, Ordering::SeqCst);
+        listen();
+        Self(())
+    }
+}
+
+impl Drop for NothingToSave {
+    fn drop(&mut self) {
+        NOTHING_TO_SAVE.store(false, Ordering::SeqCst);
+    }
+}
+
+/// What is done about a signal.
+fn hear() {
+    if HEARD.swap(true, Ordering::SeqCst) {
+        stop("stopped at once");
+    }
+    if NOTHING_TO_SAVE.load(Ordering::SeqCst) {
+        stop("stopped");
+    }
+    tell!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
+    // Not before that is said: the last words are for what the work leaves.
+    ASKED.store(true, Ordering::SeqCst);
+    if thread::Builder::new().spawn(stop_in_time).is_err() {
+        // There is no thread for it but this one.
+        stop_in_time();
+    }
 }
 
 /// Stops work that finds no good place.
@@ -61,7 +95,9 @@ fn stop_in_time() {
 
 /// Ends the program where it is.
 fn stop(how: &str) -> ! {
-    tell!("\n{how}; {}", REMAINS.lock().unwrap_or_else(PoisonError::into_inner).words());
+    // Held to the end, so that of several threads that stop one speaks.
+    let remains = REMAINS.lock().unwrap_or_else(PoisonError::into_inner);
+    tell!("\n{how}; {}", remains.words());
     std::process::exit(EXIT_CODE.into())
 }
 

@@ -71,22 +71,22 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     experiment.check_skill_memory(game).map_err(|error| args.from.locate(games, [], error))?;
     prepare(&args.out)?;
+    let go_on = format!("the same command and {}", if args.force { "--resume instead of --force" } else { "--resume" });
+    note_unlearned(Some(checkpoint.as_path()).filter(|checkpoint| !args.force && checkpoint.exists()), &go_on);
     let dataset = read_demos(game, &experiment, &demos, args.compute.threads())?;
     if args.force {
         // Not earlier: what there is stays if there is nothing to learn from.
         remove(&checkpoint)?;
     }
-    interrupt::listen();
     let report = |epoch, metrics: &SkillMetrics| {
         if args.json { print_line(epoch_json(epoch, metrics)) } else { Ok(()) }
     };
-    let go_on = if args.force { "--resume instead of --force" } else { "--resume" };
-    interrupt::go_on_with(format!("the same command and {go_on}"));
     let own = own_options(&args);
-    let unfinished = SkillCheckpoint { path: &checkpoint, options: Options { from: &args.from, own: &own } };
+    let options = Options { from: &args.from, own: &own };
+    let unfinished = SkillCheckpoint { path: &checkpoint, options, go_on: Some(&go_on) };
     match learn(&experiment, dataset, args.compute.device(), Some(&unfinished), report)? {
         None => {
-            tell!("stopped and saved; no skill model is written yet: go on with the same command and {go_on}");
+            tell!("stopped and saved; no skill model is written yet: go on with {go_on}");
             return Ok(Outcome::Stopped);
         }
         Some(model) => {
@@ -96,6 +96,17 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     }
     Ok(Outcome::Pass)
+}
+
+/// Notes what there is before this process has learned anything, for whoever stops it while recordings are replayed: the
+/// checkpoint that it goes on with, if there is one.
+fn note_unlearned(checkpoint: Option<&Path>, go_on: &str) {
+    let (left, command) = match checkpoint {
+        Some(checkpoint) => (format!("{} is kept as it was", checkpoint.display()), go_on),
+        None => ("nothing is learned yet".to_owned(), "the same command"),
+    };
+    interrupt::leave(left);
+    interrupt::go_on_with(command.to_owned());
 }
 
 /// Where the state of an unfinished training is kept.
@@ -166,6 +177,8 @@ pub struct SkillCheckpoint<'a> {
     pub path: &'a Path,
     /// What the command line asks for, to say what differs.
     pub options: Options<'a>,
+    /// What goes on with it, once it is there, if that is another command than before.
+    pub go_on: Option<&'a str>,
 }
 
 /// The metrics of an epoch; null for what was not measured.
@@ -201,8 +214,11 @@ pub fn learn(
             bar.inc(1);
             if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        if let Some(SkillCheckpoint { path, .. }) = checkpoint {
+        if let Some(SkillCheckpoint { path, go_on, .. }) = checkpoint {
             trainer.save(path)?;
+            if let Some(command) = go_on {
+                interrupt::go_on_with((*command).to_owned());
+            }
             let epochs = counted(trainer.epochs_done(), "whole epoch");
             interrupt::leave(format!("{} is kept, after {epochs}", path.display()));
         }
@@ -240,7 +256,7 @@ fn begin(
     device: DeviceKind,
     checkpoint: Option<&SkillCheckpoint>,
 ) -> Result<SkillTrainer, CliError> {
-    let Some(SkillCheckpoint { path, options }) = checkpoint.filter(|checkpoint| checkpoint.path.exists()) else {
+    let Some(SkillCheckpoint { path, options, .. }) = checkpoint.filter(|checkpoint| checkpoint.path.exists()) else {
         return Ok(SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?);
     };
     let trainer = SkillTrainer::load(path, dataset, device).map_err(unusable)?;

@@ -29,7 +29,8 @@ pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     bar.enable_steady_tick(Duration::from_millis(250));
     if !stderr().is_terminal() {
         text_progress().push(TextProgress { title: title.to_owned(), unit: unit.to_owned(), bar: bar.downgrade() });
-        REPORTER.call_once(|| drop(thread::spawn(report)));
+        // Without a thread for it nothing is reported.
+        REPORTER.call_once(|| drop(thread::Builder::new().spawn(report)));
     }
     bar
 }

@@ -1,12 +1,10 @@
 //! `playbot quickstart`: the main job from end to end.
 
 mod first_success;
+mod folder;
 mod report;
 
-use std::{
-    path::{Path, PathBuf},
-    time::Instant,
-};
+use std::{path::PathBuf, time::Instant};
 
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::games::Games;
@@ -15,17 +13,13 @@ use playbot_lab::{
     game::Game,
     report::{statistics::steps_to_reach, to_text_table},
     runs::RunCurves,
-    train::{
-        Algorithm, Experiment, Trainer,
-        metrics_log::SUCCESS_RATE,
-        run_dir::{check_replaceable, is_unstarted, write_atomically},
-        run_lock::RunLock,
-    },
+    train::{Algorithm, Experiment, Trainer, metrics_log::SUCCESS_RATE, run_dir::write_atomically},
 };
-use playbot_learner::{Dataset, DeviceKind, SkillModel, disk};
+use playbot_learner::{Dataset, DeviceKind, SkillModel};
 use serde_json::json;
 
 use first_success::{FirstSuccess, headline, steps_of_seed};
+use folder::{check_folder, take_folder};
 use report::write_report;
 
 use super::{
@@ -123,7 +117,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     check_folder(&args.run)?;
     // Not later: where there is nothing to learn from, no folder is made.
     let demos = args.from.recordings(&experiment, games)?;
-    let dataset = read_demos(game, &experiment, &demos, args.threads.threads)?;
+    interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", program::name()));
+    let dataset = read_demos(game, &experiment, &demos, args.threads.count())?;
     let _lock = take_folder(&args.run)?;
     tell_length(&trained);
     let Some(skills) = skills(&experiment, dataset.clone(), &args)? else {
@@ -146,7 +141,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let mut rows = Vec::new();
     for (name, player) in &players {
-        let plan = EvalPlan::of(&experiment, &experiment.test, args.threads.threads);
+        let plan = EvalPlan::of(&experiment, &experiment.test, args.threads.count());
         let measured = methods::measure(game, name, player, &plan)?;
         if args.json {
             let mut line = json!(measured.summary);
@@ -179,39 +174,8 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     )?)
 }
 
-/// Only the folder of an earlier quickstart is written into again, and not while another one is at work there.
-fn check_folder(path: &Path) -> Result<(), CliError> {
-    let is_run = path.join("run.json").exists();
-    let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
-    if path.exists() && !is_unstarted(path) && (is_run || !was_ours) {
-        return Err(CliError::Usage(format!(
-            "{} holds something else than an earlier quickstart, so it is left alone: choose another --run",
-            path.display()
-        )));
-    }
-    if RunLock::is_known(path) {
-        RunLock::take(path)?;
-    }
-    for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
-        if run.exists() {
-            // Found out before skills are learned.
-            check_replaceable(&run)?;
-            RunLock::take(&run)?;
-        }
-    }
-    Ok(())
-}
-
-/// Makes the folder of the quickstart and locks it.
-fn take_folder(path: &Path) -> Result<RunLock, CliError> {
-    disk::create_dir_all(path).map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
-    Ok(RunLock::take(path)?)
-}
-
 /// Learns the skill model and saves it; `None` after Ctrl-C.
 fn skills(experiment: &Experiment, dataset: Dataset, args: &Args) -> Result<Option<SkillModel>, CliError> {
-    interrupt::listen();
-    interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", program::name()));
     let mut log = String::new();
     let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
         log.push_str(&format!("{}\n", learn_skills::epoch_json(epoch, metrics)));
@@ -233,7 +197,7 @@ fn train_one(
 ) -> Result<Trained, CliError> {
     let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
-    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.threads)?;
+    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.count())?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
     let run = create_run(&folder, game, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
     interrupt::go_on_with(format!(
@@ -282,7 +246,7 @@ fn first_success(
     let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();
     for seed in (1..args.seeds).map(|more| experiment.seed.wrapping_add(more)) {
         let experiment = Experiment { seed, ..experiment.clone() };
-        let steps = steps_of_seed(game, &experiment, &algorithms, dataset, args.threads.threads)?;
+        let steps = steps_of_seed(game, &experiment, &algorithms, dataset, args.threads.count())?;
         // The trainings are done, and their results are worth more than another seed.
         let Some(steps) = steps else { break };
         seeds.push(seed);

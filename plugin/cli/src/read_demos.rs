@@ -5,10 +5,12 @@ use std::path::Path;
 use playbot_lab::{demo::dataset::Demonstrations, game::Game, games::Games, train::Experiment};
 use playbot_learner::{Dataset, Rollout};
 
-use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::counted, progress};
+use super::{
+    error::CliError, experiment::ExperimentArgs, interrupt::NothingToSave, missing_demos, number::counted, progress,
+};
 
 /// Reads recordings, replaying them through the sensor where they keep no observations. Says first how much memory
-/// pictures will take.
+/// pictures will take. Ctrl-C ends the program: nothing is left of replays.
 ///
 /// # Errors
 ///
@@ -16,6 +18,7 @@ use super::{error::CliError, experiment::ExperimentArgs, missing_demos, number::
 /// held-out level or does not replay, or the pictures would need more memory than is free.
 pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads: usize) -> Result<Dataset, CliError> {
     experiment.check_agent(game)?;
+    let _replaying = NothingToSave::listen();
     let demos = demonstrations(game, experiment, path)?;
     let observation_config = experiment.observation_config();
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
@@ -46,6 +49,7 @@ pub fn read_rollouts(
         return Ok(Vec::new());
     }
     experiment.check()?;
+    let _replaying = NothingToSave::listen();
     let demos = demonstrations(game, experiment, &from.recordings(experiment, games)?)?;
     tell!();
     let bar = progress::bar("replay recordings", demos.steps(), "steps");

@@ -89,7 +89,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     idle.iter().for_each(|words| tell!("warning: {words}"));
     interrupt::listen();
     interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
-    let mut runner = Runner::new(games, &args.from, &folder, args.force, args.compute.device(), args.compute.threads());
+    let threads = args.compute.threads();
+    let mut runner = Runner::new(games, &args.from, &folder, args.force, args.compute.device(), threads);
     runner.check_folders(&runs)?;
     runner.check_demos(&runs)?;
     let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
@@ -100,7 +101,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return Ok(Outcome::Stopped);
     };
     write(&args.out, &report)?;
-    let cost = cost_table(&runs, &folder, &command(&args), args.compute.threads());
+    let cost = cost_table(&runs, &folder, &command(&args), threads);
     write_atomically(&args.out.join("cost.md"), cost.as_bytes())?;
     if args.json {
         report.results.iter().try_for_each(|result| print_line(json!(result)))?;

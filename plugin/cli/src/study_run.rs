@@ -260,7 +260,7 @@ impl<'a> Runner<'a> {
                 learn_skills::remove(&checkpoint)?;
             }
             let options = Options { from: self.from, own: &[] };
-            let unfinished = SkillCheckpoint { path: &checkpoint, options };
+            let unfinished = SkillCheckpoint { path: &checkpoint, options, go_on: None };
             let learned = learn_skills::learn(&run.experiment, demos, self.device, Some(&unfinished), |_, _| Ok(()))?;
             let Some(model) = learned else { return Ok(None) };
             model.save(&file)?;

@@ -4,18 +4,39 @@
 use std::borrow::Cow;
 
 use playbot_lab::brief::without_long_words;
+use serde::de::IgnoredAny;
 
-/// A text without what steers a terminal: control characters other than line feeds and tabs, and those that turn the
-/// direction of writing around, are shown as `\u{1b}` is.
-pub fn without_controls(text: &str) -> Cow<'_, str> {
-    let steers = |c: char| {
-        (c.is_control() && !matches!(c, '\n' | '\t')) || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
+/// Whether a character steers a terminal: a control character other than line feed and tab, or one that turns the direction
+/// of writing around.
+fn steers(c: char) -> bool {
+    (c.is_control() && !matches!(c, '\n' | '\t')) || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A text in which characters that steer a terminal are replaced.
+fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     if !text.contains(steers) {
         return Cow::Borrowed(text);
     }
-    let shown = |c: char| if steers(c) { c.escape_unicode().to_string() } else { c.to_string() };
-    Cow::Owned(text.chars().map(shown).collect())
+    Cow::Owned(text.chars().map(|c| if steers(c) { escape(c) } else { c.to_string() }).collect())
+}
+
+/// A text without what steers a terminal, which is shown as `\u{1b}` is.
+pub fn without_controls(text: &str) -> Cow<'_, str> {
+    replaced(text, |c| c.escape_unicode().to_string())
+}
+
+/// Data for standard output without what steers a terminal. JSON stays JSON of the same meaning: there it is written as
+/// `\u001b` is. It can only be within a text, and none of it has more than four digits.
+pub fn for_programs(data: &str) -> Cow<'_, str> {
+    if data.contains(steers) && is_json(data) {
+        return replaced(data, |c| format!("\\u{:04x}", u32::from(c)));
+    }
+    without_controls(data)
+}
+
+/// Whether a text is JSON, of one value or of several.
+fn is_json(text: &str) -> bool {
+    serde_json::Deserializer::from_str(text).into_iter::<IgnoredAny>().all(|value| value.is_ok())
 }
 
 /// Longest word that is said whole: no path or number is longer.
@@ -55,6 +76,23 @@ mod tests {
         let shown = without_controls("a\u{1b}[2Jb\u{7}\r\n\tc\u{9b}\u{202e}d");
         assert_eq!(shown, "a\\u{1b}[2Jb\\u{7}\\u{d}\n\tc\\u{9b}\\u{202e}d");
         assert!(matches!(without_controls("± 3 – Grün\n"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn json_without_controls_is_the_same_json() {
+        let evil = "a\u{202e}\u{2066}\u{9b}31m\u{7f}\u{1b}[2Jü";
+        let value = serde_json::json!({ evil: [evil, 1] });
+        for lines in [value.to_string(), format!("{value}\n{value}"), format!("{value:#}")] {
+            let shown = for_programs(&lines);
+            assert!(
+                shown.contains("a\\u202e\\u2066\\u009b31m\\u007f\\u001b[2Jü") && !shown.contains(steers),
+                "{shown}"
+            );
+            let mut values = serde_json::Deserializer::from_str(&shown).into_iter::<serde_json::Value>();
+            assert!(values.all(|read| read.expect("JSON") == value), "{shown}");
+        }
+        assert_eq!(for_programs("not JSON: \"\u{202e}\""), "not JSON: \"\\u{202e}\"");
+        assert!(matches!(for_programs("{\"a\":\"ü\"}"), Cow::Borrowed(_)));
     }
 
     #[test]

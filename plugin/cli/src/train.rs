@@ -134,6 +134,7 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         None => None,
     };
     let (device, threads) = (args.compute.device(), args.compute.threads());
+    interrupt::leave("nothing is trained yet".to_owned());
     let demos = read_rollouts(game, &experiment, &args.from, games, threads)?;
     let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &demos, device, threads)
         .map_err(|error| explain(error, args, &experiment, games))?;

@@ -1,8 +1,15 @@
 //! Text that is safe in HTML, in SVG and on a terminal.
 
+/// Whether a character stands for nothing and changes how others are shown: a control character, or one that turns the
+/// direction of writing around.
+pub(crate) fn steers(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 /// Escapes text for the content and the attributes of HTML and SVG.
 ///
-/// Control characters, which neither may hold, become U+FFFD; tabs and line feeds stay.
+/// Control characters, which neither may hold, and those that turn the direction of writing around become U+FFFD; tabs and
+/// line feeds stay.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -14,18 +21,19 @@ pub(crate) fn escape(text: &str) -> String {
             '\'' => out.push_str("&#39;"),
             '\n' | '\t' => out.push(c),
             '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
-            c if c.is_control() => out.push('\u{fffd}'),
+            c if steers(c) => out.push('\u{fffd}'),
             c => out.push(c),
         }
     }
     out
 }
 
-/// Text on one line without control characters, so that it cannot steer a terminal.
+/// Text on one line without control characters and those that turn the direction of writing around, so that it cannot steer a
+/// terminal.
 pub(crate) fn one_line(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_whitespace() { ' ' } else { c })
-        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+        .map(|c| if steers(c) { '\u{fffd}' } else { c })
         .collect()
 }
 
@@ -59,6 +67,13 @@ mod tests {
     #[test]
     fn terminals_are_not_steered() {
         assert_eq!(one_line("a\nb\u{1b}[2J"), "a b\u{fffd}[2J");
+    }
+
+    #[test]
+    fn the_direction_of_writing_is_not_turned_around() {
+        assert_eq!(one_line("a\u{202e}b\u{2066}"), "a\u{fffd}b\u{fffd}");
+        assert_eq!(escape("a\u{202e}b\u{2069}\u{9b}\u{7f}"), "a\u{fffd}b\u{fffd}\u{fffd}\u{fffd}");
+        assert_eq!(escape("ä – ש"), "ä – ש", "letters that are written from the right are letters");
     }
 
     #[test]

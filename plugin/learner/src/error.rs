@@ -117,6 +117,11 @@ impl LearnError {
     }
 }
 
+/// A number in a message, whose size takes no hundreds of zeros to say.
+pub fn brief_number(x: f64) -> String {
+    if x == 0.0 || (1e-15..1e15).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
+}
+
 /// The end of a message about numbers that ran away.
 fn after(steps: Option<u64>) -> String {
     steps.map_or(String::new(), |steps| format!(" after {steps} optimizer steps"))
@@ -252,6 +257,14 @@ impl FileError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_number_fills_a_line() {
+        let numbers = [0.0, -0.5, 1024.0, 123_456_789.5, 1e300, -2.5e15, 3e-300, f64::INFINITY, f64::NEG_INFINITY];
+        let words = ["0", "-0.5", "1024", "123456789.5", "1e300", "-2.5e15", "3e-300", "inf", "-inf"];
+        assert_eq!(numbers.map(brief_number), words);
+        assert_eq!(brief_number(f64::NAN), "NaN");
+    }
 
     #[test]
     fn the_first_row_that_is_not_finite_is_named() {

@@ -59,7 +59,7 @@ pub(crate) use among_workers::are_awake;
 pub use among_workers::{among_awake_workers, among_workers, waited};
 pub use device::{DeviceKind, UnknownDevice};
 pub use disk::{write_atomically, write_atomically_with};
-pub use error::{FileError, LearnError};
+pub use error::{FileError, LearnError, brief_number};
 pub use file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text};
 pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;

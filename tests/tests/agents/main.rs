@@ -16,6 +16,7 @@ mod level_detectors;
 mod one_world;
 mod orders;
 mod pipeline;
+mod recorded_players;
 mod recorded_rewards;
 mod recording;
 mod rewards;

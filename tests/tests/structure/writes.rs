@@ -42,8 +42,8 @@ fn opens_by_itself(code: &str) -> bool {
 /// Whether an image of the crate `image`, which Bevy turns its own into, is saved.
 fn saves_an_image(code: &str) -> bool {
     let is_of_images = ["try_into_dynamic", "DynamicImage", "RgbImage", "RgbaImage", "ImageBuffer"];
-    is_of_images.iter().any(|name| code.contains(name))
-        && [".save(", ".save_with_format("].iter().any(|save| code.contains(save))
+    is_of_images.iter().any(|name| code.contains(*name))
+        && [".save(", ".save_with_format("].iter().any(|save| code.contains(*save))
 }
 
 #[test]

@@ -87,7 +87,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let sources = sources(args, games)?;
     output::make_folder(&args.out)?;
-    let plan = MakePlan { seed: args.seed, per_kind: args.per_kind, sound: args.sound, threads: args.threads.threads };
+    let plan = MakePlan { seed: args.seed, per_kind: args.per_kind, sound: args.sound, threads: args.threads.count() };
     let bar = progress::bar("bugs make", plan.steps(&sources), "levels and mutants");
     let made = make_bugs(&sources, &plan, &|steps| bar.inc(steps));
     bar.finish_and_clear();

@@ -100,7 +100,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         .is_image()
         .then(|| Film::new(observation_config.image, args.scale, game.tick_hz()))
         .transpose()?;
-    let (steps, reach) = play(&mut episode_world, &args)?;
+    let Some((steps, reach)) = play(&mut episode_world, &args)? else {
+        tell!("stopped before tick {}; nothing is written: call it again", args.tick);
+        return Ok(Outcome::Stopped);
+    };
     let numbers = || Numbers::new(game.observation().names, args.scale, &reach);
     let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
     let (bytes, size) = if args.episode {
@@ -241,8 +244,8 @@ fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<DemoEpisode
     )))
 }
 
-/// Plays until the tick that is asked for, or to the end.
-fn play(episode_world: &mut EpisodeWorld, args: &Args) -> Result<(Vec<EpisodeStep>, Reach), CliError> {
+/// Plays until the tick that is asked for, or to the end; `None` after Ctrl-C before that tick.
+fn play(episode_world: &mut EpisodeWorld, args: &Args) -> Result<Option<(Vec<EpisodeStep>, Reach)>, CliError> {
     interrupt::listen();
     let bar = progress::bar("play", 0, "ticks");
     let (mut steps, mut reach, mut kept) = (Vec::new(), Reach::default(), 0);
@@ -269,9 +272,12 @@ fn play(episode_world: &mut EpisodeWorld, args: &Args) -> Result<(Vec<EpisodeSte
         }
     }
     bar.finish_and_clear();
+    if steps.is_empty() && interrupt::asked() {
+        return Ok(None);
+    }
     if steps.is_empty() {
         let ticks = episode_world.ticks();
         return Err(CliError::Usage(format!("there is no tick {}: the episode has {ticks} ticks, from 0", args.tick)));
     }
-    Ok((steps, reach))
+    Ok(Some((steps, reach)))
 }

@@ -1,12 +1,14 @@
 //! Tables in Markdown.
 
+use crate::escape::steers;
+
 /// Text that neither ends a cell of a table nor begins anything in Markdown.
 pub(crate) fn markdown_cell(text: &str) -> String {
     let mut out = String::new();
     for letter in text.chars() {
         match letter {
             '|' | '*' | '_' | '<' | '[' | '`' | '\\' | '#' => out.extend(['\\', letter]),
-            letter if letter.is_control() => out.push(' '),
+            letter if steers(letter) => out.push(' '),
             letter => out.push(letter),
         }
     }
@@ -25,7 +27,7 @@ mod tests {
 
     #[test]
     fn no_text_ends_its_cell_or_begins_anything() {
-        let cells = ["a|b", "*c*\n<d>"].map(str::to_owned);
-        assert_eq!(markdown_row(&cells), r"| a\|b | \*c\* \<d> |");
+        let cells = ["a|b", "*c*\n<d>", "e\u{202e}f"].map(str::to_owned);
+        assert_eq!(markdown_row(&cells), r"| a\|b | \*c\* \<d> | e f |");
     }
 }

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use playbot_learner::brief_number;
+
 use super::{
     Algorithm,
     config::{Experiment, LearnerKind},
@@ -40,7 +42,8 @@ impl Experiment {
             return refuse("checkpoints.keep", 0, "must be at least 1: the latest checkpoint stays");
         }
         if !(0.0..=1.0).contains(&self.study.threshold) {
-            return refuse("study.threshold", self.study.threshold, "a success rate lies between 0 and 1");
+            let threshold = brief_number(self.study.threshold);
+            return refuse("study.threshold", threshold, "a success rate lies between 0 and 1");
         }
         let of_image =
             |error| ExperimentError::Settings { key: Some("image".to_owned()), words: format!("`image`: {error}") };

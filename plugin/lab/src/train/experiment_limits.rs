@@ -1,6 +1,6 @@
 //! Numbers beyond which nothing useful lies: a training would not end, or its sums would not be numbers.
 
-use playbot_learner::EntropyCoef;
+use playbot_learner::{EntropyCoef, brief_number};
 
 use super::{
     config::Experiment,
@@ -48,7 +48,8 @@ impl Experiment {
         }
         for (key, value, (least, most)) in self.numbers() {
             if !(least..=most).contains(&value) {
-                return refuse(key, value, format!("must lie in {least}..{most}"));
+                let range = format!("must lie in {least}..{}", brief_number(most));
+                return refuse(key, brief_number(value), range);
             }
         }
         Ok(())
@@ -126,6 +127,8 @@ mod tests {
             let text = check(changes).expect_err(changes);
             assert!(text.starts_with(&format!("`{key}` is ")), "{changes}: {text}");
         }
+        let long = check("sac: (updates_per_step: 1e300)").expect_err("far too many");
+        assert_eq!(long, "`sac.updates_per_step` is 1e300: must lie in 0..10000");
         assert_eq!(check("ppo: (max_grad_norm: 1e9, ent_coef: 0, epochs: 100)"), Ok(()));
     }
 }

@@ -3,13 +3,14 @@
 //! What is added up is a lower bound: whatever is refused here could not have worked. Address space, which `ulimit -v` limits,
 //! must have room for what threads set aside as well: whether they get by with less is a matter of chance.
 
-use playbot_learner::{ActionSpace, ObsKind};
+use playbot_learner::{ActionSpace, ImageShape, ObsKind, nn::CnnKind};
 
 use super::{
     config::{Experiment, ExperimentError, LearnerKind},
     experiment_error::refuse,
     free_memory::{free_memory, space_left},
     free_threads::ThreadLimit,
+    memory_of_convolutions::convolution_numbers,
     memory_parts::{Part, Room, check_parts, product, threads_part, worlds_part},
 };
 use crate::{arrangement::Arrangement, game::Game, sensors::GameSensors};
@@ -19,7 +20,7 @@ const LEARNED: u64 = 16;
 
 /// Sizes of what the game shows and takes.
 struct Sizes {
-    is_image: bool,
+    image: Option<ImageShape>,
     /// Bytes of an observation.
     observation: u64,
     /// Numbers of an observation that a layer reads; 0 for images, which are read by convolutions.
@@ -27,6 +28,18 @@ struct Sizes {
     /// Numbers that stand for an action, and those that say how it is drawn.
     action: u64,
     outputs: u64,
+}
+
+impl Sizes {
+    /// What so many networks' convolutions learn, where there are pictures.
+    fn convolutions(&self, cnn: &CnnKind, networks: u64, key: &str) -> Option<Part> {
+        let numbers = convolution_numbers(cnn, self.image?);
+        Some(Part {
+            what: format!("convolutions of {networks} × {numbers} numbers with gradients and moments"),
+            bytes: product(&[numbers, networks, LEARNED]),
+            keys: key.to_owned(),
+        })
+    }
 }
 
 impl Experiment {
@@ -47,7 +60,7 @@ impl Experiment {
     ///
     /// As there.
     pub fn check_skill_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        let mut parts = Vec::from(self.skill_parts(&self.sizes(game)));
+        let mut parts = self.skill_parts(&self.sizes(game));
         check_parts(&parts, free_memory())?;
         parts.push(threads_part(0));
         check_parts(&parts, space_left())
@@ -91,20 +104,22 @@ impl Experiment {
 
     fn sizes(&self, game: &dyn Game) -> Sizes {
         let kind: ObsKind = self.observation_config().obs_kind(game);
-        let is_image = self.observation_config().is_image();
         let numbers = kind.numbers() as u64;
         let (action, outputs) = match game.actions() {
             ActionSpace::Discrete(choices) => (choices as u64, choices as u64),
             ActionSpace::Continuous(dims) => (dims as u64, 2 * dims as u64),
         };
-        let (observation, inputs) = if is_image { (numbers, 0) } else { (numbers.saturating_mul(4), numbers) };
-        Sizes { is_image, observation, inputs, action, outputs }
+        let (image, observation, inputs) = match kind {
+            ObsKind::Image(shape) => (Some(shape), numbers, 0),
+            ObsKind::Vector(_) => (None, numbers.saturating_mul(4), numbers),
+        };
+        Sizes { image, observation, inputs, action, outputs }
     }
 
     fn rollout_part(&self, sizes: &Sizes) -> Part {
         let (arenas, steps, observation) = (u64::from(self.arenas), self.rollout_steps() as u64, sizes.observation);
         let learner = self.algorithm.learner().key();
-        let image = if sizes.is_image { ", `image.width`, `image.height` or `image.stack`" } else { "" };
+        let image = if sizes.image.is_some() { ", `image.width`, `image.height` or `image.stack`" } else { "" };
         Part {
             what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes"),
             bytes: product(&[arenas, steps, observation]),
@@ -112,7 +127,7 @@ impl Experiment {
         }
     }
 
-    fn ppo_parts(&self, sizes: &Sizes) -> [Part; 2] {
+    fn ppo_parts(&self, sizes: &Sizes) -> Vec<Part> {
         let inputs = sizes.inputs.saturating_add(self.latent());
         let (actor, key) = match self.algorithm.needs_skills() && self.score.init_from_decoder {
             true => (&self.skills.hidden, "`skills.hidden` or `ppo.hidden`"),
@@ -121,7 +136,9 @@ impl Experiment {
         let numbers = layers(inputs, actor, sizes.outputs).saturating_add(layers(inputs, &self.ppo.hidden, 1));
         let rows = product(&[u64::from(self.arenas), self.ppo.num_steps as u64]) / (self.ppo.minibatches as u64).max(1);
         let row = sizes.observation.saturating_add(product(&[4, sum(actor).saturating_add(sum(&self.ppo.hidden))]));
-        [networks(numbers, key), minibatch(rows, row, "`ppo.hidden`; or more `ppo.minibatches`")]
+        let mut parts = vec![networks(numbers, key), minibatch(rows, row, "`ppo.hidden`; or more `ppo.minibatches`")];
+        parts.extend(sizes.convolutions(&self.ppo.cnn, 1, "`ppo.cnn`"));
+        parts
     }
 
     fn sac_parts(&self, sizes: &Sizes) -> [Part; 3] {
@@ -151,7 +168,7 @@ impl Experiment {
         [networks(numbers, key), minibatch(sac.batch as u64, row, &row_keys), buffer]
     }
 
-    fn skill_parts(&self, sizes: &Sizes) -> [Part; 2] {
+    fn skill_parts(&self, sizes: &Sizes) -> Vec<Part> {
         let skills = &self.skills;
         let (latent, gru, encoder) = (skills.latent as u64, skills.gru_hidden as u64, skills.encoder_hidden as u64);
         let first = layers(sizes.inputs.saturating_add(sizes.action), &[skills.encoder_hidden], 0);
@@ -166,10 +183,14 @@ impl Experiment {
             .saturating_add(product(&[4, gru, skills.gru_layers as u64]))
             .saturating_add(4 * encoder.min(u64::MAX / 4));
         let rows = product(&[skills.batch as u64, skills.window as u64]);
+        // Encoder, decoder and prior have convolutions of their own.
+        let convolutions = sizes.convolutions(&skills.cnn, 3, "`skills.cnn`");
         let keys =
             "`skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden`, `skills.gru_layers`, `skills.latent`";
         let numbers = numbers.iter().fold(0u64, |sum, part| sum.saturating_add(*part));
-        [networks(numbers, keys), minibatch(rows, row, "`skills.batch`, `skills.window` or the sizes of its networks")]
+        let row_keys =
+            "`skills.batch`, `skills.window`, `skills.encoder_hidden`, `skills.gru_hidden` or `skills.gru_layers`";
+        [networks(numbers, keys), minibatch(rows, row, row_keys)].into_iter().chain(convolutions).collect()
     }
 
     /// Numbers of a skill that the policy reads.

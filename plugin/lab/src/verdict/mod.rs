@@ -33,6 +33,7 @@ mod merge;
 mod overview;
 mod places;
 mod plan;
+mod plan_memory;
 mod play;
 mod played;
 mod report_files;

@@ -10,7 +10,7 @@ use super::{
     shard::Shard,
     tester::{Tester, TesterRecord},
 };
-use crate::{detectors::Detectors, game::Game, split::LevelSplit};
+use crate::{detectors::Detectors, eval::EvalError, game::Game, split::LevelSplit};
 
 /// How to test.
 #[derive(Clone)]
@@ -64,11 +64,11 @@ pub struct TestRecord {
 }
 
 impl TestPlan {
-    /// Checks that somebody tests something, and that testers can be told apart.
+    /// Checks that somebody tests something, that testers can be told apart, and that there is room for what is kept.
     ///
     /// # Errors
     ///
-    /// [`TestError::NoTester`], [`TestError::SameName`] or [`TestError::EmptyShard`].
+    /// [`TestError::NoTester`], [`TestError::SameName`], [`TestError::EmptyShard`], or [`TestError::Eval`] with what to lower.
     pub fn check(&self) -> Result<(), TestError> {
         if self.testers.is_empty() {
             return Err(TestError::NoTester);
@@ -82,7 +82,7 @@ impl TestPlan {
             Some(shard) if shard.places(self.split.len()).next().is_none() => {
                 Err(TestError::EmptyShard { shard, range: self.split.to_string(), length: self.split.len() })
             }
-            _ => Ok(()),
+            _ => self.check_memory().map_err(|error| EvalError::from(error).into()),
         }
     }
 

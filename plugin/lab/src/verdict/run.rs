@@ -3,6 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Mutex, MutexGuard, PoisonError},
+    thread::{self, Builder},
 };
 
 use super::{
@@ -98,9 +99,10 @@ pub fn run_tests_keeping(
     let shared = Shared { next: 0, open: BTreeMap::new(), keep, failure: None, is_stopped: false };
     let shared = Mutex::new(shared);
     let threads = plan.threads.clamp(1, (portions.len() * plan.testers.len()).max(1));
-    std::thread::scope(|scope| {
+    thread::scope(|scope| {
         for _ in 1..threads {
-            scope.spawn(|| work(game, plan, &portions, &shared, watch, files));
+            // Where the system starts fewer threads, it takes longer.
+            let _ = Builder::new().spawn_scoped(scope, || work(game, plan, &portions, &shared, watch, files));
         }
         work(game, plan, &portions, &shared, watch, files);
     });

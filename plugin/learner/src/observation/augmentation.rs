@@ -40,7 +40,9 @@ impl Augmentation {
             Self::ColorJitter(share) if !(share > 0.0 && share < 1.0) => {
                 bad("needs a share above 0 and below 1".into())
             }
-            Self::Keep(rows, columns) if !((1..=shape.height).contains(&rows) && (1..=shape.width).contains(&columns)) => {
+            Self::Keep(rows, columns)
+                if !((1..=shape.height).contains(&rows) && (1..=shape.width).contains(&columns)) =>
+            {
                 bad(format!("must keep 1 to {} rows and 1 to {} columns", shape.height, shape.width))
             }
             Self::Cutout(share) if !(share > 0.0 && share <= 1.0) => bad("needs a share above 0 and up to 1".into()),

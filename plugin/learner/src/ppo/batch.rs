@@ -53,16 +53,19 @@ impl JoinedRows {
     }
 }
 
-/// The rows of each minibatch of an update: those of the rollout in an order that each epoch draws anew, in equal parts.
-pub(super) fn minibatches(config: &PpoConfig, n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<usize>> {
-    let parts = config.minibatches.min(n);
+/// The rows of each minibatch of an update: those of the rollout in an order that each epoch draws anew, in equal parts. Only
+/// those of one epoch are in memory.
+pub(super) fn minibatches<'a>(
+    config: &PpoConfig,
+    n: usize,
+    rng: &'a mut ChaCha8Rng,
+) -> impl Iterator<Item = Vec<usize>> + use<'a> {
+    let (epochs, parts) = (config.epochs, config.minibatches.min(n));
     let mut rows: Vec<usize> = (0..n).collect();
-    let mut all = Vec::with_capacity(config.epochs * parts);
-    for _ in 0..config.epochs {
+    (0..epochs).flat_map(move |_| {
         shuffle(&mut rows, rng);
-        all.extend((0..parts).map(|part| rows[part * n / parts..(part + 1) * n / parts].to_vec()));
-    }
-    all
+        (0..parts).map(|part| rows[part * n / parts..(part + 1) * n / parts].to_vec()).collect::<Vec<_>>()
+    })
 }
 
 impl Batch<'_> {

@@ -1,5 +1,6 @@
 //! Settings of PPO.
 
+use crate::error::brief_number;
 use crate::nn::{Activation, CnnKind};
 use crate::norm::{RewardNormalizer, RewardReset};
 use crate::{Augmentation, LearnError, ObsKind, TimeLimit};
@@ -128,12 +129,12 @@ impl PpoConfig {
         let positive =
             [("lr", self.lr), ("clip", self.clip), ("max_grad_norm", self.max_grad_norm), ("adam_eps", self.adam_eps)];
         if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
-            return bad(format!("ppo {name} must be positive, not {x}"));
+            return bad(format!("ppo {name} must be positive, not {}", brief_number(*x)));
         }
         let reward_gamma = self.reward_gamma.unwrap_or(self.gamma);
         let shares = [("gamma", self.gamma), ("lambda", self.lambda), ("reward_gamma", reward_gamma)];
         if let Some((name, x)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
-            return bad(format!("ppo {name} must lie in 0..1, not {x}"));
+            return bad(format!("ppo {name} must lie in 0..1, not {}", brief_number(*x)));
         }
         let weights = [("vf_coef", self.vf_coef), ("ent_coef", self.ent_coef)];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !x.is_finite()) {
@@ -141,7 +142,7 @@ impl PpoConfig {
         }
         let at_least_0 = [("weight_decay", self.weight_decay), ("augment_coef", self.augment_coef)];
         if let Some((name, x)) = at_least_0.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
-            return bad(format!("ppo {name} must not be negative, but is {x}"));
+            return bad(format!("ppo {name} must not be negative, but is {}", brief_number(*x)));
         }
         if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
             return bad("ppo anneal_lr needs total_updates".into());

@@ -1,5 +1,6 @@
 //! Settings of SAC.
 
+use crate::error::brief_number;
 use crate::nn::Activation;
 use crate::{ActionSpace, LearnError, TimeLimit};
 use serde::{Deserialize, Serialize};
@@ -154,25 +155,26 @@ impl SacConfig {
             ("adam_eps", self.adam_eps),
         ];
         if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
-            return bad(format!("sac {name} must be positive, not {x}"));
+            return bad(format!("sac {name} must be positive, not {}", brief_number(*x)));
         }
         let shares = [("gamma", self.gamma), ("tau", self.tau)];
         if let Some((name, x)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
-            return bad(format!("sac {name} must lie in 0..1, not {x}"));
+            return bad(format!("sac {name} must lie in 0..1, not {}", brief_number(*x)));
         }
         let (low, high) = self.log_std;
         if !(low < high && low.abs() <= 20.0 && high.abs() <= 20.0) {
+            let (low, high) = (brief_number(low), brief_number(high));
             return bad(format!("sac log_std must be two ascending numbers within ±20, not {low} and {high}"));
         }
         match self.entropy {
             EntropyCoef::Auto { initial, .. } if !(initial > 0.0 && initial.is_finite()) => {
-                bad(format!("sac entropy initial must be positive, not {initial}"))
+                bad(format!("sac entropy initial must be positive, not {}", brief_number(initial)))
             }
             EntropyCoef::Auto { target_scale: Some(scale), .. } if !scale.is_finite() => {
                 bad(format!("sac entropy target_scale must be finite, not {scale}"))
             }
             EntropyCoef::Fixed(temperature) if !(temperature >= 0.0 && temperature.is_finite()) => {
-                bad(format!("sac entropy must not be negative, but is {temperature}"))
+                bad(format!("sac entropy must not be negative, but is {}", brief_number(temperature)))
             }
             _ => Ok(()),
         }

@@ -2,6 +2,7 @@
 
 use super::SacConfig;
 use crate::LearnError;
+use crate::error::brief_number;
 use serde::{Deserialize, Serialize};
 
 /// What RLPD adds to SAC (Ball et al. 2023, "Efficient online reinforcement learning with offline data"): recordings in each
@@ -33,7 +34,7 @@ impl RlpdConfig {
     /// [`LearnError::Config`] names the first setting that cannot.
     pub fn validate(&self) -> Result<(), LearnError> {
         if !(self.demo_share > 0.0 && self.demo_share < 1.0) {
-            let text = format!("rlpd demo_share must lie between 0 and 1, not {}", self.demo_share);
+            let text = format!("rlpd demo_share must lie between 0 and 1, not {}", brief_number(self.demo_share));
             return Err(LearnError::Config(text));
         }
         let with = self.over(SacConfig::default()).validate();

@@ -1,5 +1,6 @@
 //! Settings of SCORE.
 
+use crate::error::brief_number;
 use crate::skill::SkillDraw;
 use crate::{ActionSpace, LearnError};
 use serde::{Deserialize, Serialize};
@@ -138,7 +139,7 @@ impl ScoreConfig {
         }
         let coefs = [("kl_coef", self.kl_coef), ("kl_coef_end", self.kl_coef_end.unwrap_or(0.0))];
         if let Some((name, x)) = coefs.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
-            return bad(format!("score {name} must not be negative, but is {x}"));
+            return bad(format!("score {name} must not be negative, but is {}", brief_number(*x)));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Settings of the skill model.
 
 use super::{ActionInput, WindowRule};
+use crate::error::brief_number;
 use crate::nn::CnnKind;
 use crate::policy::StdKind;
 use crate::{ActionSpace, Augmentation, LearnError, ObsKind};
@@ -160,14 +161,15 @@ impl SkillConfig {
         }
         let positive = [("lr", self.lr), ("max_grad_norm", self.max_grad_norm)];
         if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
-            return Err(LearnError::Config(format!("skill {name} must be positive, not {x}")));
+            return Err(LearnError::Config(format!("skill {name} must be positive, not {}", brief_number(*x))));
         }
         if !(0.0..1.0).contains(&self.action_noise) {
-            let found = self.action_noise;
+            let found = brief_number(self.action_noise);
             return Err(LearnError::Config(format!("skill action_noise must be at least 0 and below 1, not {found}")));
         }
         if !(0.0..=0.9).contains(&self.held_out) {
-            return Err(LearnError::Config(format!("skill held_out must lie in 0..0.9, not {}", self.held_out)));
+            let found = brief_number(self.held_out);
+            return Err(LearnError::Config(format!("skill held_out must lie in 0..0.9, not {found}")));
         }
         match self.patience {
             Some(0) => return Err(LearnError::Config("skill patience must be at least 1".to_owned())),
@@ -185,7 +187,7 @@ impl SkillConfig {
             ("state_weight", self.state_weight),
         ];
         if let Some((name, x)) = weights.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
-            return Err(LearnError::Config(format!("skill {name} must not be negative, but is {x}")));
+            return Err(LearnError::Config(format!("skill {name} must not be negative, but is {}", brief_number(*x))));
         }
         Ok(())
     }

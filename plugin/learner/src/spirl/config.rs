@@ -1,6 +1,7 @@
 //! Settings of SPiRL.
 
 use crate::LearnError;
+use crate::error::brief_number;
 use serde::{Deserialize, Serialize};
 
 /// Hyperparameters of SPiRL beside those of the learner of skills, PPO or SAC, and the ticks for which a skill is held
@@ -31,10 +32,11 @@ impl SpirlConfig {
     pub fn validate(&self) -> Result<(), LearnError> {
         let bad = |text: String| Err(LearnError::Config(text));
         if !(self.kl_coef > 0.0 && self.kl_coef.is_finite()) {
-            return bad(format!("spirl kl_coef must be positive, not {}", self.kl_coef));
+            return bad(format!("spirl kl_coef must be positive, not {}", brief_number(self.kl_coef)));
         }
         match self.target_kl {
             Some(target) if !(target > 0.0 && target.is_finite()) => {
+                let target = brief_number(target);
                 bad(format!("spirl target_kl must be positive, not {target}; `None` leaves kl_coef as it is"))
             }
             _ => Ok(()),

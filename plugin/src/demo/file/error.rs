@@ -38,7 +38,7 @@ impl DemoFileError {
 fn advised(fault: &DemoFault, path: &Path) -> String {
     let name = path.display().to_string();
     let word = if name.contains(char::is_whitespace) { format!("'{name}'") } else { name };
-    fault.to_string().replace("demo repair FILE`", &format!("demo repair {word}`"))
+    fault.to_string().replace("`playbot demo repair FILE", &format!("`playbot demo repair {word}"))
 }
 
 /// The ways a demonstration file can be wrong.
@@ -99,6 +99,15 @@ pub enum DemoFault {
          run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
     )]
     HeaderChecksum,
+    /// The header is damaged, and so is its copy, so that nothing in the file says what its episodes are of.
+    #[error(
+        "{what}; no copy of its header is sound either: take that of another recording of the same game, mode and version with \
+         `playbot demo repair FILE --header-from OTHER`"
+    )]
+    HeaderLost {
+        /// What is wrong with the header, in words.
+        what: String,
+    },
     /// A value in the header makes no sense.
     #[error("header field `{field}`: {why}")]
     HeaderValue {
@@ -258,6 +267,18 @@ pub enum DemoFault {
 }
 
 impl DemoFault {
+    /// This fault where it is known that the copy of the header is no help.
+    pub(super) fn without_copy(self) -> Self {
+        match self {
+            Self::NotADemo { .. } | Self::HeaderLine { .. } | Self::HeaderSyntax { .. } | Self::HeaderChecksum => {
+                let words = self.to_string();
+                let what = words.split("; run `playbot demo repair").next().unwrap_or_default();
+                Self::HeaderLost { what: what.to_owned() }
+            }
+            other => other,
+        }
+    }
+
     /// For `map_err`: what was tried when the operating system refused.
     pub(super) fn io(action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Io { action, source }

@@ -118,7 +118,7 @@ fn load(mut file: &File, path: &Path, header_from: Option<&Path>) -> Result<Load
     let (header, start, from) = match (second_header::recover(&input), header_from) {
         (Some((header, start)), _) => (header, start, path.to_owned()),
         (None, Some(other)) => (DemoReader::open(other)?.header().clone(), 0, other.to_owned()),
-        (None, None) => return Err(at_input(fault)),
+        (None, None) => return Err(at_input(fault.without_copy())),
     };
     let top = preamble::encode(&header).map_err(at_input)?;
     Ok(Loaded { input, header, top, start, header_from: Some(from) })

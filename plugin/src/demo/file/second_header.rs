@@ -80,7 +80,9 @@ mod tests {
         fs::write(&path, bytes).expect("written");
         let out = folder.path().join("mended.demo");
         let error = repair(&path, &out, None).expect_err("nothing says what it is").to_string();
-        assert!(error.contains("--header-from"), "{error}");
+        let advice = format!("`playbot demo repair {} --header-from OTHER`", path.display());
+        assert!(error.contains("not a demonstration file: ") && error.contains(&advice), "{error}");
+        assert_eq!(error.matches("demo repair").count(), 1, "what was tried is not advised again: {error}");
         assert_eq!(repair(&path, &out, Some(&other)).expect("it fits").kept_episodes, 1);
         let read = DemoReader::open(&out).and_then(DemoReader::read_all).expect("sound");
         assert_eq!(read, [episode(1, 3)]);

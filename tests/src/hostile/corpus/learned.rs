@@ -7,7 +7,7 @@ use playbot_lab::{
     prelude::*,
     train::{Algorithm, TrainedLearner, checkpoint::CheckpointChoice, run_dir::RunDir},
 };
-use playbot_learner::{DeviceKind, FileError, Learner as _, PolicyCard, PolicyFile, SkillModel, SkillTrainer};
+use playbot_learner::{DeviceKind, FileError, PolicyCard, PolicyFile, SkillModel, SkillTrainer};
 
 use crate::{
     Corridor,
@@ -36,7 +36,9 @@ pub(super) fn learned(folder: &Path) -> Vec<FileKind> {
         let run = folder.join(format!("run-{algorithm}"));
         train(&run, small::trainer(algorithm), None);
         let last = RunDir::open(&run).expect("a run").run.checkpoint(CheckpointChoice::Last).expect("saved");
-        move |path: &Path| drop(fs::copy(last.learner_file(), path).expect("copied"))
+        move |path: &Path| {
+            fs::copy(last.learner_file(), path).expect("copied");
+        }
     };
     vec![
         kind("skill model", &|path| small::skills().model().save(path).expect("written"), skill_model),

@@ -1,6 +1,5 @@
 //! Recordings are replayed before eyes.
 
-use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
 use playbot_tests::PaintedCorridor;
 
 use super::corridor::{demonstrations, experiment, record};

@@ -1,6 +1,9 @@
 //! Setting all testers on all subjects, on all cores.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::{
+    sync::{Mutex, MutexGuard, PoisonError},
+    thread::{self, Builder},
+};
 
 use bevy_playbot::panics::hear;
 
@@ -74,9 +77,10 @@ impl<'a> ScoreRun<'a> {
         let open: Vec<(&Case, &Contestant)> = self.all().filter(is_open).collect();
         let threads = self.plan.threads.clamp(1, open.len().max(1));
         let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             for _ in 1..threads {
-                scope.spawn(|| self.work(&open, &shared, watch));
+                // Where the system starts fewer threads, it takes longer.
+                let _ = Builder::new().spawn_scoped(scope, || self.work(&open, &shared, watch));
             }
             self.work(&open, &shared, watch);
         });

@@ -152,6 +152,9 @@ fn no_size_is_too_large_to_be_added_up() {
         ("score-ppo", "skills: (gru_layers: 4294967295), demos: \"d\"".to_owned(), "`skills.gru_layers`"),
         ("score-ppo", "skills: (hidden: [4294967295]), demos: \"d\"".to_owned(), "`skills.hidden`"),
         ("bc", format!("skills: (batch: {most}, window: {most}), demos: \"d\""), "`skills.batch`"),
+        ("ppo", format!("observation: Raster, ppo: (cnn: Impala(channels: [{most}]))"), "`ppo.cnn`"),
+        ("ppo", format!("observation: Raster, ppo: (cnn: Nature(feature: {most}))"), "`ppo.cnn`"),
+        ("bc", format!("observation: Raster, skills: (cnn: Nature(feature: {most})), demos: \"d\""), "`skills.cnn`"),
         ("ppo", "arenas: 400000, worlds: 400000, ppo: (num_steps: 1, minibatches: 1)".to_owned(), "`worlds`"),
     ] {
         let text = check(algorithm, &changes, 16 << 30).expect_err(&changes);
