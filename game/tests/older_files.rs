@@ -87,7 +87,8 @@ fn a_run_plays_as_it_did() {
 
 #[test]
 fn a_policy_file_plays_as_it_did() {
-    measures_as_then(&["--policy", "bot.policy", "--levels", "umaze:8..9"], "policy.json");
+    let args = ["--policy", "bot.policy", "--levels", "umaze:8..9", "--episodes-per-level", "4"];
+    measures_as_then(&args, "policy.json");
 }
 
 #[test]

@@ -9,7 +9,9 @@ use bevy_playbot::{
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 
 /// Replaces some of an agent's actions, or shakes them, whoever decided.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug)]
 pub(super) struct ActionNoise {
     noise: f64,
     rng: ChaCha8Rng,

@@ -267,8 +267,8 @@ mod tests {
         let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
         let observation_config = ObservationConfig { kind: ObservationKind::Raster, image };
         let demos = Demonstrations { observation_config, ..all(std::iter::once(episode)) };
-        assert!(demos.check_room(10 * 48 << 20).is_ok());
-        let error = demos.check_room((10 * 48 << 20) - 1).expect_err("too large").to_string();
+        assert!(demos.check_room((10 * 48) << 20).is_ok());
+        let error = demos.check_room(((10 * 48) << 20) - 1).expect_err("too large").to_string();
         for words in ["0.5 GiB", "`demo_steps`", "1024×1024 colour pictures of the raster, 16 in a stack"] {
             assert!(error.contains(words), "{error}");
         }

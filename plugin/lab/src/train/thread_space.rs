@@ -64,10 +64,10 @@ mod tests {
     #[test]
     fn each_thread_has_a_stack_and_a_heap_of_its_own_as_long_as_there_are_any() {
         let new = Threads { cores: 2, heaps: 16, running: 1 };
-        assert_eq!(new.coming(), 5);
-        assert_eq!(new.space(0), 5 * (STACK + HEAP) + ANY_WORK);
-        assert_eq!(new.space(10), 15 * (STACK + HEAP) + ANY_WORK);
-        let most = 105 * STACK + 15 * HEAP + ANY_WORK;
+        assert_eq!(new.coming(), 6);
+        assert_eq!(new.space(0), 6 * (STACK + HEAP) + ANY_WORK);
+        assert_eq!(new.space(9), 15 * (STACK + HEAP) + ANY_WORK);
+        let most = 106 * STACK + 15 * HEAP + ANY_WORK;
         assert_eq!(new.space(100), most, "two cores have 16 heaps, of which one is there");
         assert_eq!(new.space(u64::MAX), u64::MAX);
         assert_eq!(allowed_cores("Threads:\t6\nCpus_allowed:\t7,0000000f\nCpus_allowed_list:\t0-3\n"), Some(7));

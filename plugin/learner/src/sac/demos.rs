@@ -110,9 +110,9 @@ mod tests {
                 let recorded = |row: &usize| drawn.obs[*row] > 0.0;
                 assert_eq!((drawn.len(), (0..batch).filter(recorded).count()), (batch, expected));
                 // What was seen, done and earned go together.
-                for row in 0..batch {
-                    let whole = if recorded(&row) { (1, 5.0) } else { (0, 0.0) };
-                    assert_eq!((actions[row], drawn.rewards[row]), whole);
+                for (row, paid) in actions.iter().zip(&drawn.rewards).enumerate() {
+                    let whole = if recorded(&row) { (&1, &5.0) } else { (&0, &0.0) };
+                    assert_eq!(paid, whole);
                 }
                 seen.extend_from_slice(&drawn.obs);
             }

@@ -1,7 +1,7 @@
 //! A trainer's complete state in one file.
 
 use super::held_out::Best;
-use super::trainer::told_numbers;
+use super::state_heads::told_numbers;
 use super::{Dataset, SkillDescription, SkillNets, SkillTrainer, StateHeads};
 use crate::file::{FileKind, TensorFile};
 use crate::norm::{put_obs_stats, take_obs_stats};

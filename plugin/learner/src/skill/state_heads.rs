@@ -6,10 +6,10 @@
 //! learned and no longer: the model reads pictures alone. (An auxiliary task as in Jaderberg et al. 2017, "Reinforcement
 //! learning with unsupervised auxiliary tasks", with what only the simulator knows as its target.)
 
-use super::{Dataset, SkillForward};
-use crate::nn::{Linear, ParamSource, ParamVisitor, Parameters, RandomInit, path};
+use super::{Dataset, SkillConfig, SkillForward, SkillTrainer, Window};
+use crate::nn::{Linear, ParamSource, ParamVisitor, Parameters, RandomInit, matrix, path};
 use crate::rng::Streams;
-use crate::{LearnError, ObsKind};
+use crate::{LearnError, ObsKind, Observations};
 use burn::tensor::{Device, Tensor};
 use std::sync::Arc;
 
@@ -55,6 +55,34 @@ impl StateHeads {
     }
 }
 
+impl SkillTrainer {
+    /// The squared error with which the state of `windows` of `dataset` is told, `[1]`, where it is to be.
+    pub(super) fn state_error(
+        &self,
+        dataset: &Dataset,
+        windows: &[Window],
+        forward: &SkillForward,
+    ) -> Result<Option<Tensor<1>>, LearnError> {
+        let (Some(heads), Some(states), Some(stats)) = (&self.nets.state_heads, &dataset.states, &self.state_stats)
+        else {
+            return Ok(None);
+        };
+        let steps = self.config.window;
+        let (Observations::Vector(values), _) = states.gather(windows, steps)? else {
+            return Err(LearnError::Config("states are vectors".to_owned()));
+        };
+        let rows = steps * windows.len();
+        let states = matrix(stats.normalize(&values), rows, states.obs_dim(), &self.device.plain());
+        Ok(Some(heads.error(forward, &states)))
+    }
+}
+
+/// Numbers of the state that is told of each picture, if it is to be.
+pub(super) fn told_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
+    let states = dataset.states.as_ref().filter(|_| config.state_weight > 0.0)?;
+    Some(states.obs_dim())
+}
+
 impl Parameters for StateHeads {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         self.decoder.visit(&path(prefix, "decoder"), visitor);
@@ -64,7 +92,7 @@ impl Parameters for StateHeads {
 
 impl Dataset {
     /// Adds what the game's vector sensor saw of the same steps, for
-    /// [`SkillConfig::state_weight`](super::SkillConfig::state_weight).
+    /// [`SkillConfig::state_weight`].
     ///
     /// # Errors
     /// [`LearnError::Config`] if `states` holds no vectors, [`LearnError::Shape`] if it holds other episodes.

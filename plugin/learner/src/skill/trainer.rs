@@ -2,6 +2,7 @@
 
 use super::held_out::{Best, HeldOut};
 use super::metrics::{MetricSums, accuracy};
+use super::state_heads::told_numbers;
 use super::{
     Dataset, SkillConfig, SkillDescription, SkillForward, SkillMetrics, SkillModel, SkillNets, StateHeads, Window,
     skill_loss,
@@ -44,7 +45,7 @@ pub struct SkillTrainer {
     /// How the networks see observations, if not raw.
     pub(super) stats: Option<Arc<ObsStats>>,
     /// How they tell states, if they do.
-    state_stats: Option<ObsStats>,
+    pub(super) state_stats: Option<ObsStats>,
     pub(super) nets: SkillNets,
     pub(super) adam: Adam,
     pub(super) streams: Streams,
@@ -251,26 +252,6 @@ impl SkillTrainer {
         norm.is_finite().then_some(norm).ok_or_else(lost)
     }
 
-    /// The squared error with which the state of `windows` of `dataset` is told, `[1]`, where it is to be.
-    pub(super) fn state_error(
-        &self,
-        dataset: &Dataset,
-        windows: &[Window],
-        forward: &SkillForward,
-    ) -> Result<Option<Tensor<1>>, LearnError> {
-        let (Some(heads), Some(states), Some(stats)) = (&self.nets.state_heads, &dataset.states, &self.state_stats)
-        else {
-            return Ok(None);
-        };
-        let steps = self.config.window;
-        let (Observations::Vector(values), _) = states.gather(windows, steps)? else {
-            return Err(LearnError::Config("states are vectors".to_owned()));
-        };
-        let rows = steps * windows.len();
-        let states = matrix(stats.normalize(&values), rows, states.obs_dim(), &self.device.plain());
-        Ok(Some(heads.error(forward, &states)))
-    }
-
     /// The networks on windows of `dataset`, with draws of skills from `noise`; images are changed if `changes` are given.
     pub(super) fn forward_of(
         &self,
@@ -301,10 +282,4 @@ impl SkillTrainer {
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
     }
-}
-
-/// Numbers of the state that is told of each picture, if it is to be.
-pub(super) fn told_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
-    let states = dataset.states.as_ref().filter(|_| config.state_weight > 0.0)?;
-    Some(states.obs_dim())
 }

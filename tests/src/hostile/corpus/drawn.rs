@@ -32,7 +32,7 @@ pub(super) fn drawn(folder: &Path) -> Vec<FileKind> {
     };
     let request = LevelRequest { mode: None, map: None, file: None, seed: Some(7), picture: false };
     let hard = LevelRequest { mode: Some("hard"), ..request };
-    let medium = LevelRequest { map: Some("medium"), ..request };
+    let medium = LevelRequest { map: Some("medium"), seed: None, ..request };
     let level = |game: &dyn Game, request: &LevelRequest| game.show_level(request).expect("a level").json;
     let experiment = small::experiment(Algorithm::ScorePpo).to_ron().expect("Unicode");
     vec![
