@@ -1,10 +1,8 @@
-//! Disks as a power cut leaves them, made from what a program [did to one](DiskRecording).
+//! Disks as a power cut leaves them, made from what a program [did to one](playbot_learner::disk::DiskRecording).
 //!
 //! The model is that of today's file systems with a journal: names and folders change in the order in which the program
 //! changed them; the bytes of a file are sure only once they were brought to the disk, and until then may be there, be gone,
 //! or be there in part.
-//!
-//! [`DiskRecording`]: playbot_learner::disk::DiskRecording
 
 use std::{
     collections::BTreeMap,
