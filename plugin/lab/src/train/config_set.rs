@@ -85,6 +85,7 @@ mod tests {
     fn keys_that_are_not_written_as_long_as_they_do_nothing_can_be_set() {
         let sets = [
             "skills.held_out=0.1",
+            "skills.anneal_lr=true",
             "skills.patience=3",
             "skills.weight_decay=0.01",
             "skills.augment=[Translate(2)]",
@@ -92,6 +93,7 @@ mod tests {
         ];
         let skills = experiment().with_set(&sets).expect("known keys").skills;
         assert_eq!((skills.held_out, skills.patience, skills.weight_decay), (0.1, Some(3), 0.01));
+        assert!(skills.anneal_lr);
         assert_eq!(skills.state_weight, 2.0);
         assert_eq!(skills.augment.len(), 1);
         let older = experiment().with_set(&["sac.alpha_lr=0.5"]).expect("an older name");

@@ -45,6 +45,10 @@ pub struct SkillConfig {
     pub gru_layers: usize,
     /// Learning rate of Adam.
     pub lr: f64,
+    /// Whether the rate falls in a line to nothing over all epochs, so that the last batches settle what the first have
+    /// found.
+    #[serde(skip_serializing_if = "is_false")]
+    pub anneal_lr: bool,
     /// Windows per batch.
     pub batch: usize,
     /// Passes over the demonstrations.
@@ -106,6 +110,11 @@ fn is_zero(number: &f64) -> bool {
     *number == 0.0
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde wants it")]
+fn is_false(switch: &bool) -> bool {
+    !switch
+}
+
 impl Default for SkillConfig {
     fn default() -> Self {
         Self {
@@ -120,6 +129,7 @@ impl Default for SkillConfig {
             gru_hidden: 64,
             gru_layers: 1,
             lr: 3e-4,
+            anneal_lr: false,
             batch: 50,
             epochs: 100,
             max_grad_norm: 0.5,
@@ -190,6 +200,14 @@ impl SkillConfig {
             return Err(LearnError::Config(format!("skill {name} must not be negative, but is {}", brief_number(*x))));
         }
         Ok(())
+    }
+
+    /// The learning rate after so many epochs, of which the running one counts as far as it has come.
+    pub fn lr_at(&self, epochs_done: f64) -> f64 {
+        match self.anneal_lr {
+            true => self.lr * (1.0 - epochs_done / self.epochs as f64).max(0.0),
+            false => self.lr,
+        }
     }
 
     /// `Ok` if a model of these settings can learn actions of `space`.

@@ -238,9 +238,14 @@ impl SkillTrainer {
         Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm, state_error, held_out: None })
     }
 
+    /// The learning rate of the next batch.
+    fn lr(&self) -> f64 {
+        self.config.lr_at(self.epoch as f64 + self.next as f64 / self.windows.len() as f64)
+    }
+
     /// Gradient, clipping, one step of Adam; gives the norm before clipping.
     fn descend(&mut self, loss: Tensor<1>) -> Result<f32, LearnError> {
-        let (lr, max_norm, steps) = (self.config.lr, self.config.max_grad_norm, self.adam.steps());
+        let (lr, max_norm, steps) = (self.lr(), self.config.max_grad_norm, self.adam.steps());
         if is_host(&self.device.plain()) {
             let grads = NamedGrads::take(&mut self.nets, "", loss.backward())?;
             let (norm, scale) = grads.clip_factor(max_norm, steps)?;

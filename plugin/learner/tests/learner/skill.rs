@@ -174,6 +174,35 @@ fn a_loaded_trainer_goes_on_bit_for_bit() {
 }
 
 #[test]
+fn an_annealed_rate_falls_to_nothing_over_the_epochs_and_over_a_stop() {
+    let settings = SkillConfig { anneal_lr: true, epochs: 2, lr: 0.5, ..config() };
+    let rates = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0].map(|epochs| settings.lr_at(epochs));
+    assert_eq!(rates, [0.5, 0.375, 0.25, 0.125, 0.0, 0.0]);
+    let annealed = SkillConfig { anneal_lr: true, epochs: 2, ..config() };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("trainer.safetensors");
+    let mut trainer = SkillTrainer::new(annealed, corridor_demos(50), 7, DeviceKind::Flex).expect("windows fit");
+    train(&mut trainer, 1);
+    trainer.train_batch().expect("finite");
+    trainer.save(&path).expect("written");
+    let mut loaded = SkillTrainer::load(&path, corridor_demos(50), DeviceKind::Flex).expect("read");
+    let to_the_end = train(&mut loaded, 1);
+    assert_eq!(to_the_end, train(&mut trainer, 1));
+    let bytes = |trainer: &SkillTrainer, name: &str| {
+        let path = folder.path().join(name);
+        trainer.model().save(&path).expect("written");
+        std::fs::read(path).expect("readable")
+    };
+    let at_the_end = bytes(&trainer, "end");
+    assert!(at_the_end == bytes(&loaded, "loaded"), "a stop changes nothing");
+    train(&mut trainer, 1);
+    assert!(at_the_end == bytes(&trainer, "later"), "at a rate of nothing no weight moves");
+    let mut steady = SkillTrainer::new(config(), corridor_demos(50), 7, DeviceKind::Flex).expect("windows fit");
+    let last = *train(&mut steady, 2).last().expect("two epochs");
+    assert!(last != to_the_end[0], "a rate that stays learns something else");
+}
+
+#[test]
 fn a_model_comes_back_from_its_file_as_it_was() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("skill.safetensors");
