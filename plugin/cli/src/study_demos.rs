@@ -33,6 +33,10 @@ struct RecordingsKey {
     observation_config: ObservationConfig,
     /// How many steps at most.
     steps: Option<u64>,
+    /// Whether lost episodes are left out.
+    wins: bool,
+    /// Whether the game's state is wanted beside the pictures.
+    with_states: bool,
     /// Whether their rewards are wanted, for which all of them are replayed.
     with_rewards: bool,
 }
@@ -70,6 +74,8 @@ impl<'a> StudyDemos<'a> {
             held_out: experiment.test.clone(),
             observation_config: experiment.observation_config(),
             steps: experiment.demo_steps,
+            wins: experiment.demo_wins,
+            with_states: experiment.skills.state_weight > 0.0,
             with_rewards: experiment.algorithm.trains_on_demos(),
         })
     }

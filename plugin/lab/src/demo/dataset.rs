@@ -91,8 +91,8 @@ impl Demonstrations {
         Ok(Self { observation_config: *observation_config, episodes, with_states: false })
     }
 
-    /// What an experiment learns skills from, of all recordings below a path: none of its held-out levels, and no more
-    /// steps than it asks for.
+    /// What an experiment learns skills from, of all recordings below a path: none of its held-out levels, no more steps
+    /// than it asks for, and only what was won if it wants that.
     ///
     /// # Errors
     ///
@@ -100,10 +100,25 @@ impl Demonstrations {
     pub fn of(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Self, VerifyError> {
         let demos = Self::read(game, &experiment.observation_config(), path, Some(&experiment.test))?;
         let demos = Self { with_states: experiment.skills.state_weight > 0.0, ..demos };
+        let demos = if experiment.demo_wins { demos.won(path)? } else { demos };
         Ok(match experiment.demo_steps {
             Some(steps) => demos.at_most(steps),
             None => demos,
         })
+    }
+
+    /// Keeps the episodes that reached the goal.
+    ///
+    /// # Errors
+    ///
+    /// [`VerifyError::NoneWon`] if none did.
+    fn won(mut self, path: &Path) -> Result<Self, VerifyError> {
+        let episodes = self.episodes.len();
+        self.episodes.retain(|demo| demo.episode.is_success());
+        if self.episodes.is_empty() {
+            return Err(VerifyError::NoneWon { path: path.to_owned(), episodes });
+        }
+        Ok(self)
     }
 
     /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
@@ -168,7 +183,7 @@ impl Demonstrations {
 
     /// The data set of what the sensor shows.
     fn seen(&self, game: &dyn Game, threads: usize, progress: &(impl Fn(u64) + Sync)) -> Result<Dataset, VerifyError> {
-        self.check_room(free_memory())?;
+        self.check_room(self.bytes(game), free_memory())?;
         let originals = self.originals();
         let mut observed = self.observe(game, threads, &originals, Replay::new, progress)?;
         let mut episodes = Vec::new();
@@ -190,9 +205,16 @@ impl Demonstrations {
         Ok(dataset.with_levels(self.levels())?)
     }
 
-    /// Nothing is replayed whose pictures have no room.
-    fn check_room(&self, free: u64) -> Result<(), VerifyError> {
-        let (steps, bytes, observation_config) = (self.steps(), self.picture_bytes(), self.observation_config);
+    /// Memory of the pictures, and of the states beside them if those are to be told.
+    fn bytes(&self, game: &dyn Game) -> u64 {
+        let numbers = ObservationConfig::default().obs_kind(game).numbers() as u64;
+        let states = if self.with_states { self.steps() * numbers * size_of::<f32>() as u64 } else { 0 };
+        self.picture_bytes() + states
+    }
+
+    /// Nothing is replayed that has no room.
+    fn check_room(&self, bytes: u64, free: u64) -> Result<(), VerifyError> {
+        let (steps, observation_config) = (self.steps(), self.observation_config);
         if bytes > free { Err(VerifyError::TooLarge { steps, observation_config, bytes, free }) } else { Ok(()) }
     }
 
@@ -262,13 +284,29 @@ mod tests {
     }
 
     #[test]
+    fn lost_episodes_are_left_out_where_only_won_ones_are_wanted() {
+        use bevy_playbot::demo::file::DemoEnd;
+        let ended = |ends: &[DemoEnd]| {
+            all(ends.iter().map(|&end| DemoEpisode { end, ..DemoEpisode::new(0, DemoActions::Discrete(2)) }))
+        };
+        let (won, lost) = (DemoEnd::Terminated { success: true }, DemoEnd::Terminated { success: false });
+        let path = Path::new("a.demo");
+        let kept = ended(&[lost, won, DemoEnd::Truncated, won, DemoEnd::Aborted]).won(path).expect("two are won");
+        assert_eq!(kept.episodes.iter().map(|demo| demo.index).collect::<Vec<_>>(), [1, 3]);
+        let error = ended(&[lost, DemoEnd::Truncated]).won(path).expect_err("none is won").to_string();
+        assert!(error.contains("a.demo: none of the 2 recorded episodes"), "{error}");
+    }
+
+    #[test]
     fn pictures_that_have_no_room_are_refused() {
         let episode = DemoEpisode { state_hashes: vec![0; 10], ..DemoEpisode::new(0, DemoActions::Discrete(2)) };
         let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
         let observation_config = ObservationConfig { kind: ObservationKind::Raster, image };
         let demos = Demonstrations { observation_config, ..all(std::iter::once(episode)) };
-        assert!(demos.check_room((10 * 48) << 20).is_ok());
-        let error = demos.check_room(((10 * 48) << 20) - 1).expect_err("too large").to_string();
+        let bytes = demos.picture_bytes();
+        assert_eq!(bytes, (10 * 48) << 20);
+        assert!(demos.check_room(bytes, bytes).is_ok());
+        let error = demos.check_room(bytes, bytes - 1).expect_err("too large").to_string();
         for words in ["0.5 GiB", "`demo_steps`", "1024×1024 colour pictures of the raster, 16 in a stack"] {
             assert!(error.contains(words), "{error}");
         }

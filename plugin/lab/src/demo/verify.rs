@@ -78,6 +78,18 @@ pub enum VerifyError {
         /// The held-out levels.
         split: LevelSplit,
     },
+    /// Only won episodes were wanted.
+    #[error(
+        "{}: none of the {episodes} recorded episodes reached the goal, and `demo_wins` takes only those that did: record a \
+         demonstrator that reaches it, or leave `demo_wins` out",
+        path.display()
+    )]
+    NoneWon {
+        /// The file or folder.
+        path: PathBuf,
+        /// Episodes that were recorded there.
+        episodes: usize,
+    },
     /// The pictures cannot be made.
     #[error(transparent)]
     Vision(#[from] VisionError),

@@ -45,6 +45,9 @@ pub struct Experiment {
     /// them if none is named.
     #[serde(default)]
     pub demo_steps: Option<u64>,
+    /// Learn only from recorded episodes that ended with the goal reached: of demonstrators that do not always reach it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub demo_wins: bool,
     /// Seed of everything random.
     #[serde(default = "one")]
     pub seed: u64,

@@ -118,6 +118,7 @@ mod tests {
             "test=\"hard:70..80\"",
             "demos=my recordings/a",
             "demo_steps=5000",
+            "demo_wins=true",
             "observation=Raster",
             "image.stack=4",
             "image=(grayscale: true, width: 84)",
@@ -142,6 +143,7 @@ mod tests {
         expected.test = "hard:70..80".parse().expect("a split");
         expected.demos = Some("my recordings/a".into());
         expected.demo_steps = Some(5000);
+        expected.demo_wins = true;
         expected.observation = ObservationKind::Raster;
         expected.image = ImageOptions { stack: 4, grayscale: true, width: 84, ..ImageOptions::default() };
         expected.ppo.cnn = CnnKind::Nature { feature: 64 };

@@ -84,6 +84,9 @@ impl StudyRun {
         if let Some(steps) = run.demo_steps {
             settings += &ron::to_string(&steps)?;
         }
+        if run.demo_wins {
+            settings += "wins";
+        }
         Ok(format!("skills-{:08x}-seed{}.safetensors", crc32fast::hash(settings.as_bytes()), run.seed))
     }
 }
@@ -165,10 +168,11 @@ mod tests {
         let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false"]),
             (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"]),
             (name: "eyes", set: ["observation=Raster"]), (name: "grey", set: ["observation=Raster", "image.grayscale=true"]),
-            (name: "idle", set: ["image.grayscale=true"]), (name: "few", set: ["demo_steps=9"])"#;
+            (name: "idle", set: ["image.grayscale=true"]), (name: "few", set: ["demo_steps=9"]),
+            (name: "won", set: ["demo_wins=true"])"#;
         let runs = study_runs(&experiment(variants)).expect("valid");
         let ids: Vec<String> = runs.iter().map(StudyRun::id).collect();
-        let names = ["full", "no-kl", "short", "ppo", "eyes", "grey", "idle", "few"];
+        let names = ["full", "no-kl", "short", "ppo", "eyes", "grey", "idle", "few", "won"];
         let expected = names.map(|name| [3, 5].map(|seed| format!("{name}-seed{seed}")));
         assert_eq!(ids, expected.concat());
         assert!(runs.iter().all(|run| run.experiment.variants.is_empty() && run.experiment.seeds.is_empty()));
@@ -180,6 +184,7 @@ mod tests {
         assert_ne!(skills[0], skills[4], "other windows");
         assert!(skills[0] != skills[8] && skills[8] != skills[10], "other eyes");
         assert_eq!(skills[0], skills[12], "nobody looks at pictures");
+        assert_ne!(skills[0], skills[16], "other recordings");
         assert_ne!(skills[0], skills[14], "fewer demonstrations");
     }
 

@@ -11,6 +11,8 @@ pub(super) struct Transition<'a> {
     pub(super) next_obs: Option<&'a [f32]>,
     /// The skill under which that observation is valued; `None` likewise.
     pub(super) next_z: Option<&'a [f32]>,
+    /// The share of that skill's ticks that is left; `None` likewise, and where the rollout does not tell.
+    pub(super) next_left: Option<f32>,
 }
 
 /// `Ok` if a checked rollout holds the states where episodes were cut off and where it stops.
@@ -46,21 +48,23 @@ pub(super) fn transitions(rollout: &Rollout) -> Result<impl Iterator<Item = Tran
     let (obs, cut_obs, next_obs) = (vectors(&rollout.obs)?, vectors(&ends.cut_obs)?, vectors(&ends.next_obs)?);
     let mut cut = 0;
     Ok((0..rollout.rows()).map(move |row| {
-        let next = |obs, z, at: usize| -> (Option<&[f32]>, Option<&[f32]>) {
-            (Some(slice(obs, width, at)), Some(slice(z, rollout.latent, at)))
+        let next = |obs, z, left: &[f32], at: usize| Transition {
+            row,
+            next_obs: Some(slice(obs, width, at)),
+            next_z: Some(slice(z, rollout.latent, at)),
+            next_left: left.get(at).copied(),
         };
         let following = row + rollout.envs;
-        let (next_obs, next_z) = if rollout.terminated[row] {
-            (None, None)
+        if rollout.terminated[row] {
+            Transition { row, next_obs: None, next_z: None, next_left: None }
         } else if is_cut(rollout, row) {
             cut += 1;
-            next(cut_obs, &ends.cut_z, cut - 1)
+            next(cut_obs, &ends.cut_z, &ends.cut_left, cut - 1)
         } else if following < rollout.rows() {
-            next(obs, &rollout.z, following)
+            next(obs, &rollout.z, &rollout.left, following)
         } else {
-            next(next_obs, &ends.next_z, following - rollout.rows())
-        };
-        Transition { row, next_obs, next_z }
+            next(next_obs, &ends.next_z, &ends.next_left, following - rollout.rows())
+        }
     }))
 }
 
@@ -99,9 +103,10 @@ pub(super) mod tests {
             truncated: at(&[0, 3]),
             final_values: vec![0.0; 6],
             next_values: vec![0.0; 2],
+            left: vec![1.0, 0.5, 1.0, 1.0, 0.5, 0.5],
             ends: EndStates {
-                cut_left: Vec::new(),
-                next_left: Vec::new(),
+                cut_left: vec![0.25],
+                next_left: vec![1.0, 0.75],
                 cut_rows: vec![0],
                 cut_obs: vec![50.0].into(),
                 cut_z: vec![60.0],
@@ -119,15 +124,15 @@ pub(super) mod tests {
         check_ends(&rollout).expect("it fits");
         let next: Vec<_> = transitions(&rollout)
             .expect("vectors")
-            .map(|t| t.next_obs.zip(t.next_z).map(|(obs, z)| (obs[0], z[0])))
+            .map(|t| t.next_obs.zip(t.next_z).zip(t.next_left).map(|((obs, z), left)| (obs[0], z[0], left)))
             .collect();
         let expected = [
-            Some((50.0, 60.0)), // cut off: not the row below, which belongs to the next episode
-            Some((3.0, 13.0)),
-            Some((4.0, 14.0)),
+            Some((50.0, 60.0, 0.25)), // cut off: not the row below, which belongs to the next episode
+            Some((3.0, 13.0, 1.0)),
+            Some((4.0, 14.0, 0.5)),
             None, // terminated, though also cut off
-            Some((70.0, 80.0)),
-            Some((71.0, 81.0)),
+            Some((70.0, 80.0, 1.0)),
+            Some((71.0, 81.0, 0.75)),
         ];
         assert_eq!(next, expected);
         assert!(transitions(&rollout).expect("vectors").map(|t| t.row).eq(0..6));
@@ -146,6 +151,7 @@ pub(super) mod tests {
                 r.ends.cut_rows.push(3);
                 r.ends.cut_obs.push(&[0.0]).expect("vectors");
                 r.ends.cut_z.push(0.0);
+                r.ends.cut_left.push(0.0);
             })
             .contains("row 3")
         );

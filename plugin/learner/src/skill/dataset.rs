@@ -16,12 +16,12 @@ pub struct DemoEpisode {
     pub actions: Actions,
 }
 
-/// Demonstrations of one game. Clones share the memory, of which images need much.
+/// Demonstrations of one game. Clones and subsets share the memory, of which images need much.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     pub(super) observation: ObsKind,
     pub(super) space: ActionSpace,
-    pub(super) episodes: Arc<[DemoEpisode]>,
+    pub(super) episodes: Arc<[Arc<DemoEpisode>]>,
     /// The level of each episode.
     pub(super) levels: Arc<[usize]>,
     /// The same episodes as vectors of the game's state, if they are known.
@@ -50,7 +50,8 @@ impl Dataset {
             space.check(&episode.actions)?;
         }
         let levels = (0..episodes.len()).collect();
-        Ok(Self { observation, space, episodes: episodes.into(), levels, states: None })
+        let episodes = episodes.into_iter().map(Arc::new).collect();
+        Ok(Self { observation, space, episodes, levels, states: None })
     }
 
     /// Says which episodes were played on the same level, by any number that is the same for them: what
@@ -94,7 +95,7 @@ impl Dataset {
         Self {
             observation: self.observation,
             space: self.space,
-            episodes: numbers.iter().map(|&i| self.episodes[i].clone()).collect(),
+            episodes: numbers.iter().map(|&i| Arc::clone(&self.episodes[i])).collect(),
             levels: numbers.iter().map(|&i| self.levels[i]).collect(),
             states: self.states.as_ref().map(|states| Arc::new(states.subset(numbers))),
         }
@@ -163,6 +164,14 @@ pub(super) mod tests {
             })
             .collect();
         Dataset::new(1, ActionSpace::Discrete(2), episodes).expect("consistent episodes")
+    }
+
+    #[test]
+    fn a_subset_needs_no_memory_of_its_own() {
+        let all = dataset(&[3, 4, 5]);
+        let some = all.subset(&[2, 0]);
+        assert_eq!((some.steps(), some.levels.to_vec()), (8, vec![2, 0]));
+        assert!(Arc::ptr_eq(&some.episodes[0], &all.episodes[2]));
     }
 
     #[test]
