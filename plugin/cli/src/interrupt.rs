@@ -111,6 +111,11 @@ pub fn leave(left: String) {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).left = Some(left);
 }
 
+/// What was noted, in words for whoever was stopped at a good place.
+pub fn remains() -> String {
+    REMAINS.lock().unwrap_or_else(PoisonError::into_inner).words()
+}
+
 /// Notes what goes on with the work, in words for whoever stops it at once.
 pub fn go_on_with(command: String) {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).command = Some(command);

@@ -135,7 +135,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             return Ok(stopped(&args, algorithm));
         }
     }
-    let (seeds, first) = first_success(game, &experiment, &trained, &dataset, &args)?;
+    let Some((seeds, first)) = first_success(game, &experiment, &trained, &dataset, &args)? else {
+        tell!("stopped; {}", interrupt::remains());
+        return Ok(Outcome::Stopped);
+    };
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), cloning(&skills, &experiment, draw)));
     players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
@@ -233,26 +236,27 @@ fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
 }
 
 /// After how many steps each method mostly succeeds, for the seed that was trained to the end and for the others that were
-/// asked for; fewer after Ctrl-C.
+/// asked for. `None` after Ctrl-C.
 fn first_success(
     game: &dyn Game,
     experiment: &Experiment,
     trained: &[Trained],
     dataset: &Dataset,
     args: &Args,
-) -> Result<(Vec<u64>, Vec<FirstSuccess>), CliError> {
+) -> Result<Option<(Vec<u64>, Vec<FirstSuccess>)>, CliError> {
+    interrupt::leave(format!("both trainings are saved in {}, without a report", args.run.display()));
+    interrupt::go_on_with(format!("`{} eval --run {}`", program::name(), args.run.join("score-ppo").display()));
     let of = |one: &Trained| FirstSuccess { algorithm: one.algorithm, steps: vec![one.steps_to_threshold] };
     let (mut seeds, mut first) = (vec![experiment.seed], trained.iter().map(of).collect::<Vec<_>>());
     let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();
     for seed in (1..args.seeds).map(|more| experiment.seed.wrapping_add(more)) {
         let experiment = Experiment { seed, ..experiment.clone() };
         let steps = steps_of_seed(game, &experiment, &algorithms, dataset, args.threads.count())?;
-        // The trainings are done, and their results are worth more than another seed.
-        let Some(steps) = steps else { break };
+        let Some(steps) = steps else { return Ok(None) };
         seeds.push(seed);
         first.iter_mut().zip(steps).for_each(|(one, steps)| one.steps.push(steps));
     }
-    Ok((seeds, first))
+    Ok(Some((seeds, first)))
 }
 
 /// How many steps SCORE needed for what PPO reached in the end, in words.

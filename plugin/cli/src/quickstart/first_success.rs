@@ -43,36 +43,49 @@ pub(super) fn steps_of_seed(
     let mut all = Vec::new();
     for &algorithm in algorithms {
         let experiment = Experiment { algorithm, ..experiment.clone() };
-        let Some(steps) = steps_to_success(game, &experiment, &skills, threads)? else { return Ok(None) };
-        all.push(steps);
+        match train_to_success(game, &experiment, &skills, threads)? {
+            Reached::After(steps) => all.push(Some(steps)),
+            Reached::Never => all.push(None),
+            Reached::Stopped => return Ok(None),
+        }
     }
     Ok(Some(all))
 }
 
-fn steps_to_success(
+/// How a training ended that goes on until it mostly succeeds.
+enum Reached {
+    /// It did after so many steps.
+    After(u64),
+    /// Not in all the steps that it had.
+    Never,
+    /// Ctrl-C.
+    Stopped,
+}
+
+fn train_to_success(
     game: &dyn Game,
     experiment: &Experiment,
     skills: &SkillModel,
     threads: usize,
-) -> Result<Option<Option<u64>>, CliError> {
+) -> Result<Reached, CliError> {
     let skills = experiment.algorithm.needs_skills().then_some(skills);
     let mut trainer = Trainer::new(game, experiment, skills, DeviceKind::default(), threads)?;
     let title = format!("train {}, seed {}", experiment.algorithm, experiment.seed);
     let bar = progress::bar(&title, experiment.whole_steps(), "steps");
-    while !trainer.is_done() {
+    let mut reached = Reached::Never;
+    while matches!(reached, Reached::Never) && !trainer.is_done() {
         if interrupt::asked() {
-            bar.finish_and_clear();
-            return Ok(None);
+            reached = Reached::Stopped;
+            break;
         }
         let report = trainer.update()?;
         bar.set_position(report.step);
         if report.mostly_succeeds(experiment.study.threshold) {
-            bar.finish_and_clear();
-            return Ok(Some(Some(report.step)));
+            reached = Reached::After(report.step);
         }
     }
     bar.finish_and_clear();
-    Ok(Some(None))
+    Ok(reached)
 }
 
 /// The median of each method, and its seeds.

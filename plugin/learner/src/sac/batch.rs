@@ -17,7 +17,9 @@ pub struct SacBatch {
     pub actions: ActionBatch,
     /// What they earned, `[n]`.
     pub rewards: Tensor<1>,
-    /// 1 where the value of the next state counts, 0 where the episode was over, `[n]`.
+    /// The share of the skills' ticks that is left, and what is left in the next states, `[n, 1]`: only if the critics count.
+    pub left: Option<(Tensor<2>, Tensor<2>)>,
+    /// 1 where the value of the next state counts, or its weight where that differs, and 0 where the episode was over, `[n]`.
     pub continues: Tensor<1>,
     /// The next states as the actor reads them, `[n, latent + obs_dim]`; any numbers where they do not count.
     pub next_inputs: Tensor<2>,
@@ -31,6 +33,22 @@ pub struct SacBatch {
 }
 
 impl SacBatch {
+    /// What critics read beside an action, `[n, latent + obs_dim]` or one more: [`Self::inputs`], and what is left.
+    pub(super) fn of_critics(&self) -> Tensor<2> {
+        match &self.left {
+            Some((left, _)) => Tensor::cat(vec![self.inputs.clone(), left.clone()], 1),
+            None => self.inputs.clone(),
+        }
+    }
+
+    /// The same of the next states.
+    pub(super) fn next_of_critics(&self) -> Tensor<2> {
+        match &self.left {
+            Some((_, next)) => Tensor::cat(vec![self.next_inputs.clone(), next.clone()], 1),
+            None => self.next_inputs.clone(),
+        }
+    }
+
     pub(super) fn prior_of_states(&self) -> Option<&Dist> {
         self.prior.as_ref().map(|(states, _)| states)
     }
@@ -43,7 +61,7 @@ impl SacBatch {
 impl SacLearner {
     /// Width of what the actor reads.
     pub(super) fn inputs(&self) -> usize {
-        self.base.spec.latent + self.buffer.obs_dim
+        self.base.spec.latent + self.buffer.widths.obs
     }
 
     /// `buffer`, which is a batch of transitions, on the device, normalised; with the teacher's side of them if the actor needs
@@ -57,7 +75,7 @@ impl SacLearner {
         let (base, n) = (&self.base, buffer.len());
         let all: Vec<usize> = (0..n).collect();
         let (stats, device) = (base.obs_stats(), base.device.plain());
-        let (latent, obs_dim) = (base.spec.latent, buffer.obs_dim);
+        let (latent, obs_dim) = (base.spec.latent, buffer.widths.obs);
         let inputs = |z: &[f32], obs: &[f32]| {
             let rows = joined_rows(z, latent, obs, obs_dim, stats.as_deref(), &all);
             matrix(rows, n, self.inputs(), &device)
@@ -77,11 +95,14 @@ impl SacLearner {
         };
         let (here, next) = (inputs(&buffer.z, &buffer.obs), inputs(&buffer.next_z, &buffer.next_obs));
         let prior = base.prior_origin().map(|prior| (prior.forward(here.clone()), prior.forward(next.clone())));
+        let column = |values: &[f32]| matrix(values.to_vec(), n, 1, &device);
+        let left = (buffer.widths.clock > 0).then(|| (column(&buffer.left), column(&buffer.next_left)));
         let continues = all.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
         Ok(SacBatch {
             inputs: here,
             actions: ActionBatch::new(&buffer.actions, &device),
             rewards: vector(all.iter().map(reward).collect(), &device),
+            left,
             continues: vector(continues, &device),
             next_inputs: next,
             teacher: teacher.map(|output| output.batch(&all, &device)),

@@ -7,20 +7,37 @@ use crate::rng::below;
 use crate::{ActionSpace, Actions, FileError, LearnError, Rollout, TimeLimit};
 use rand::Rng;
 
+/// How many numbers of each kind a transition has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Widths {
+    /// Of an observation.
+    pub(super) obs: usize,
+    /// Of a skill.
+    pub(super) latent: usize,
+    /// 1 if the share of a skill's ticks that is left is kept, else 0.
+    pub(super) clock: usize,
+    /// 1 if the value of what comes after has a weight of its own, else 0.
+    pub(super) weight: usize,
+}
+
 /// The newest transitions, raw as they were played: a ring of `capacity` slots in flat memory, which grows as it fills.
 ///
 /// Normalisation happens when transitions are read, so that old ones are seen with the present statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ReplayBuffer {
     capacity: usize,
-    pub(super) obs_dim: usize,
-    pub(super) latent: usize,
+    pub(super) widths: Widths,
     /// Transitions taken in so far, kept or not.
     pub(super) seen: u64,
     pub(super) obs: Vec<f32>,
     pub(super) z: Vec<f32>,
     pub(super) next_obs: Vec<f32>,
     pub(super) next_z: Vec<f32>,
+    /// Shares of the skills' ticks that are left in the states, and in those that came after.
+    pub(super) left: Vec<f32>,
+    pub(super) next_left: Vec<f32>,
+    /// What the value of the next state counts, beside the discount: not 1 for a skill that was cut off early.
+    pub(super) weights: Vec<f32>,
     pub(super) actions: Actions,
     pub(super) rewards: Vec<f32>,
     terminated: Vec<bool>,
@@ -28,18 +45,24 @@ pub(super) struct ReplayBuffer {
 }
 
 impl ReplayBuffer {
-    /// Empty, for rollouts whose skills are `latent` wide.
-    pub(super) fn new(capacity: usize, obs_dim: usize, latent: usize, space: &ActionSpace) -> Self {
+    /// Empty.
+    pub(super) fn new(capacity: usize, widths: Widths, space: &ActionSpace) -> Self {
+        Self::empty(capacity, widths, Actions::empty(space))
+    }
+
+    fn empty(capacity: usize, widths: Widths, actions: Actions) -> Self {
         Self {
             capacity,
-            obs_dim,
-            latent,
+            widths,
             seen: 0,
             obs: Vec::new(),
             z: Vec::new(),
             next_obs: Vec::new(),
             next_z: Vec::new(),
-            actions: Actions::empty(space),
+            left: Vec::new(),
+            next_left: Vec::new(),
+            weights: Vec::new(),
+            actions,
             rewards: Vec::new(),
             terminated: Vec::new(),
             truncated: Vec::new(),
@@ -52,16 +75,30 @@ impl ReplayBuffer {
     }
 
     /// Takes in all transitions of a checked rollout, in order; the oldest give way. The next state after a
-    /// termination is stored as zeros.
-    pub(super) fn push(&mut self, rollout: &Rollout) -> Result<(), LearnError> {
-        let (no_obs, no_z) = (vec![0.0; self.obs_dim], vec![0.0; self.latent]);
+    /// termination is stored as zeros. `weights`, one per row, are read only by a buffer that keeps them.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] if the rollout does not say how much of the
+    /// skills was left, and the buffer keeps that.
+    pub(super) fn push(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<(), LearnError> {
+        let Widths { obs: obs_dim, latent, clock, weight } = self.widths;
+        let (no_obs, no_z) = (vec![0.0; obs_dim], vec![0.0; latent]);
         let obs = rollout.obs.as_slice().vectors("SAC")?;
+        if clock > 0 {
+            LearnError::check("rollout left", rollout.rows(), rollout.left.len())?;
+            LearnError::check("rollout ends cut_left", rollout.ends.cut_rows.len(), rollout.ends.cut_left.len())?;
+            LearnError::check("rollout ends next_left", rollout.envs, rollout.ends.next_left.len())?;
+        }
+        LearnError::check("weights of transitions", rollout.rows() * weight, weights.len())?;
         for transition in transitions(rollout)? {
             let (row, at) = (transition.row, (self.seen % self.capacity as u64) as usize);
-            write(&mut self.obs, at, slice(obs, self.obs_dim, row));
-            write(&mut self.z, at, slice(&rollout.z, self.latent, row));
+            write(&mut self.obs, at, slice(obs, obs_dim, row));
+            write(&mut self.z, at, slice(&rollout.z, latent, row));
             write(&mut self.next_obs, at, transition.next_obs.unwrap_or(&no_obs));
             write(&mut self.next_z, at, transition.next_z.unwrap_or(&no_z));
+            write(&mut self.left, at, slice(&rollout.left, clock, row));
+            write(&mut self.next_left, at, &[transition.next_left.unwrap_or_default()][..clock]);
+            write(&mut self.weights, at, slice(weights, weight, row));
             self.actions.write(at, &rollout.actions, row)?;
             write(&mut self.rewards, at, &[rollout.rewards[row]]);
             write(&mut self.terminated, at, &[rollout.terminated[row]]);
@@ -83,14 +120,18 @@ impl ReplayBuffer {
     /// [`LearnError::Action`] if the two act in different kinds of spaces.
     pub(super) fn picked(&self, slots: &[usize], more: Option<(&Self, &[usize])>) -> Result<Self, LearnError> {
         let n = slots.len() + more.map_or(0, |(_, slots)| slots.len());
-        let mut all = Self { capacity: n, seen: n as u64, actions: self.actions.gather(slots), ..self.emptied() };
+        let mut all = Self { seen: n as u64, ..Self::empty(n, self.widths, self.actions.gather(slots)) };
+        let Widths { obs, latent, clock, weight } = self.widths;
         let parts = [Some((self, slots)), more];
         for (from, slots) in parts.iter().flatten() {
             for &slot in *slots {
-                all.obs.extend_from_slice(slice(&from.obs, self.obs_dim, slot));
-                all.z.extend_from_slice(slice(&from.z, self.latent, slot));
-                all.next_obs.extend_from_slice(slice(&from.next_obs, self.obs_dim, slot));
-                all.next_z.extend_from_slice(slice(&from.next_z, self.latent, slot));
+                all.obs.extend_from_slice(slice(&from.obs, obs, slot));
+                all.z.extend_from_slice(slice(&from.z, latent, slot));
+                all.next_obs.extend_from_slice(slice(&from.next_obs, obs, slot));
+                all.next_z.extend_from_slice(slice(&from.next_z, latent, slot));
+                all.left.extend_from_slice(slice(&from.left, clock, slot));
+                all.next_left.extend_from_slice(slice(&from.next_left, clock, slot));
+                all.weights.extend_from_slice(slice(&from.weights, weight, slot));
                 all.rewards.push(from.rewards[slot]);
                 all.terminated.push(from.terminated[slot]);
                 all.truncated.push(from.truncated[slot]);
@@ -102,38 +143,27 @@ impl ReplayBuffer {
         Ok(all)
     }
 
-    /// A buffer without transitions, of the same widths.
-    fn emptied(&self) -> Self {
-        Self {
-            capacity: self.capacity,
-            obs_dim: self.obs_dim,
-            latent: self.latent,
-            seen: 0,
-            obs: Vec::new(),
-            z: Vec::new(),
-            next_obs: Vec::new(),
-            next_z: Vec::new(),
-            actions: self.actions.gather(&[]),
-            rewards: Vec::new(),
-            terminated: Vec::new(),
-            truncated: Vec::new(),
-        }
-    }
-
-    /// 1 if the value of the slot's next state counts, 0 if the episode was over: after a termination, and by
-    /// [`TimeLimit::Legacy`] after a truncation too.
+    /// What the value of the slot's next state counts beside the discount: 1, or its weight; 0 if the episode was over, which
+    /// it is after a termination, and by [`TimeLimit::Legacy`] after a truncation too.
     pub(super) fn continues(&self, slot: usize, limit: TimeLimit) -> f32 {
         let over = self.terminated[slot] || (self.truncated[slot] && limit == TimeLimit::Legacy);
-        if over { 0.0 } else { 1.0 }
+        if over { 0.0 } else { self.weights.get(slot).copied().unwrap_or(1.0) }
     }
 
     /// Adds all transitions to a file, under names that begin with `prefix`.
     pub(super) fn put(&self, file: &mut TensorFile, prefix: &str) {
-        let n = self.len();
-        file.put(&path(prefix, "obs"), &[n, self.obs_dim], &self.obs);
-        file.put(&path(prefix, "z"), &[n, self.latent], &self.z);
-        file.put(&path(prefix, "next_obs"), &[n, self.obs_dim], &self.next_obs);
-        file.put(&path(prefix, "next_z"), &[n, self.latent], &self.next_z);
+        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
+        file.put(&path(prefix, "obs"), &[n, obs], &self.obs);
+        file.put(&path(prefix, "z"), &[n, latent], &self.z);
+        file.put(&path(prefix, "next_obs"), &[n, obs], &self.next_obs);
+        file.put(&path(prefix, "next_z"), &[n, latent], &self.next_z);
+        if clock > 0 {
+            file.put(&path(prefix, "left"), &[n], &self.left);
+            file.put(&path(prefix, "next_left"), &[n], &self.next_left);
+        }
+        if weight > 0 {
+            file.put(&path(prefix, "weights"), &[n], &self.weights);
+        }
         match &self.actions {
             Actions::Discrete(values) => file.put_u32(&path(prefix, "actions"), values),
             Actions::Continuous { dim, values } => file.put(&path(prefix, "actions"), &[n, *dim], values),
@@ -146,11 +176,22 @@ impl ReplayBuffer {
     /// Takes all transitions out of a file, of which `seen` were ever taken in.
     pub(super) fn take(&mut self, file: &mut TensorFile, prefix: &str, seen: u64) -> Result<(), FileError> {
         self.seen = seen;
-        let n = self.len();
-        self.obs = file.take(&path(prefix, "obs"), &[n, self.obs_dim])?;
-        self.z = file.take(&path(prefix, "z"), &[n, self.latent])?;
-        self.next_obs = file.take(&path(prefix, "next_obs"), &[n, self.obs_dim])?;
-        self.next_z = file.take(&path(prefix, "next_z"), &[n, self.latent])?;
+        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
+        self.obs = file.take(&path(prefix, "obs"), &[n, obs])?;
+        self.z = file.take(&path(prefix, "z"), &[n, latent])?;
+        self.next_obs = file.take(&path(prefix, "next_obs"), &[n, obs])?;
+        self.next_z = file.take(&path(prefix, "next_z"), &[n, latent])?;
+        if clock > 0 {
+            self.left = file.take(&path(prefix, "left"), &[n])?;
+            self.next_left = file.take(&path(prefix, "next_left"), &[n])?;
+        }
+        let weights = path(prefix, "weights");
+        self.weights = match weight {
+            0 => Vec::new(),
+            // The first checkpoints of SPiRL discounted all skills alike.
+            _ if !file.has(&weights) => vec![1.0; n],
+            _ => file.take(&weights, &[n])?,
+        };
         match &mut self.actions {
             Actions::Discrete(values) => *values = file.take_u32(&path(prefix, "actions"), n)?,
             Actions::Continuous { dim, values } => *values = file.take(&path(prefix, "actions"), &[n, *dim])?,
@@ -180,8 +221,9 @@ mod tests {
     use crate::rng::Streams;
 
     fn filled(capacity: usize) -> ReplayBuffer {
-        let mut buffer = ReplayBuffer::new(capacity, 1, 1, &ActionSpace::Discrete(3));
-        buffer.push(&rollout()).expect("it fits");
+        let widths = Widths { obs: 1, latent: 1, clock: 1, weight: 1 };
+        let mut buffer = ReplayBuffer::new(capacity, widths, &ActionSpace::Discrete(3));
+        buffer.push(&rollout(), &[2.0, 1.0, 1.0, 1.0, 0.5, 1.0]).expect("it fits");
         buffer
     }
 
@@ -192,8 +234,28 @@ mod tests {
         assert_eq!(buffer.obs, [4.0, 5.0, 2.0, 3.0]);
         assert_eq!(buffer.next_obs, [70.0, 71.0, 4.0, 0.0]);
         assert_eq!(buffer.next_z, [80.0, 81.0, 14.0, 0.0]);
+        assert_eq!(buffer.left, [0.5, 0.5, 1.0, 1.0]);
+        assert_eq!(buffer.next_left, [1.0, 0.75, 0.5, 0.0]);
+        assert_eq!(buffer.weights, [0.5, 1.0, 1.0, 1.0]);
         assert_eq!(buffer.actions, Actions::Discrete(vec![1, 2, 2, 0]));
         assert_eq!(buffer.rewards, [24.0, 25.0, 22.0, 23.0]);
+    }
+
+    #[test]
+    fn what_is_kept_goes_into_batches_and_files_and_what_is_not_needs_no_rollout_to_tell() {
+        let buffer = filled(6);
+        let picked = buffer.picked(&[4, 0], None).expect("the same actions");
+        assert_eq!([picked.left, picked.next_left, picked.weights], [[0.5, 1.0], [1.0, 0.25], [0.5, 2.0]]);
+        let silent = Rollout { left: Vec::new(), ..rollout() };
+        let widths = Widths { obs: 1, latent: 1, ..Widths::default() };
+        let new = |widths| ReplayBuffer::new(6, widths, &ActionSpace::Discrete(3));
+        let mut plain = new(widths);
+        plain.push(&silent, &[]).expect("nothing is missed");
+        assert_eq!((plain.left.len(), plain.next_left.len(), plain.continues(0, TimeLimit::Bootstrap)), (0, 0, 1.0));
+        let error = new(Widths { clock: 1, ..widths }).push(&silent, &[]).expect_err("it does not tell");
+        assert!(error.to_string().contains("rollout left"), "{error}");
+        let error = new(Widths { weight: 1, ..widths }).push(&silent, &[]).expect_err("no weights");
+        assert!(error.to_string().contains("weights"), "{error}");
     }
 
     #[test]
@@ -210,7 +272,7 @@ mod tests {
     fn time_limits_end_nothing_unless_asked_to() {
         let buffer = filled(6);
         let flags = |limit| (0..6).map(|slot| buffer.continues(slot, limit)).collect::<Vec<f32>>();
-        assert_eq!(flags(TimeLimit::Bootstrap), [1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
-        assert_eq!(flags(TimeLimit::Legacy), [0.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
+        assert_eq!(flags(TimeLimit::Bootstrap), [2.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
+        assert_eq!(flags(TimeLimit::Legacy), [0.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
     }
 }

@@ -1,7 +1,7 @@
 //! Recordings in a replay buffer of their own.
 
 use super::SacConfig;
-use super::buffer::ReplayBuffer;
+use super::buffer::{ReplayBuffer, Widths};
 use crate::file::TensorFile;
 use crate::{ActionSpace, Actions, FileError, LearnError, PolicySpec, Rollout};
 
@@ -32,9 +32,9 @@ impl Demos {
                         skills from them instead";
             return Err(LearnError::Config(text.to_owned()));
         }
-        let mut buffer = ReplayBuffer::new(rows, obs_dim, 0, space);
+        let mut buffer = ReplayBuffer::new(rows, Widths { obs: obs_dim, ..Widths::default() }, space);
         for episode in episodes {
-            buffer.push(episode)?;
+            buffer.push(episode, &[])?;
         }
         if let Actions::Continuous { values, .. } = &mut buffer.actions {
             values.iter_mut().for_each(|value| *value = value.clamp(-1.0, 1.0));
@@ -50,7 +50,8 @@ impl Demos {
         if rows == 0 || !(share > 0.0 && share < 1.0) {
             return Err(file.format(format!("a share of {share} of each batch from {rows} recorded steps")));
         }
-        let mut buffer = ReplayBuffer::new(rows as usize, spec.obs.numbers(), 0, &spec.action_space);
+        let widths = Widths { obs: spec.obs.numbers(), ..Widths::default() };
+        let mut buffer = ReplayBuffer::new(rows as usize, widths, &spec.action_space);
         buffer.take(file, "demos", rows)?;
         spec.action_space.check(&buffer.actions).map_err(|error| file.learner(error))?;
         Ok(Self { buffer, share })

@@ -1,8 +1,9 @@
 //! The learner: SAC, and SCORE-SAC if it is given a skill model.
 
-use super::buffer::ReplayBuffer;
+use super::buffer::{ReplayBuffer, Widths};
 use super::demos::Demos;
 use super::explore::explorer;
+use super::nets::clock;
 use super::{RlpdConfig, SacConfig, SacNets, check_ends};
 use crate::file::{FileKind, TensorFile};
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
@@ -166,11 +167,16 @@ impl SacLearner {
     }
 
     fn with_nets(config: SacConfig, base: LearnerBase, nets: SacNets) -> Self {
-        let (obs_dim, latent) = (base.spec.obs.numbers(), base.rollout_latent());
+        let widths = Widths {
+            obs: base.spec.obs.numbers(),
+            latent: base.rollout_latent(),
+            clock: clock(&base),
+            weight: usize::from(base.prior_origin().is_some()),
+        };
         Self {
             nets,
             optimizers: Optimizers::new(&config),
-            buffer: ReplayBuffer::new(config.buffer, obs_dim, latent, &base.spec.action_space),
+            buffer: ReplayBuffer::new(config.buffer, widths, &base.spec.action_space),
             demos: None,
             gradient_steps: 0,
             carry: 0.0,

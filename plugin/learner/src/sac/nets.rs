@@ -91,18 +91,25 @@ fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
     let (low, high) = config.log_std;
     match base.copied_teacher() {
         Some(teacher) => teacher.shape(),
-        None => ActorShape { net: critic_shape(config, base), std: StdShape::Squashed(low, high), cnn: None },
+        None => ActorShape { net: actors_net(config, base), std: StdShape::Squashed(low, high), cnn: None },
     }
 }
 
 /// The critics that the settings describe.
 fn ensemble(config: &SacConfig, base: &LearnerBase) -> EnsembleShape {
-    let (net, space) = (critic_shape(config, base), base.spec.action_space);
+    let (shape, space) = (actors_net(config, base), base.spec.action_space);
+    // Critics that count read one number more.
+    let net = NetShape { obs_dim: shape.obs_dim.saturating_add(clock(base)), ..shape };
     EnsembleShape { net, space, critics: config.critics, layer_norm: config.layer_norm }
 }
 
-/// What a critic reads beside a continuous action, and its hidden layers.
-fn critic_shape(config: &SacConfig, base: &LearnerBase) -> NetShape {
+/// 1 if the critics read how much of a skill's ticks is left, else 0.
+pub(super) fn clock(base: &LearnerBase) -> usize {
+    usize::from(base.score_config().is_some_and(|score| score.critic_clock && score.condition))
+}
+
+/// What the actor reads, and the hidden layers of all networks.
+fn actors_net(config: &SacConfig, base: &LearnerBase) -> NetShape {
     NetShape {
         obs_dim: base.spec.obs.numbers(),
         latent: base.spec.latent,

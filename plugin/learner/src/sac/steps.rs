@@ -115,7 +115,7 @@ pub fn target_of(
     let actions =
         PolicyActions::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), batch.prior_of_next(), noise)?;
     let targets = nets.targets.some(&batch.seen_by_target);
-    let next = actions.soft_value(&targets, Pool::Least, batch.next_inputs.clone(), temperature);
+    let next = actions.soft_value(&targets, Pool::Least, batch.next_of_critics(), temperature);
     Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
 }
 
@@ -134,7 +134,7 @@ pub fn critic_step(
     lr: f64,
 ) -> Result<CriticStep, LearnError> {
     let target = target_of(nets, batch, noise, temperature, gamma)?;
-    let q = nets.critics.of_actions(batch.inputs.clone(), &batch.actions);
+    let q = nets.critics.of_actions(batch.of_critics(), &batch.actions);
     let values = Pool::Mean.of(q.clone()).mean();
     let losses: Vec<_> = q.into_iter().map(|q| critic_loss(q, target.clone())).collect();
     let steps = adam.steps();
@@ -165,7 +165,7 @@ pub fn actor_step(
     let actions = PolicyActions::new(dist.clone(), batch.prior_of_states(), noise)?;
     // Where a target sees only some critics, the mean of all is what the actor follows.
     let pool = if batch.seen_by_target.is_empty() { Pool::Least } else { Pool::Mean };
-    let loss = actions.soft_value(&frozen(&nets.critics), pool, batch.inputs.clone(), temperature).mean().neg();
+    let loss = actions.soft_value(&frozen(&nets.critics), pool, batch.of_critics(), temperature).mean().neg();
     let steps = adam.steps();
     let mut metrics = ActorStep {
         actor_loss: finite("actor_loss", &loss, steps)?,

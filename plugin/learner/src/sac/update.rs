@@ -30,15 +30,16 @@ impl SacLearner {
             if let Some(normalizer) = &mut self.base.rewards {
                 normalizer.update(&rollout.rewards, &rollout.done(), rollout.envs)?;
             }
-            self.update_here(rollout)
+            self.update_here(rollout, &[])
         })
     }
 
-    /// [`Self::update`] from rewards whose spread is known already: those of skills were taken in tick by tick.
-    pub(crate) fn update_of_known_spread(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
+    /// [`Self::update`] of a policy over skills. The spread of its rewards is known already: they were taken in tick by tick.
+    /// The value of what comes after each row counts as much as `weights` say beside the discount.
+    pub(crate) fn update_of_skills(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<SacMetrics, LearnError> {
         update_on(&self.base.device.plain(), || {
             self.check_rollout(rollout)?;
-            self.update_here(rollout)
+            self.update_here(rollout, weights)
         })
     }
 
@@ -47,12 +48,12 @@ impl SacLearner {
         check_ends(rollout)
     }
 
-    fn update_here(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
+    fn update_here(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<SacMetrics, LearnError> {
         let base = &mut self.base;
         if let Some(normalizer) = &mut base.observations {
             normalizer.update(rollout.obs.as_slice().vectors("SAC")?);
         }
-        self.buffer.push(rollout)?;
+        self.buffer.push(rollout, weights)?;
         let mut sums = MetricSums::default();
         let due = self.steps_due(rollout.rows());
         for _ in 0..due {

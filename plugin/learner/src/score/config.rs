@@ -100,8 +100,8 @@ pub struct ScoreConfig {
     pub horizon: usize,
     /// Where skills come from.
     pub prior: PriorKind,
-    /// Whether PPO's critic counts the ticks that are left of a skill: what (s, z) is worth depends on them. Needs
-    /// `condition`. Off by default: on levels of CoinRun that were never seen its policies were no better.
+    /// Whether critics count the ticks that are left of a skill: what (s, z) is worth depends on them. Needs `condition`.
+    /// Off by default: on levels of CoinRun that were never seen its policies were no better.
     pub critic_clock: bool,
 }
 

@@ -70,7 +70,9 @@ impl OverSkills {
                 // Its buffer keeps rewards as they were: they are scaled when they are read.
                 scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
                 let skills = skill_rollout(rollout, &rollout.rewards, gamma, horizon)?;
-                Ok(learner.update_of_known_spread(&skills.rows)?.scalars())
+                let of_whole = learner.config().gamma;
+                let weights: Vec<f32> = skills.discounts.iter().map(|discount| (discount / of_whole) as f32).collect();
+                Ok(learner.update_of_skills(&skills.rows, &weights)?.scalars())
             }
             Self::Ppo(learner) => {
                 let rewards = scaled(learner.base.rewards.as_mut(), gamma, rollout)?;

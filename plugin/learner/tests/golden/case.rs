@@ -9,7 +9,7 @@ use safetensors::{Dtype, SafeTensors};
 use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A case, with a record of what was compared.
 pub struct Case {
@@ -21,8 +21,16 @@ pub struct Case {
 
 impl Case {
     pub fn load(name: &str) -> Self {
-        let folder = std::env::var_os("PLAYBOT_GOLDEN")
-            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/numerics"), PathBuf::from);
+        let folder = std::env::var_os("PLAYBOT_GOLDEN").map_or_else(|| fixtures("numerics"), PathBuf::from);
+        Self::read(&folder, name)
+    }
+
+    /// A case of the script `tests/fixtures/sac_variants/generate.py`, which no other folder has.
+    pub fn of_sac_variants(name: &str) -> Self {
+        Self::read(&fixtures("sac_variants"), name)
+    }
+
+    fn read(folder: &Path, name: &str) -> Self {
         let read = |ending: &str| {
             let path = folder.join(format!("{name}.{ending}"));
             std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
@@ -239,6 +247,10 @@ impl Case {
             }
         }
     }
+}
+
+fn fixtures(folder: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(folder)
 }
 
 struct Fill<'a> {

@@ -1,6 +1,7 @@
-//! Golden tests: the learner against reference numbers computed with PyTorch in double precision.
+//! Golden tests: the learner against reference numbers computed in double precision, with PyTorch or from first principles.
 //!
-//! The cases lie in `tests/fixtures/numerics`, or in the folder that the environment variable `PLAYBOT_GOLDEN` names.
+//! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable `PLAYBOT_GOLDEN`
+//! names; those of variants of SAC lie in `tests/fixtures/sac_variants`, beside the script that makes them.
 
 mod adam;
 mod case;
@@ -14,5 +15,6 @@ mod names;
 mod norm;
 mod ppo_loss;
 mod sac;
+mod sac_variants;
 mod update;
 mod vae;

@@ -1,7 +1,7 @@
 //! SAC: the squashed Gaussian, a whole continuous step, and the losses over choices.
 
 use crate::case::{Case, host, number};
-use crate::update::{After, Names};
+use crate::update::{After, check_gradients};
 use burn::tensor::Tensor;
 use playbot_learner::nn::{
     ActionBatch, Adam, AdamConfig, Dist, LogProbForm, Parameters, SquashedGaussian, bounded_log_std, frozen, tracked,
@@ -102,6 +102,7 @@ impl Continuous {
             rewards: case.tensor("in.rewards", &device),
             continues: case.tensor::<1>("in.terminations", &device).neg() + 1.0,
             next_inputs: case.tensor("in.next_obs", &device),
+            left: None,
             teacher: None,
             prior: None,
             seen_by_target: Vec::new(),
@@ -110,16 +111,6 @@ impl Continuous {
 
     fn noise(&self, name: &str) -> Tensor<2> {
         self.case.tensor(name, &self.kind.plain())
-    }
-
-    /// Compares the gradients that a step with learning rate 0 and β = 0 leaves in Adam's first moment.
-    fn check_gradients<M: Parameters>(&self, group: &str, prefix: &str, network: &mut M, adam: &Adam, names: &str) {
-        let mut all = Names(Vec::new());
-        network.visit(prefix, &mut all);
-        for name in all.0 {
-            let (gradient, _) = adam.moments(&name).expect("updated");
-            self.case.check_parameter(group, &name.replacen(prefix, names, 1), gradient);
-        }
     }
 
     /// What the policy says about the next states, and the critics about the batch, before anything is trained.
@@ -156,7 +147,7 @@ impl Continuous {
         let (noise, gamma) = (self.noise("in.noise_next"), case.number("gamma"));
         let (mut copy, mut adam) = (nets.clone(), Adam::new(still));
         critic_step(&mut copy, &mut adam, &batch, Some(&noise), alpha, gamma, 0.0).expect("finite");
-        self.check_gradients("grad_critic.", "", &mut copy.critics, &adam, "");
+        check_gradients(case, "grad_critic.", ("", ""), &mut copy.critics, &adam);
         let mut adam = Adam::new(config);
         let lr = case.number("q_lr");
         let step = critic_step(&mut nets, &mut adam, &batch, Some(&noise), alpha, gamma, lr).expect("finite");
@@ -168,7 +159,7 @@ impl Continuous {
         let noise = self.noise("in.noise_actor");
         let (mut copy, mut adam) = (nets.clone(), Adam::new(still));
         actor_step(&mut copy, &mut adam, &batch, Some(&noise), alpha, None, 0.0).expect("finite");
-        self.check_gradients("grad_actor.", "actor", &mut copy.actor, &adam, "sac_actor");
+        check_gradients(case, "grad_actor.", ("actor", "sac_actor"), &mut copy.actor, &adam);
         let mut adam = Adam::new(config);
         let lr = case.number("actor_lr");
         let step = actor_step(&mut nets, &mut adam, &batch, Some(&noise), alpha, None, lr).expect("finite");

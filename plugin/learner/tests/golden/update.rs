@@ -197,12 +197,24 @@ impl<'a> Update<'a> {
         let config = PpoConfig { max_grad_norm: 1e30, ..self.config.clone() };
         let score = self.score.as_ref();
         gradient_step(&mut nets, &mut adam, batch, &config, score, 0.0).expect("finite");
-        let mut names = Names(Vec::new());
-        nets.visit("", &mut names);
-        for name in names.0 {
-            let (gradient, _) = adam.moments(&name).expect("updated");
-            self.case.check_parameter("step1_grad.", &name, gradient);
-        }
+        check_gradients(self.case, "step1_grad.", ("", ""), &mut nets, &adam);
+    }
+}
+
+/// Compares the gradients that a step with learning rate 0 and β = 0 left in Adam's first moment. What begins with the first
+/// of two names in `network` begins with the second in the case.
+pub fn check_gradients<M: Parameters>(
+    case: &Case,
+    group: &str,
+    (ours, theirs): (&str, &str),
+    network: &mut M,
+    adam: &Adam,
+) {
+    let mut names = Names(Vec::new());
+    network.visit(ours, &mut names);
+    for name in names.0 {
+        let (gradient, _) = adam.moments(&name).expect("updated");
+        case.check_parameter(group, &name.replacen(ours, theirs, 1), gradient);
     }
 }
 

@@ -3,7 +3,24 @@
 use crate::corridor;
 use crate::score::model;
 use crate::switches::{ppo, rollout};
-use playbot_learner::{DeviceKind, Learner, PpoConfig, PpoLearner, ScoreConfig};
+use playbot_learner::{
+    DeviceKind, Learner, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
+};
+
+/// Rows that end at once and pay as much as is left of their skills.
+fn paid_by_the_clock(model: &SkillModel) -> Rollout {
+    let mut rollout = rollout(model);
+    let rows = rollout.rows();
+    rollout.left = (0..rows).map(|row| if row % 2 == 0 { 1.0 } else { 0.125 }).collect();
+    rollout.rewards = rollout.left.clone();
+    rollout.terminated = vec![true; rows];
+    rollout.truncated = vec![false; rows];
+    (rollout.ends.cut_rows, rollout.ends.cut_obs, rollout.ends.cut_z) =
+        (Vec::new(), Vec::<f32>::new().into(), Vec::new());
+    rollout.ends.cut_left = Vec::new();
+    rollout.ends.next_left = vec![1.0; rollout.envs];
+    rollout
+}
 
 #[test]
 fn the_critic_counts_the_ticks_of_a_skill_if_it_has_a_clock() {
@@ -33,14 +50,7 @@ fn the_critic_counts_the_ticks_of_a_skill_if_it_has_a_clock() {
 #[test]
 fn the_clock_learns_what_skills_that_run_out_are_worth() {
     let model = model(1);
-    let mut rollout = rollout(&model);
-    let rows = rollout.rows();
-    rollout.left = (0..rows).map(|row| if row % 2 == 0 { 1.0 } else { 0.125 }).collect();
-    rollout.rewards = rollout.left.clone();
-    rollout.terminated = vec![true; rows];
-    rollout.truncated = vec![false; rows];
-    (rollout.ends.cut_rows, rollout.ends.cut_obs, rollout.ends.cut_z) =
-        (Vec::new(), Vec::<f32>::new().into(), Vec::new());
+    let rollout = paid_by_the_clock(&model);
     let error = |critic_clock| {
         let config = PpoConfig { norm_reward: false, clip_value_loss: false, epochs: 40, ..corridor::config() };
         let score = ScoreConfig { critic_clock, ..ScoreConfig::default() };
@@ -51,4 +61,32 @@ fn the_clock_learns_what_skills_that_run_out_are_worth() {
     let (with, without) = (error(true), error(false));
     // Without it there are only states and skills to tell the rows apart by.
     assert!(with < 0.001 && without > 0.01, "{with} with a clock, {without} without");
+}
+
+#[test]
+fn the_critics_of_sac_count_too_and_a_file_keeps_what_they_count() {
+    let model = model(1);
+    let rollout = paid_by_the_clock(&model);
+    let config = SacConfig { learning_starts: 1, updates_per_step: 1.0, ..crate::sac::config() };
+    let error = |critic_clock| {
+        let score = ScoreConfig { critic_clock, ..ScoreConfig::default() };
+        let learner = SacLearner::with_skill(config.clone(), score, &model, 1, DeviceKind::Flex);
+        let mut learner = learner.expect("good settings");
+        learner.update(&rollout).expect("finite");
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("checkpoint.safetensors");
+        learner.save(&path).expect("written");
+        let mut loaded = SacLearner::load(&path, DeviceKind::Flex).expect("read");
+        let metrics: Vec<_> = (0..6).map(|_| learner.update(&rollout).expect("finite")).collect();
+        let again: Vec<_> = (0..6).map(|_| loaded.update(&rollout).expect("finite")).collect();
+        assert_eq!(metrics, again);
+        metrics.last().and_then(|metrics| metrics.qf_loss).expect("gradient steps")
+    };
+    let (with, without) = (error(true), error(false));
+    assert!(with < 0.2 * without, "{with} with a clock, {without} without");
+    let silent = Rollout { left: Vec::new(), ..rollout.clone() };
+    let score = ScoreConfig { critic_clock: true, ..ScoreConfig::default() };
+    let mut counting = SacLearner::with_skill(config, score, &model, 1, DeviceKind::Flex).expect("good settings");
+    let error = counting.update(&silent).expect_err("a rollout that does not count").to_string();
+    assert!(error.contains("rollout left"), "{error}");
 }

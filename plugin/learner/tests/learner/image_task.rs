@@ -9,14 +9,17 @@ use playbot_learner::{
 };
 use std::ops::ControlFlow;
 
-const SIDE: usize = 12;
 /// Steps until an episode is cut off.
 const LIMIT: usize = 8;
 /// Steps between two draws of a skill.
 const HORIZON: usize = 4;
 
+/// Rows of a picture, and its columns.
+pub const SIDE: usize = 12;
 pub const SHAPE: ImageShape = ImageShape { channels: 1, height: SIDE, width: SIDE };
 pub const SPACE: ActionSpace = ActionSpace::Discrete(4);
+/// Steps of a window of [`skill_config`].
+pub const WINDOW: usize = 4;
 
 pub fn cnn() -> CnnKind {
     CnnKind::Impala { channels: vec![4, 4], feature: 8 }
@@ -35,6 +38,20 @@ pub fn config() -> PpoConfig {
     }
 }
 
+/// A small skill model of such pictures, which learns within a dozen epochs.
+pub fn skill_config() -> SkillConfig {
+    SkillConfig {
+        latent: 2,
+        window: WINDOW,
+        hidden: vec![32],
+        gru_hidden: 16,
+        cnn: CnnKind::Impala { channels: vec![4, 4], feature: 16 },
+        lr: 1e-2,
+        batch: 16,
+        ..SkillConfig::default()
+    }
+}
+
 /// A dark image with a bright spot of 3×3 pixels in one of its quarters: top left, top right, bottom left, bottom right.
 pub fn image(quarter: u32, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut pixels: Vec<u8> = (0..SHAPE.numbers()).map(|_| below(rng, 40) as u8).collect();
@@ -48,17 +65,7 @@ pub fn image(quarter: u32, rng: &mut ChaCha8Rng) -> Vec<u8> {
 
 /// Players who look at the picture six times in ten, and guess otherwise; with settings to learn from them.
 pub fn demonstrations(seed: u64) -> (SkillConfig, Dataset) {
-    let config = SkillConfig {
-        latent: 2,
-        beta: 0.5,
-        window: 3,
-        hidden: vec![16],
-        gru_hidden: 8,
-        cnn: cnn(),
-        lr: 1e-2,
-        batch: 16,
-        ..SkillConfig::default()
-    };
+    let config = SkillConfig { beta: 0.5, window: 3, hidden: vec![16], gru_hidden: 8, cnn: cnn(), ..skill_config() };
     let mut rng = Streams::new(seed).stream("demos", 0);
     let episodes = (0..80).map(|_| {
         let quarters: Vec<u32> = (0..9).map(|_| below(&mut rng, 4) as u32).collect();

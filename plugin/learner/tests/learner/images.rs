@@ -1,5 +1,6 @@
 //! The skill model on images: it learns what is to be seen, keeps apart who acted, and survives its file.
 
+use crate::image_task::{SHAPE, SIDE, WINDOW, skill_config};
 use playbot_learner::nn::CnnKind;
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
 use playbot_learner::{
@@ -9,24 +10,8 @@ use playbot_learner::{
 use std::ops::ControlFlow;
 use std::path::Path;
 
-const SIDE: usize = 12;
-const SHAPE: ImageShape = ImageShape { channels: 1, height: SIDE, width: SIDE };
-const STEPS: usize = 4;
 const SPACE: ActionSpace = ActionSpace::Discrete(4);
 const EPOCHS: usize = 12;
-
-fn config() -> SkillConfig {
-    SkillConfig {
-        latent: 2,
-        window: STEPS,
-        hidden: vec![32],
-        gru_hidden: 16,
-        cnn: CnnKind::Impala { channels: vec![4, 4], feature: 16 },
-        lr: 1e-2,
-        batch: 16,
-        ..SkillConfig::default()
-    }
-}
 
 /// A dark image with a bright spot of 3×3 pixels in the left or the right half.
 fn image(right: bool, rng: &mut ChaCha8Rng) -> Vec<u8> {
@@ -45,7 +30,7 @@ fn episodes(count: u64, act: impl Fn(bool, &[bool]) -> Actions) -> Vec<DemoEpiso
     let streams = Streams::new(4);
     let episode = |i: u64| {
         let mut rng = streams.stream("episode", i);
-        let rights: Vec<bool> = (0..3 * STEPS).map(|_| below(&mut rng, 2) == 1).collect();
+        let rights: Vec<bool> = (0..3 * WINDOW).map(|_| below(&mut rng, 2) == 1).collect();
         let pixels: Vec<u8> = rights.iter().flat_map(|&right| image(right, &mut rng)).collect();
         DemoEpisode { observations: pixels.into(), actions: act(i % 2 == 1, &rights) }
     };
@@ -69,7 +54,7 @@ fn train(trainer: &mut SkillTrainer, epochs: usize) -> Vec<f32> {
 #[test]
 fn the_model_sees_where_the_spot_is_and_who_plays() {
     for action_input in [ActionInput::OneHot, ActionInput::ScaledIndex] {
-        let config = SkillConfig { action_input, ..config() };
+        let config = SkillConfig { action_input, ..skill_config() };
         let mut trainer = SkillTrainer::new(config, demos(96), 1, DeviceKind::Flex).expect("windows fit");
         let nll = train(&mut trainer, EPOCHS);
         // Chance costs 4 ln 4 = 5.5 per window. A decoder that does not see the spot, or an encoder that does not tell
@@ -108,7 +93,7 @@ fn continuous_actions_of_images() {
         values: rights.iter().flat_map(|&right| [sign(right), sign(second)]).collect(),
     };
     let data = Dataset::new(SHAPE, ActionSpace::Continuous(2), episodes(96, turn)).expect("consistent");
-    let mut trainer = SkillTrainer::new(config(), data, 1, DeviceKind::Flex).expect("windows fit");
+    let mut trainer = SkillTrainer::new(skill_config(), data, 1, DeviceKind::Flex).expect("windows fit");
     let nll = train(&mut trainer, EPOCHS);
     // One normal distribution for all has a σ of 0.6 in either dimension and costs 7.3 per window. With only one of the
     // dimensions told apart, the other still costs 3.6, and the first cannot have won as much yet.
@@ -125,10 +110,10 @@ fn both_backends_and_both_architectures_learn_the_same() {
     });
     let data = Dataset::new(shape, ActionSpace::Discrete(2), episodes.collect()).expect("consistent");
     let run = |cnn: &CnnKind, device| {
-        let config = SkillConfig { cnn: cnn.clone(), batch: 4, ..config() };
+        let config = SkillConfig { cnn: cnn.clone(), batch: 4, ..skill_config() };
         train(&mut SkillTrainer::new(config, data.clone(), 1, device).expect("windows fit"), 3)
     };
-    for cnn in [config().cnn, nature] {
+    for cnn in [skill_config().cnn, nature] {
         let (flex, ndarray) = (run(&cnn, DeviceKind::Flex), run(&cnn, DeviceKind::Ndarray));
         assert!(flex.iter().zip(&ndarray).all(|(a, b)| (a - b).abs() < 1e-3), "{cnn:?}: {flex:?} and {ndarray:?}");
     }
@@ -138,7 +123,7 @@ fn both_backends_and_both_architectures_learn_the_same() {
 fn a_loaded_trainer_goes_on_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("trainer.safetensors");
-    let config = SkillConfig { windows: WindowRule::Legacy, ..config() };
+    let config = SkillConfig { windows: WindowRule::Legacy, ..skill_config() };
     let mut trainer = SkillTrainer::new(config, demos(12), 7, DeviceKind::Flex).expect("windows fit");
     train(&mut trainer, 1);
     trainer.train_batch().expect("finite");
@@ -163,7 +148,7 @@ fn a_loaded_trainer_goes_on_bit_for_bit() {
 }
 
 fn model() -> SkillModel {
-    let mut trainer = SkillTrainer::new(config(), demos(12), 7, DeviceKind::Flex).expect("windows fit");
+    let mut trainer = SkillTrainer::new(skill_config(), demos(12), 7, DeviceKind::Flex).expect("windows fit");
     train(&mut trainer, 1);
     trainer.into_model()
 }
@@ -201,14 +186,14 @@ fn a_row_does_not_depend_on_the_other_rows() {
     let pixels: Vec<u8> = (0..n * shape.numbers()).map(|_| below(&mut rng, 256) as u8).collect();
     let z: Vec<f32> = (0..n * 2).map(|_| normal(&mut rng)).collect();
     for (cnn, device) in
-        [(config().cnn, DeviceKind::Flex), (nature, DeviceKind::Flex), (config().cnn, DeviceKind::Ndarray)]
+        [(skill_config().cnn, DeviceKind::Flex), (nature, DeviceKind::Flex), (skill_config().cnn, DeviceKind::Ndarray)]
     {
         let episode = DemoEpisode {
             observations: pixels[..4 * shape.numbers()].to_vec().into(),
             actions: Actions::Discrete(vec![0; 4]),
         };
         let data = Dataset::new(shape, ActionSpace::Discrete(5), vec![episode]).expect("consistent");
-        let config = SkillConfig { cnn, ..config() };
+        let config = SkillConfig { cnn, ..skill_config() };
         let policy = SkillTrainer::new(config, data, 1, device).expect("a window fits").into_model().policy();
         let whole = policy.forward(&z, &pixels, n).expect("finite");
         for size in [1, 2, 3, 16] {
@@ -236,7 +221,7 @@ fn what_cannot_read_images_says_so() {
     config_error(drawn.expect_err("a vector"), "prior are vectors, not images");
     let short = model.policy().forward(&z, &vec![0u8; 143], 1).expect_err("a pixel is missing");
     assert!(matches!(short, LearnError::Shape { expected: 144, found: 143, .. }), "{short}");
-    let small = SkillConfig { cnn: CnnKind::Nature { feature: 8 }, ..config() };
+    let small = SkillConfig { cnn: CnnKind::Nature { feature: 8 }, ..skill_config() };
     let error = SkillTrainer::new(small, demos(2), 1, DeviceKind::Flex).expect_err("too small for it");
     config_error(error, "at least 36 rows");
 }

@@ -1,31 +1,17 @@
 //! Trunks that learn to tell the game's state of pictures while a skill model is learned.
 
-use playbot_learner::nn::CnnKind;
+use crate::image_task::{SHAPE, SIDE, WINDOW, skill_config};
 use playbot_learner::rng::{Streams, below};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, SkillConfig, SkillMetrics,
-    SkillModel, SkillTrainer,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, SkillConfig, SkillMetrics, SkillModel,
+    SkillTrainer,
 };
 use std::ops::ControlFlow;
 
-const SIDE: usize = 12;
-const SHAPE: ImageShape = ImageShape { channels: 1, height: SIDE, width: SIDE };
-const STEPS: usize = 4;
 const SPACE: ActionSpace = ActionSpace::Discrete(2);
 
 fn config(state_weight: f64) -> SkillConfig {
-    SkillConfig {
-        latent: 2,
-        window: STEPS,
-        hidden: vec![32],
-        gru_hidden: 16,
-        cnn: CnnKind::Impala { channels: vec![4, 4], feature: 16 },
-        lr: 1e-2,
-        batch: 16,
-        held_out: 0.2,
-        state_weight,
-        ..SkillConfig::default()
-    }
+    SkillConfig { held_out: 0.2, state_weight, ..skill_config() }
 }
 
 /// Pictures of a bright spot, as vectors its row and column, and players who press a key for the half in which it is.
@@ -35,7 +21,7 @@ fn demos(count: u64) -> (Dataset, Dataset) {
     for i in 0..count {
         let mut rng = streams.stream("episode", i);
         let (mut pixels, mut state, mut actions) = (Vec::new(), Vec::new(), Vec::new());
-        for _ in 0..3 * STEPS {
+        for _ in 0..3 * WINDOW {
             let [row, column] = [0; 2].map(|_| below(&mut rng, SIDE as u64 - 2) as usize);
             let mut picture: Vec<u8> = (0..SHAPE.numbers()).map(|_| below(&mut rng, 40) as u8).collect();
             (row..row + 3).for_each(|y| picture[y * SIDE + column..][..3].fill(255));

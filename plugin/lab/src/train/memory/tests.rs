@@ -9,7 +9,13 @@ use crate::train::config_file::parse_experiment;
 use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
 
 /// A game of ten numbers.
-struct Ten;
+struct Ten {
+    arenas_per_world: Option<u32>,
+}
+
+const TEN: Ten = Ten { arenas_per_world: None };
+/// A World bears a single arena of it.
+const ALONE: Ten = Ten { arenas_per_world: Some(1) };
 
 impl Game for Ten {
     fn name(&self) -> &'static str {
@@ -34,36 +40,8 @@ impl Game for Ten {
     fn spawn_agent(&self, world: &mut World, _index: u32) -> Entity {
         world.spawn_empty().id()
     }
-}
-
-/// The same game, of which a World bears a single arena.
-struct Alone;
-
-impl Game for Alone {
-    fn name(&self) -> &'static str {
-        "alone"
-    }
-    fn version(&self) -> u32 {
-        1
-    }
-    fn modes(&self) -> &'static [&'static str] {
-        &["a"]
-    }
-    fn tick_hz(&self) -> f64 {
-        15.0
-    }
-    fn actions(&self) -> ActionSpace {
-        Ten.actions()
-    }
-    fn observation(&self) -> ObservationSpace {
-        Ten.observation()
-    }
-    fn build(&self, _app: &mut App, _mode: &str) {}
-    fn spawn_agent(&self, world: &mut World, _index: u32) -> Entity {
-        world.spawn_empty().id()
-    }
     fn arenas_per_world(&self) -> Option<u32> {
-        Some(1)
+        self.arenas_per_world
     }
 }
 
@@ -73,7 +51,7 @@ fn machine(memory: u64) -> Room {
 }
 
 fn check(algorithm: &str, changes: &str, free: u64) -> Result<(), String> {
-    check_on(&Ten, algorithm, changes, &machine(free))
+    check_on(&TEN, algorithm, changes, &machine(free))
 }
 
 fn check_on(game: &dyn Game, algorithm: &str, changes: &str, room: &Room) -> Result<(), String> {
@@ -119,23 +97,23 @@ fn worlds_must_fit_with_their_threads() {
     assert!(text.contains("1000 Worlds with 1000 arenas need 1001.0 MiB, and 990.0 MiB") && text.contains("`worlds`"));
     // A thread each, of which the machine lets nobody have so many, however much memory it has.
     let limited = |most| Room { threads: ThreadLimit { most, whose: "the kernel" }, ..machine(u64::MAX) };
-    assert_eq!(check_on(&Ten, "ppo", many, &limited(1000)), Ok(()));
-    let text = check_on(&Ten, "ppo", many, &limited(999)).expect_err("too many");
+    assert_eq!(check_on(&TEN, "ppo", many, &limited(1000)), Ok(()));
+    let text = check_on(&TEN, "ppo", many, &limited(999)).expect_err("too many");
     assert!(
         text.starts_with("`worlds` is 1000: ") && text.contains("the kernel leaves room for 999 threads"),
         "{text}"
     );
     let one = "arenas: 1000, worlds: 1, ppo: (num_steps: 1, minibatches: 1, hidden: [8])";
-    assert_eq!(check_on(&Ten, "ppo", one, &limited(0)), Ok(()), "it plays on the thread that is there");
-    let text = check_on(&Alone, "ppo", one, &limited(999)).expect_err("a World for each arena");
+    assert_eq!(check_on(&TEN, "ppo", one, &limited(0)), Ok(()), "it plays on the thread that is there");
+    let text = check_on(&ALONE, "ppo", one, &limited(999)).expect_err("a World for each arena");
     assert!(text.starts_with("`arenas` is 1000: 1000 Worlds play on a thread each"), "{text}");
     // The stacks of a thousand threads are 2 GiB of address space.
     let narrow = |space| Room { space, ..machine(u64::MAX) };
-    let text = check_on(&Ten, "ppo", many, &narrow(2 << 30)).expect_err("too little");
+    let text = check_on(&TEN, "ppo", many, &narrow(2 << 30)).expect_err("too little");
     assert!(
         text.contains("1000 of them for Worlds") && text.contains("`ulimit -v`") && text.contains("lower `worlds`")
     );
-    assert_eq!(check_on(&Ten, "ppo", many, &narrow(1 << 50)), Ok(()));
+    assert_eq!(check_on(&TEN, "ppo", many, &narrow(1 << 50)), Ok(()));
 }
 
 #[test]
