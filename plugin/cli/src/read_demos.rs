@@ -22,9 +22,10 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
     let demos = demonstrations(game, experiment, path)?;
     let observation_config = experiment.observation_config();
     let (steps, gib) = (demos.steps(), |bytes: u64| bytes as f64 / f64::from(1 << 30));
-    match demos.picture_bytes() {
-        0 => tell!(),
-        bytes => tell!(": {observation_config} take {:.2} GiB", gib(bytes)),
+    match (demos.bytes(game), demos.picture_bytes()) {
+        (0, _) => tell!(),
+        (bytes, pictures) if bytes == pictures => tell!(": {observation_config} take {:.2} GiB", gib(bytes)),
+        (bytes, _) => tell!(": {observation_config} and the states that they show take {:.2} GiB", gib(bytes)),
     }
     let bar = progress::bar("replay recordings", steps, "steps");
     let dataset = demos.dataset(game, threads, |steps| bar.inc(steps));

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations, Streams, rng::shuffle};
+use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations};
 
 use super::{replay_observations::ObservedEpisode, verify::VerifyError};
 use crate::sensors::GameSensors;
@@ -107,40 +107,6 @@ impl Demonstrations {
         })
     }
 
-    /// Keeps the episodes that reached the goal.
-    ///
-    /// # Errors
-    ///
-    /// [`VerifyError::NoneWon`] if none did.
-    fn won(mut self, path: &Path) -> Result<Self, VerifyError> {
-        let episodes = self.episodes.len();
-        self.episodes.retain(|demo| demo.episode.is_success());
-        if self.episodes.is_empty() {
-            return Err(VerifyError::NoneWon { path: path.to_owned(), episodes });
-        }
-        Ok(self)
-    }
-
-    /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
-    /// recordings, always the same ones. More steps keep them and others.
-    pub fn at_most(mut self, steps: u64) -> Self {
-        // At random: recordings repeat the same levels in the same order, so that every n-th episode might always be on the
-        // same level.
-        let mut order: Vec<usize> = (0..self.episodes.len()).collect();
-        shuffle(&mut order, &mut Streams::new(0).stream("demonstrations", 0));
-        let mut sum = 0;
-        let kept = order.iter().take_while(|index| {
-            sum += self.episodes[**index].episode.len() as u64;
-            sum <= steps
-        });
-        let kept = kept.count().max(1);
-        let mut keep = vec![false; self.episodes.len()];
-        order.iter().take(kept).for_each(|&index| keep[index] = true);
-        let mut keep = keep.into_iter();
-        self.episodes.retain(|_| keep.next().unwrap_or(false));
-        self
-    }
-
     /// Steps of all episodes together.
     pub fn steps(&self) -> u64 {
         self.episodes.iter().map(|demo| demo.episode.len() as u64).sum()
@@ -206,7 +172,7 @@ impl Demonstrations {
     }
 
     /// Memory of the pictures, and of the states beside them if those are to be told.
-    fn bytes(&self, game: &dyn Game) -> u64 {
+    pub fn bytes(&self, game: &dyn Game) -> u64 {
         let numbers = ObservationConfig::default().obs_kind(game).numbers() as u64;
         let states = if self.with_states { self.steps() * numbers * size_of::<f32>() as u64 } else { 0 };
         self.picture_bytes() + states
@@ -248,7 +214,7 @@ pub(super) fn learner_actions(episode: &DemoEpisode) -> Actions {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use bevy_playbot::{
         demo::file::DemoActions,
@@ -256,7 +222,7 @@ mod tests {
         vision::{ImageOptions, ObservationKind},
     };
 
-    fn all(episodes: impl Iterator<Item = DemoEpisode>) -> Demonstrations {
+    pub(in super::super) fn all(episodes: impl Iterator<Item = DemoEpisode>) -> Demonstrations {
         let demo = |(index, episode)| Demonstration {
             file: Path::new("a.demo").into(),
             index,
@@ -284,20 +250,6 @@ mod tests {
     }
 
     #[test]
-    fn lost_episodes_are_left_out_where_only_won_ones_are_wanted() {
-        use bevy_playbot::demo::file::DemoEnd;
-        let ended = |ends: &[DemoEnd]| {
-            all(ends.iter().map(|&end| DemoEpisode { end, ..DemoEpisode::new(0, DemoActions::Discrete(2)) }))
-        };
-        let (won, lost) = (DemoEnd::Terminated { success: true }, DemoEnd::Terminated { success: false });
-        let path = Path::new("a.demo");
-        let kept = ended(&[lost, won, DemoEnd::Truncated, won, DemoEnd::Aborted]).won(path).expect("two are won");
-        assert_eq!(kept.episodes.iter().map(|demo| demo.index).collect::<Vec<_>>(), [1, 3]);
-        let error = ended(&[lost, DemoEnd::Truncated]).won(path).expect_err("none is won").to_string();
-        assert!(error.contains("a.demo: none of the 2 recorded episodes"), "{error}");
-    }
-
-    #[test]
     fn pictures_that_have_no_room_are_refused() {
         let episode = DemoEpisode { state_hashes: vec![0; 10], ..DemoEpisode::new(0, DemoActions::Discrete(2)) };
         let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
@@ -310,24 +262,5 @@ mod tests {
         for words in ["0.5 GiB", "`demo_steps`", "1024×1024 colour pictures of the raster, 16 in a stack"] {
             assert!(error.contains(words), "{error}");
         }
-    }
-
-    #[test]
-    fn what_is_kept_is_drawn_from_all_episodes_and_levels() {
-        let all = || {
-            all((0..80).map(|index| DemoEpisode {
-                state_hashes: vec![0; 10],
-                ..DemoEpisode::new(index % 8, DemoActions::Discrete(2))
-            }))
-        };
-        let kept = |steps| all().at_most(steps).episodes.iter().map(|demo| demo.index).collect::<Vec<_>>();
-        let part = kept(209);
-        assert_eq!(part.len(), 20);
-        let early = part.iter().filter(|index| **index < 40).count();
-        assert!((3..=17).contains(&early), "{part:?}");
-        let levels: std::collections::BTreeSet<usize> = part.iter().map(|index| index % 8).collect();
-        assert!(levels.len() >= 5, "levels follow one another in a rhythm of 8, of which {levels:?} are kept");
-        assert!(kept(150).iter().all(|index| part.contains(index)), "fewer steps are a part of more");
-        assert_eq!((kept(1).len(), kept(800).len(), kept(u64::MAX).len()), (1, 80, 80));
     }
 }

@@ -1,6 +1,7 @@
 //! Recordings in the laboratory: making them of a demonstrator, checking them by replay, and reading them back for learning.
 
 mod action_noise;
+mod chosen;
 pub mod dataset;
 pub mod demonstration;
 mod observe;

@@ -80,8 +80,8 @@ pub enum VerifyError {
     },
     /// Only won episodes were wanted.
     #[error(
-        "{}: none of the {episodes} recorded episodes reached the goal, and `demo_wins` takes only those that did: record a \
-         demonstrator that reaches it, or leave `demo_wins` out",
+        "{}: none of the {episodes} recorded episodes ended at the goal, and `demo_wins` takes only those that did: record a \
+         demonstrator that gets there, or leave `demo_wins` out, as it must be for games that go on at the goal",
         path.display()
     )]
     NoneWon {

@@ -45,7 +45,8 @@ pub struct Experiment {
     /// them if none is named.
     #[serde(default)]
     pub demo_steps: Option<u64>,
-    /// Learn only from recorded episodes that ended with the goal reached: of demonstrators that do not always reach it.
+    /// Learn only from recorded episodes that ended at the goal: of demonstrators that do not always get there. Episodes of
+    /// games that go on at the goal end nowhere, and are left out.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub demo_wins: bool,
     /// Seed of everything random.

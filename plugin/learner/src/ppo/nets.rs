@@ -30,7 +30,7 @@ impl PpoNets {
         };
         let mut rng = base.streams.stream("ppo.critic", 0);
         let critic = Critic::new(&critic_shape(config, &shape), &mut rng, &device);
-        let counts = base.score_config().is_some_and(|score| score.critic_clock && score.condition);
+        let counts = base.score_config().is_some_and(|score| score.critic_clock);
         let Ok(critic) =
             if counts { critic.with_clock(&mut RandomInit { rng: &mut rng, device: &device }, "") } else { Ok(critic) };
         Ok(Self { actor, critic })

@@ -74,21 +74,31 @@ impl ReplayBuffer {
         self.seen.min(self.capacity as u64) as usize
     }
 
-    /// Takes in all transitions of a checked rollout, in order; the oldest give way. The next state after a
-    /// termination is stored as zeros. `weights`, one per row, are read only by a buffer that keeps them.
+    /// `Ok` if a rollout says how much of the skills was left, or that is not kept.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] if the rollout does not say how much of the
-    /// skills was left, and the buffer keeps that.
+    /// [`LearnError::Shape`] names what is missing.
+    pub(super) fn check_clock(&self, rollout: &Rollout) -> Result<(), LearnError> {
+        if self.widths.clock == 0 {
+            return Ok(());
+        }
+        let ends = &rollout.ends;
+        LearnError::check("rollout left", rollout.rows(), rollout.left.len())?;
+        LearnError::check("rollout ends cut_left", ends.cut_rows.len(), ends.cut_left.len())?;
+        LearnError::check("rollout ends next_left", rollout.envs, ends.next_left.len())
+    }
+
+    /// Takes in all transitions of a checked rollout, in order; the oldest give way. The next state after a
+    /// termination is stored as zeros. `weights` are one per row if the buffer keeps them, else none.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] as [`Self::check_clock`] or for another number
+    /// of weights.
     pub(super) fn push(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<(), LearnError> {
         let Widths { obs: obs_dim, latent, clock, weight } = self.widths;
         let (no_obs, no_z) = (vec![0.0; obs_dim], vec![0.0; latent]);
         let obs = rollout.obs.as_slice().vectors("SAC")?;
-        if clock > 0 {
-            LearnError::check("rollout left", rollout.rows(), rollout.left.len())?;
-            LearnError::check("rollout ends cut_left", rollout.ends.cut_rows.len(), rollout.ends.cut_left.len())?;
-            LearnError::check("rollout ends next_left", rollout.envs, rollout.ends.next_left.len())?;
-        }
+        self.check_clock(rollout)?;
         LearnError::check("weights of transitions", rollout.rows() * weight, weights.len())?;
         for transition in transitions(rollout)? {
             let (row, at) = (transition.row, (self.seen % self.capacity as u64) as usize);

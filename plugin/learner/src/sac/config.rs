@@ -43,7 +43,8 @@ pub struct SacConfig {
     pub temperature_lr: f64,
     /// Transitions in a gradient step, drawn with replacement.
     pub batch: usize,
-    /// Transitions that are kept, the newest. Each takes 2 · (obs_dim + latent) + action width + 2 numbers of 4 bytes.
+    /// Transitions that are kept, the newest. Each takes 2 · (obs_dim + latent) + action width + 2 numbers of 4 bytes, and
+    /// 2 more where critics count ticks, 1 where skills are chosen.
     pub buffer: usize,
     /// Transitions before the first gradient step.
     pub learning_starts: u64,

@@ -3,7 +3,7 @@
 use super::buffer::{ReplayBuffer, Widths};
 use super::demos::Demos;
 use super::explore::explorer;
-use super::nets::clock;
+use super::nets::clock_width;
 use super::{RlpdConfig, SacConfig, SacNets, check_ends};
 use crate::file::{FileKind, TensorFile};
 use crate::learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics};
@@ -170,7 +170,7 @@ impl SacLearner {
         let widths = Widths {
             obs: base.spec.obs.numbers(),
             latent: base.rollout_latent(),
-            clock: clock(&base),
+            clock: clock_width(&base),
             weight: usize::from(base.prior_origin().is_some()),
         };
         Self {

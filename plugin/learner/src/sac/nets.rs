@@ -99,13 +99,13 @@ fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
 fn ensemble(config: &SacConfig, base: &LearnerBase) -> EnsembleShape {
     let (shape, space) = (actors_net(config, base), base.spec.action_space);
     // Critics that count read one number more.
-    let net = NetShape { obs_dim: shape.obs_dim.saturating_add(clock(base)), ..shape };
+    let net = NetShape { obs_dim: shape.obs_dim.saturating_add(clock_width(base)), ..shape };
     EnsembleShape { net, space, critics: config.critics, layer_norm: config.layer_norm }
 }
 
 /// 1 if the critics read how much of a skill's ticks is left, else 0.
-pub(super) fn clock(base: &LearnerBase) -> usize {
-    usize::from(base.score_config().is_some_and(|score| score.critic_clock && score.condition))
+pub(super) fn clock_width(base: &LearnerBase) -> usize {
+    usize::from(base.score_config().is_some_and(|score| score.critic_clock))
 }
 
 /// What the actor reads, and the hidden layers of all networks.

@@ -45,7 +45,8 @@ impl SacLearner {
 
     fn check_rollout(&self, rollout: &Rollout) -> Result<(), LearnError> {
         rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
-        check_ends(rollout)
+        check_ends(rollout)?;
+        self.buffer.check_clock(rollout)
     }
 
     fn update_here(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<SacMetrics, LearnError> {

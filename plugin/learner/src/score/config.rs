@@ -134,6 +134,9 @@ impl ScoreConfig {
         if self.init_from_decoder && !self.condition {
             return bad("score init_from_decoder needs condition: the decoder reads the skill".into());
         }
+        if self.critic_clock && !self.condition {
+            return bad("score critic_clock needs condition: who reads no skill has no use for its ticks".into());
+        }
         if self.horizon == 0 {
             return bad("score horizon must be at least 1".into());
         }

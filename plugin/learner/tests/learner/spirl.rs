@@ -168,3 +168,29 @@ fn what_cannot_work_is_refused() {
     let error = learner.learn(&short).expect_err("no whole skill");
     assert!(matches!(&error, LearnError::Config(text) if text.contains("twice as long")), "{error}");
 }
+
+#[test]
+fn what_comes_after_a_skill_that_was_cut_off_is_discounted_by_the_ticks_that_it_was_played() {
+    let mut learner = sac(SpirlConfig::default());
+    train(&mut learner, 4, 32);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    learner.save(&path).expect("written");
+    let bytes = std::fs::read(&path).expect("readable");
+    let read = |bytes| safetensors::SafeTensors::deserialize(bytes).expect("safetensors");
+    let file = read(&bytes);
+    let over_skills = read(file.tensor("over_skills").expect("the learner of skills").data());
+    let tensor = over_skills.tensor("buffer.weights").expect("kept");
+    let numbers = tensor.data().chunks_exact(4).map(|bytes| f32::from_le_bytes(bytes.try_into().expect("four")));
+    let weights: Vec<f64> = numbers.map(f64::from).collect();
+    // γ to the ticks that were not played: 1 for whole skills, more for others.
+    let gamma = sac_config().gamma;
+    let expected = [0, 1, 2, 3].map(|missed| gamma.powi(-missed));
+    assert!(weights.iter().all(|weight| expected.iter().any(|one| (weight / one - 1.0).abs() < 1e-5)), "{weights:?}");
+    let whole = weights.iter().filter(|weight| (**weight - 1.0).abs() < 1e-6).count();
+    assert!(0 < whole && whole < weights.len(), "{whole} of {} skills were played to their end", weights.len());
+    let loaded = SpirlLearner::load(&path, DeviceKind::Flex).expect("read");
+    let again = folder.path().join("again.safetensors");
+    loaded.save(&again).expect("written");
+    assert!(std::fs::read(again).expect("readable") == bytes, "a file keeps them");
+}
