@@ -77,7 +77,24 @@ const MAZES: [(&str, &[&str]); 10] = [
     ("antmaze-xl", &["score-ppo", "sac", "ppo"]),
     ("antmaze-to-large", &["score-medium", "score-large", "ppo-medium"]),
     ("antmaze-to-xl", &["score-medium", "score-large", "score-xl", "ppo-large"]),
-    ("antmaze-ablation", &["score-ppo", "no-init", "no-kl", "no-alpha", "own-sample-alpha", "ppo"]),
+    (
+        "antmaze-ablation",
+        &[
+            "score-ppo",
+            "no-init",
+            "no-kl",
+            "no-alpha",
+            "own-sample-alpha",
+            "no-z-no-copy",
+            "copy-without-z",
+            "bc-start",
+            "every-tick",
+            "random-z",
+            "critic-clock",
+            "spirl-ppo",
+            "ppo",
+        ],
+    ),
     ("antmaze-random", &["score-ppo", "ppo", "bc"]),
     ("maze2d-medium", &["score-ppo", "sac", "ppo", "rlpd"]),
     ("maze2d-large", &["score-ppo", "sac", "ppo", "rlpd"]),
@@ -108,9 +125,10 @@ fn mazes_come_at_the_papers_size_and_at_one_for_an_hour() {
     }
 }
 
-/// Experiments and their variants that are told to differ: one is named for another worth of entropy, and one has the schedule
-/// that suits it better.
-const TOLD: [(&str, &str); 2] = [("coinrun-sac", "sac-explore"), ("coinrun-taught", "ppo")];
+/// Experiments and their variants that are told to differ: one is named for another worth of entropy, one counts its steps in
+/// skills, and one has the schedule that suits it better.
+const TOLD: [(&str, &str); 3] =
+    [("coinrun-sac", "sac-explore"), ("coinrun-sac", "spirl-sac"), ("coinrun-taught", "ppo")];
 
 /// How much entropy is worth, how fast its learner learns and how often it goes over what was played.
 fn effort(experiment: &Experiment) -> String {
