@@ -72,18 +72,19 @@ fn train_to_success(
     let mut trainer = Trainer::new(game, experiment, skills, DeviceKind::default(), threads)?;
     let title = format!("train {}, seed {}", experiment.algorithm, experiment.seed);
     let bar = progress::bar(&title, experiment.whole_steps(), "steps");
-    let mut reached = Reached::Never;
-    while matches!(reached, Reached::Never) && !trainer.is_done() {
+    let reached = loop {
+        if trainer.is_done() {
+            break Reached::Never;
+        }
         if interrupt::asked() {
-            reached = Reached::Stopped;
-            break;
+            break Reached::Stopped;
         }
         let report = trainer.update()?;
         bar.set_position(report.step);
         if report.mostly_succeeds(experiment.study.threshold) {
-            reached = Reached::After(report.step);
+            break Reached::After(report.step);
         }
-    }
+    };
     bar.finish_and_clear();
     Ok(reached)
 }
