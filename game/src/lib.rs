@@ -5,7 +5,7 @@
 //! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
-//! - [`with_rays`]: the mazes for agents that see walls and goal.
+//! - [`senses`]: the mazes for agents that see walls and goal, and for those that know the map.
 //! - [`registry`]: all of them, for the program `playbot`.
 
 pub mod ant;
@@ -16,6 +16,6 @@ mod defect_variant;
 pub mod maze;
 pub mod maze2d;
 pub mod registry;
+pub mod senses;
 #[cfg(test)]
 mod watched;
-pub mod with_rays;

@@ -2,14 +2,22 @@
 
 use playbot_lab::game::Game;
 
-use crate::{ant::Ant, antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d, with_rays::WithRays};
+use crate::{
+    ant::Ant,
+    antmaze::AntMaze,
+    coinrun::CoinRun,
+    maze2d::Maze2d,
+    senses::{Mapped, Sighted, WithSenses},
+};
 
 /// All games, CoinRun first.
-pub const GAMES: [&dyn Game; 6] = [
+pub const GAMES: [&dyn Game; 8] = [
     &CoinRun { physics: false },
     &Maze2d { physics: false },
-    &WithRays(Maze2d { physics: false }),
+    &WithSenses(Maze2d { physics: false }, Sighted),
+    &WithSenses(Maze2d { physics: false }, Mapped),
     &Ant,
     &AntMaze,
-    &WithRays(AntMaze),
+    &WithSenses(AntMaze, Sighted),
+    &WithSenses(AntMaze, Mapped),
 ];

@@ -54,7 +54,7 @@ fn what_is_held_out_is_not_trained_on_by_another_name() {
         let experiment = Experiment { train, test, ..read("maze2d-random") };
         experiment.check_levels(self::game(game)).map_err(|error| error.to_string())
     };
-    for game in ["maze2d", "maze2d-sighted", "antmaze", "antmaze-sighted"] {
+    for game in ["maze2d", "maze2d-sighted", "maze2d-mapped", "antmaze", "antmaze-sighted", "antmaze-mapped"] {
         for train in ["random+sparse:0..63", "random+limit=100:50..63", "random+loops=0.3+difficulty=4..8:50..50"] {
             let error = check(game, train, "random:50..99").expect_err("mazes of the same seed");
             assert!(error.contains(train) && error.contains("random:50..99"), "{error}");

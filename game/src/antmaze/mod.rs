@@ -2,7 +2,7 @@
 //!
 //! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`]) and a
 //! seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at the time
-//! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal.
+//! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal, [`AntMazeWithMap`] for those that know the map.
 
 mod against_rules;
 mod arena;
@@ -19,16 +19,16 @@ pub mod mode;
 pub mod picture;
 pub mod play;
 pub mod plugin;
+pub mod senses;
 pub mod view;
 pub mod walls;
 pub mod waypoints;
-pub mod with_rays;
 
 pub use demonstrator_bot::DemonstratorBot;
 pub use game::AntMaze;
 pub use level::{AntMazeLevel, generate};
 pub use mode::{AntMazeMode, GoalNoise, Goals, Pay};
 pub use plugin::{AntMazePlugin, AntMazeSystems};
+pub use senses::{AntMazeWithMap, AntMazeWithRays};
 pub use walls::wall_boxes;
 pub use waypoints::Waypoints;
-pub use with_rays::AntMazeWithRays;

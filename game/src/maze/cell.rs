@@ -19,6 +19,12 @@ impl Cell {
     pub const fn new(row: usize, col: usize) -> Self {
         Self { row, col }
     }
+
+    /// The cell so many rows and columns further on; `None` where rows or columns have not begun.
+    pub fn moved(self, rows: i32, columns: i32) -> Option<Self> {
+        let along = |index: usize, by: i32| index.checked_add_signed(by as isize);
+        Some(Self { row: along(self.row, rows)?, col: along(self.col, columns)? })
+    }
 }
 
 impl From<[usize; 2]> for Cell {

@@ -40,7 +40,7 @@ use crate::{
         read_mode,
         show_level::{self, MazeSource, ShownMaze, unfit},
     },
-    with_rays::WithRays,
+    senses::{Mapped, Sighted, WithSenses},
 };
 
 /// Maze2D under its name `maze2d`.
@@ -189,6 +189,7 @@ impl Game for Maze2d {
             Benchmark::simulate("rapier", "medium+contact=rapier"),
             Benchmark::simulate("random", "random"),
             Benchmark::simulate("sighted", "random"),
+            Benchmark::simulate("mapped", "random"),
             Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster),
             Benchmark::train("vector", "medium"),
         ]
@@ -197,7 +198,8 @@ impl Game for Maze2d {
     fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
         match benchmark.case {
             "physics" => Some(&Maze2d { physics: true }),
-            "sighted" => Some(&WithRays(Maze2d { physics: false })),
+            "sighted" => Some(&WithSenses(Maze2d { physics: false }, Sighted)),
+            "mapped" => Some(&WithSenses(Maze2d { physics: false }, Mapped)),
             _ => None,
         }
     }

@@ -3,7 +3,7 @@
 //! [`ball`], [`soft_contact`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
 //! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
-//! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal.
+//! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal, [`Maze2dWithMap`] for those that know the map.
 
 mod against_rules;
 pub mod arena;
@@ -25,11 +25,11 @@ mod play;
 pub mod plugin;
 mod ray;
 mod rules_text;
+pub mod senses;
 pub mod sim;
 pub mod soft_contact;
 mod trace;
 pub mod walls;
-pub mod with_rays;
 
 pub use ball::Ball;
 pub use demonstrator::Demonstrator;
@@ -38,4 +38,4 @@ pub use game::Maze2d;
 pub use level::Maze2dLevel;
 pub use mode::{Contact, Maze2dMode};
 pub use plugin::{Maze2dPlugin, Maze2dSystems};
-pub use with_rays::Maze2dWithRays;
+pub use senses::{Maze2dWithMap, Maze2dWithRays};

@@ -47,7 +47,7 @@ mod tests {
             level::{any_cell, centre},
             physics::MazePhysics,
         },
-        with_rays::WAYS,
+        senses::sighted::WAYS,
     };
 
     fn walls(rows: &[&str], offset: f64) -> Walls {

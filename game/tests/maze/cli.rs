@@ -71,7 +71,7 @@ fn a_whole_mode_names_the_level_that_is_played() {
     let mode: antmaze::AntMazeMode = text.parse().expect("a mode");
     let played = antmaze::generate(&mode, 3).expect("a level");
     assert_ne!(played.goal, played.maze.goal(), "the mode draws another goal than the map's");
-    for game in ["antmaze", "antmaze-sighted"] {
+    for game in ["antmaze", "antmaze-sighted", "antmaze-mapped"] {
         let shown = level(&[game, "--map", text, "--seed", "3"]);
         assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start), &json!(played.goal)));
     }

@@ -75,7 +75,7 @@ impl<'a> StudyDemos<'a> {
             observation_config: experiment.observation_config(),
             steps: experiment.demo_steps,
             wins: experiment.demo_wins,
-            with_states: experiment.skills.state_weight > 0.0,
+            with_states: experiment.skills.tells_states(),
             with_rewards: experiment.algorithm.trains_on_demos(),
         })
     }

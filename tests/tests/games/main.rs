@@ -7,4 +7,4 @@ mod maze2d;
 mod maze2d_picture;
 mod maze2d_training;
 mod registry;
-mod with_rays;
+mod senses;

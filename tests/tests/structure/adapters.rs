@@ -8,7 +8,7 @@ use crate::{
     tokens::{Token, tokens},
 };
 
-/// What [`WithRays`](playbot_games::with_rays::WithRays) does not hand on: what is written for the game without rays by name,
+/// What [`WithSenses`](playbot_games::senses::WithSenses) does not hand on: what is written for the game itself by name,
 /// and what follows from the rest.
 const OWN: [&str; 8] =
     ["benchmarked", "built_anew", "card", "demo_header", "experiment", "trace", "trace_columns", "trace_row"];
@@ -37,10 +37,13 @@ fn unanswered(file: &str) -> (BTreeSet<String>, BTreeSet<String>) {
 }
 
 #[test]
-fn games_with_rays_hand_on_all_that_a_game_is_asked() {
-    let (asked, missing) = unanswered("game/src/with_rays.rs");
+fn games_with_senses_hand_on_all_that_a_game_is_asked() {
+    let (asked, missing) = unanswered("game/src/senses/with_senses.rs");
     let missing: Vec<_> = missing.iter().filter(|name| !OWN.contains(&name.as_str())).collect();
-    assert!(missing.is_empty(), "game/src/with_rays.rs lacks {missing:?}: hand them on in `as_without_rays!`");
+    assert!(
+        missing.is_empty(),
+        "game/src/senses/with_senses.rs lacks {missing:?}: hand them on in `as_without_senses!`"
+    );
     let unknown: Vec<_> = OWN.iter().filter(|name| !asked.contains(**name)).collect();
     assert!(unknown.is_empty(), "no game is asked {unknown:?} any more");
 }

@@ -99,7 +99,7 @@ impl Demonstrations {
     /// As for [`read`](Self::read).
     pub fn of(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Self, VerifyError> {
         let demos = Self::read(game, &experiment.observation_config(), path, Some(&experiment.test))?;
-        let demos = Self { with_states: experiment.skills.state_weight > 0.0, ..demos };
+        let demos = Self { with_states: experiment.skills.tells_states(), ..demos };
         let demos = if experiment.demo_wins { demos.won(path)? } else { demos };
         Ok(match experiment.demo_steps {
             Some(steps) => demos.at_most(steps),

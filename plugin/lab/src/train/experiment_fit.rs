@@ -73,7 +73,7 @@ impl Experiment {
         self.check_painted_velocity()?;
         if self.algorithm.needs_skills() {
             self.skills.check_observation(kind).map_err(settings)?;
-            if self.skills.state_weight > 0.0 && game.observation().is_empty() {
+            if self.skills.tells_states() && game.observation().is_empty() {
                 let why = "the game fills no vector that could be told of its pictures; leave it out";
                 return refuse("skills.state_weight", self.skills.state_weight, why);
             }

@@ -25,7 +25,7 @@ pub struct TesterRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checksum: Option<String>,
     /// Whether a policy takes its most probable action instead of drawing one.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub greedy: bool,
     /// The policy's file, where the tester has another name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -40,11 +40,6 @@ impl PartialEq for TesterRecord {
 }
 
 impl Eq for TesterRecord {}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
-fn is_false(value: &bool) -> bool {
-    !value
-}
 
 impl TesterRecord {
     /// A bot of the game.

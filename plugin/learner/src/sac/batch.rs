@@ -35,18 +35,12 @@ pub struct SacBatch {
 impl SacBatch {
     /// What critics read beside an action, `[n, latent + obs_dim]` or one more: [`Self::inputs`], and what is left.
     pub(super) fn of_critics(&self) -> Tensor<2> {
-        match &self.left {
-            Some((left, _)) => Tensor::cat(vec![self.inputs.clone(), left.clone()], 1),
-            None => self.inputs.clone(),
-        }
+        with_clock(&self.inputs, self.left.as_ref().map(|(left, _)| left))
     }
 
     /// The same of the next states.
     pub(super) fn next_of_critics(&self) -> Tensor<2> {
-        match &self.left {
-            Some((_, next)) => Tensor::cat(vec![self.next_inputs.clone(), next.clone()], 1),
-            None => self.next_inputs.clone(),
-        }
+        with_clock(&self.next_inputs, self.left.as_ref().map(|(_, next)| next))
     }
 
     pub(super) fn prior_of_states(&self) -> Option<&Dist> {
@@ -55,6 +49,14 @@ impl SacBatch {
 
     pub(super) fn prior_of_next(&self) -> Option<&Dist> {
         self.prior.as_ref().map(|(_, next)| next)
+    }
+}
+
+/// What the actor reads, and behind it the column of what is left, if critics count.
+fn with_clock(inputs: &Tensor<2>, left: Option<&Tensor<2>>) -> Tensor<2> {
+    match left {
+        Some(left) => Tensor::cat(vec![inputs.clone(), left.clone()], 1),
+        None => inputs.clone(),
     }
 }
 

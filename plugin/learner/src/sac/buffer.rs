@@ -228,7 +228,9 @@ mod tests {
     use super::super::transitions::tests::rollout;
     use super::*;
     use crate::ActionSpace;
+    use crate::file::FileKind;
     use crate::rng::Streams;
+    use std::path::Path;
 
     fn filled(capacity: usize) -> ReplayBuffer {
         let widths = Widths { obs: 1, latent: 1, clock: 1, weight: 1 };
@@ -266,6 +268,20 @@ mod tests {
         assert!(error.to_string().contains("rollout left"), "{error}");
         let error = new(Widths { weight: 1, ..widths }).push(&silent, &[]).expect_err("no weights");
         assert!(error.to_string().contains("weights"), "{error}");
+    }
+
+    #[test]
+    fn files_from_before_there_were_weights_hold_transitions_that_all_count_alike() {
+        let widths = Widths { obs: 1, latent: 1, ..Widths::default() };
+        let new = |widths| ReplayBuffer::new(6, widths, &ActionSpace::Discrete(3));
+        let mut plain = new(widths);
+        plain.push(&rollout(), &[]).expect("it fits");
+        let kind = FileKind { name: "buffer", version: 1 };
+        let mut file = TensorFile::new(Path::new("buffer"), kind, &serde_json::json!({})).expect("a header");
+        plain.put(&mut file, "old");
+        let mut loaded = new(Widths { weight: 1, ..widths });
+        loaded.take(&mut file, "old", plain.seen).expect("read");
+        assert_eq!((loaded.weights.as_slice(), &loaded.obs), (&[1.0; 6][..], &plain.obs));
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub struct SkillConfig {
     pub lr: f64,
     /// Whether the rate falls in a line to nothing over all epochs, so that the last batches settle what the first have
     /// found.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub anneal_lr: bool,
     /// Windows per batch.
     pub batch: usize,
@@ -110,11 +110,6 @@ fn is_zero(number: &f64) -> bool {
     *number == 0.0
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde wants it")]
-fn is_false(switch: &bool) -> bool {
-    !switch
-}
-
 impl Default for SkillConfig {
     fn default() -> Self {
         Self {
@@ -150,6 +145,11 @@ impl Default for SkillConfig {
 }
 
 impl SkillConfig {
+    /// Whether what networks make of pictures learns to tell the game's state, too: with a [`Self::state_weight`].
+    pub fn tells_states(&self) -> bool {
+        self.state_weight > 0.0
+    }
+
     /// `Ok` if these settings can work.
     ///
     /// # Errors
@@ -236,7 +236,7 @@ impl SkillConfig {
                 let text = "skill norm_obs is for vectors: the pixels of images are divided by 255 instead";
                 Err(LearnError::Config(text.to_owned()))
             }
-            ObsKind::Vector(_) if self.state_weight > 0.0 => {
+            ObsKind::Vector(_) if self.tells_states() => {
                 let text = "skill state_weight is for pictures: who sees the state vector need not learn to tell it";
                 Err(LearnError::Config(text.to_owned()))
             }

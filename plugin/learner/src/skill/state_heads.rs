@@ -79,7 +79,7 @@ impl SkillTrainer {
 
 /// Numbers of the state that is told of each picture, if it is to be.
 pub(super) fn told_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
-    let states = dataset.states.as_ref().filter(|_| config.state_weight > 0.0)?;
+    let states = dataset.states.as_ref().filter(|_| config.tells_states())?;
     Some(states.obs_dim())
 }
 

@@ -79,7 +79,7 @@ impl SkillTrainer {
         config.validate()?;
         config.check_observation(dataset.observation)?;
         config.check_space(dataset.space)?;
-        if config.state_weight > 0.0 && dataset.states.is_none() {
+        if config.tells_states() && dataset.states.is_none() {
             let text = "skill state_weight needs demonstrations with states (Dataset::with_states)";
             return Err(LearnError::Config(text.to_owned()));
         }

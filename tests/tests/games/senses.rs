@@ -1,4 +1,4 @@
-//! Games with rays: the same games, to the bit, whose agents are told more.
+//! Games with senses: the same games, to the bit, whose agents are told more.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use bevy_playbot::{
     vision::{ObservationConfig, ObservationKind},
 };
 use playbot_games::{
-    antmaze::{AntMaze, AntMazeWithRays},
-    maze2d::{Maze2d, Maze2dWithRays},
+    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays},
+    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays},
 };
 use playbot_lab::prelude::*;
 use playbot_lab::{
@@ -17,11 +17,17 @@ use playbot_lab::{
     worlds::{add_game, build_observing_world, build_world, spawn_agents},
 };
 
-/// Every game with rays, the same without, a mode, and how long an episode may take there.
-fn games() -> [(Arc<dyn Game>, Arc<dyn Game>, &'static str, u64); 2] {
+/// Ticks that an episode may take in the modes of [`games`].
+const LIMIT: u64 = 60;
+
+/// Every game with senses, how many numbers they tell, the same game without, and a mode.
+fn games() -> [(Arc<dyn Game>, usize, Arc<dyn Game>, &'static str); 4] {
+    let (ball, ant) = ("random+goal=random+limit=60", "random+goals=random+random-start+limit=60");
     [
-        (Arc::new(Maze2dWithRays::default()), Arc::new(Maze2d::default()), "random+goal=random+limit=60", 60),
-        (Arc::new(AntMazeWithRays::default()), Arc::new(AntMaze), "random+goals=random+random-start+limit=60", 60),
+        (Arc::new(Maze2dWithRays::default()), 10, Arc::new(Maze2d::default()), ball),
+        (Arc::new(Maze2dWithMap::default()), 131, Arc::new(Maze2d::default()), ball),
+        (Arc::new(AntMazeWithRays::default()), 10, Arc::new(AntMaze), ant),
+        (Arc::new(AntMazeWithMap::default()), 131, Arc::new(AntMaze), ant),
     ]
 }
 
@@ -36,11 +42,11 @@ fn build(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, fi
 }
 
 #[test]
-fn rays_change_nothing_in_the_game() {
-    for (with_rays, without, mode, _) in games() {
-        let mut pair = [&with_rays, &without].map(|game| build(&**game, mode, &ObservationConfig::default(), 0));
-        let (all, own) = (with_rays.observation().len(), without.observation().len());
-        assert_eq!((all, with_rays.version()), (own + 10, without.version()));
+fn senses_change_nothing_in_the_game() {
+    for (with_senses, more, without, mode) in games() {
+        let mut pair = [&with_senses, &without].map(|game| build(&**game, mode, &ObservationConfig::default(), 0));
+        let (all, own) = (with_senses.observation().len(), without.observation().len());
+        assert_eq!((all, with_senses.version()), (own + more, without.version()));
         for tick in 0..150 {
             let [(seen, hashes), (told, others)] = pair.each_mut().map(|(world, agents)| {
                 world.tick().expect("sound");
@@ -52,9 +58,9 @@ fn rays_change_nothing_in_the_game() {
                     agents.iter().map(|&agent| world.get::<StateHash>(agent).map(|hash| hash.0)).collect();
                 (vectors, hashes)
             });
-            assert_eq!(hashes, others, "{}, tick {tick}", with_rays.name());
+            assert_eq!(hashes, others, "{}, tick {tick}", with_senses.name());
             for (seen, told) in seen.iter().zip(&told) {
-                assert_eq!((seen.len(), &seen[..own]), (all, &told[..]), "{}, tick {tick}", with_rays.name());
+                assert_eq!((seen.len(), &seen[..own]), (all, &told[..]), "{}, tick {tick}", with_senses.name());
             }
         }
     }
@@ -62,7 +68,7 @@ fn rays_change_nothing_in_the_game() {
 
 #[test]
 fn threads_change_nothing_that_is_seen() {
-    for (game, _, mode, _) in games() {
+    for (game, _, _, mode) in games() {
         let seen = |threads| {
             let mut worlds = [0, 2].map(|first| build(&*game, mode, &ObservationConfig::default(), first));
             on_threads(&mut worlds, threads, |(world, agents)| {
@@ -81,7 +87,7 @@ fn threads_change_nothing_that_is_seen() {
 
 #[test]
 fn systems_are_in_one_order_with_pictures_and_without() {
-    for (game, _, mode, limit) in games() {
+    for (game, _, _, mode) in games() {
         for kind in [ObservationKind::Vector, ObservationKind::Raster] {
             let mut app = test_app();
             let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
@@ -89,7 +95,7 @@ fn systems_are_in_one_order_with_pictures_and_without() {
             let agent = spawn_agents(&*game, app.world_mut(), &observation_config, 0, 1)[0];
             game.attach_demonstrator(app.world_mut(), agent, 0.2);
             app.world_mut().entity_mut(agent).insert(Control::Bot);
-            app.play_episodes(2, 2 * limit + 10).expect("sound");
+            app.play_episodes(2, 2 * LIMIT + 10).expect("sound");
             let vector = &app.world().get::<Observation>(agent).expect("an agent").vector;
             assert_eq!(vector.is_empty(), kind == ObservationKind::Raster, "pictures are all that their agents get");
         }
@@ -99,7 +105,7 @@ fn systems_are_in_one_order_with_pictures_and_without() {
 #[test]
 fn who_stands_at_the_goal_sees_no_way_left() {
     // Nobody but the demonstrator gets there: the way is the same that episodes are judged by.
-    for (game, _, _, _) in games() {
+    for (game, ..) in games() {
         let (mut world, agents) = build_world(&*game, "umaze", 0, 0, 1);
         game.attach_demonstrator(&mut world, agents[0], 0.0);
         world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));

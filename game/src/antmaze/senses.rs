@@ -1,4 +1,4 @@
-//! AntMaze for ants that are told where the goal and the walls are.
+//! AntMaze for ants that are told where the goal and the walls are, and which cells around are walls.
 
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
@@ -8,11 +8,16 @@ use playbot_lab::prelude::*;
 use super::{
     components::{InMaze, MazeAnt},
     game::AntMaze,
+    geometry::cell_at,
     play,
 };
 use crate::{
     ant::walls::Walls,
-    with_rays::{SenseRays, WithRays, push_rays},
+    senses::{
+        Mapped, Senses, Sighted, WithSenses,
+        mapped::{self, push_map},
+        sighted::{self, push_rays},
+    },
 };
 
 /// How far a ray reaches, in metres: two cells.
@@ -21,13 +26,33 @@ pub const RAY_LENGTH: f32 = 8.0;
 const RAY_HEIGHTS: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 
 /// AntMaze with rays, under its name `antmaze-sighted`. East is x and north is y.
-pub type AntMazeWithRays = WithRays<AntMaze>;
+pub type AntMazeWithRays = WithSenses<AntMaze, Sighted>;
 
-impl SenseRays for AntMaze {
-    const NAME_WITH_RAYS: &'static str = "antmaze-sighted";
+/// AntMaze with rays and a map, under its name `antmaze-mapped`.
+pub type AntMazeWithMap = WithSenses<AntMaze, Mapped>;
 
-    fn build_rays(&self, app: &mut App) {
+impl Senses<AntMaze> for Sighted {
+    const NAME: &'static str = "antmaze-sighted";
+
+    fn names(self) -> Vec<String> {
+        sighted::names()
+    }
+
+    fn build(self, app: &mut App) {
         app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
+    }
+}
+
+impl Senses<AntMaze> for Mapped {
+    const NAME: &'static str = "antmaze-mapped";
+
+    fn names(self) -> Vec<String> {
+        mapped::names()
+    }
+
+    fn build(self, app: &mut App) {
+        let systems = (sense_rays, sense_map).chain();
+        app.add_systems(ObserveSchedule, systems.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -38,6 +63,19 @@ fn sense_rays(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), W
             let from = Vec3::new(at.x, at.y, at.z.clamp(*RAY_HEIGHTS.start(), *RAY_HEIGHTS.end()));
             let to_goal = Vec2::from(level.0.goal_at) - at.truncate();
             push_rays(&mut observation, to_goal.to_array(), |way| distance(ant.0.walls(), from, way));
+        }
+    }
+}
+
+fn sense_map(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), With<VectorSensor>>) {
+    for (episode, ant, level, mut observation) in &mut ants {
+        if episode.is_running() {
+            let maze = &level.0.maze;
+            let here = cell_at(maze, ant.0.torso().0.truncate().to_array());
+            // Who has left the maze, which no legal play brings about, sees nothing but walls.
+            push_map(&mut observation, |[east, north]| {
+                here.and_then(|cell| cell.moved(north, east)).is_none_or(|cell| !maze.is_free(cell))
+            });
         }
     }
 }
@@ -75,5 +113,22 @@ mod tests {
         near(seen[37], 2.0 + place.y);
         let slant = std::f32::consts::SQRT_2 * (2.0 + place.min_element());
         near(seen[36], slant);
+    }
+    #[test]
+    fn the_map_has_the_north_first_which_is_the_end_of_the_rows() {
+        let game = AntMazeWithMap::default();
+        let (mut world, agents) = build_world(&game, "medium", 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));
+        world.tick().expect("sound");
+        let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector;
+        let rows: Vec<String> = seen[39..]
+            .chunks(11)
+            .map(|row| row.iter().map(|&cell| if cell > 0.5 { '#' } else { 'O' }).collect())
+            .collect();
+        // It starts in (1, 1): from row 6 down to row -4, and from column -4 to column 6.
+        let wanted =
+            ["#####OOO#OO", "#####O#OO#O", "#####OO#OOO", "######OOO##", "#####OO#OOO", "#####OO##OO", "###########"];
+        assert_eq!(rows[..7], wanted[..]);
+        assert!(rows[7..].iter().all(|row| row == "###########"));
     }
 }

@@ -1,4 +1,4 @@
-//! Maze2D for balls that are told where the goal and the walls are.
+//! Maze2D for balls that are told where the goal and the walls are, and which cells around are walls.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
@@ -10,20 +10,44 @@ use super::{
     game::Maze2d,
     play,
 };
-use crate::with_rays::{SenseRays, WithRays, push_rays};
+use crate::senses::{
+    Mapped, Senses, Sighted, WithSenses,
+    mapped::{self, push_map},
+    sighted::{self, push_rays},
+};
 
 /// How far a ray reaches from the centre of a ball, in metres: four cells.
 pub const RAY_LENGTH: f64 = 4.0;
 
 /// Maze2D with rays, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up the
 /// rows, against x.
-pub type Maze2dWithRays = WithRays<Maze2d>;
+pub type Maze2dWithRays = WithSenses<Maze2d, Sighted>;
 
-impl SenseRays for Maze2d {
-    const NAME_WITH_RAYS: &'static str = "maze2d-sighted";
+/// Maze2D with rays and a map, under its name `maze2d-mapped`.
+pub type Maze2dWithMap = WithSenses<Maze2d, Mapped>;
 
-    fn build_rays(&self, app: &mut App) {
+impl Senses<Maze2d> for Sighted {
+    const NAME: &'static str = "maze2d-sighted";
+
+    fn names(self) -> Vec<String> {
+        sighted::names()
+    }
+
+    fn build(self, app: &mut App) {
         app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
+    }
+}
+
+impl Senses<Maze2d> for Mapped {
+    const NAME: &'static str = "maze2d-mapped";
+
+    fn names(self) -> Vec<String> {
+        mapped::names()
+    }
+
+    fn build(self, app: &mut App) {
+        let systems = (sense_rays, sense_map).chain();
+        app.add_systems(ObserveSchedule, systems.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -44,6 +68,20 @@ fn sense_rays(
     }
 }
 
+fn sense_map(
+    mut balls: Query<(&Episode, &MazeBall, &PlaysIn, &mut Observation), With<VectorSensor>>,
+    arenas: Query<&MazeArena>,
+) {
+    for (episode, ball, plays_in, mut observation) in &mut balls {
+        let Ok(arena) = arenas.get(plays_in.0) else { continue };
+        if episode.is_running() {
+            let walls = &arena.level.walls;
+            let (row, column) = walls.cell_at(ball.0.position);
+            push_map(&mut observation, |[east, north]| walls.is_solid(row - north, column + east));
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::f32::consts::SQRT_2;
@@ -54,9 +92,8 @@ mod tests {
     use crate::maze2d::Ball;
 
     /// What a ball at rest in this place observes.
-    fn seen(mode: &str, place: [f64; 2]) -> Vec<f32> {
-        let game = Maze2dWithRays::default();
-        let (mut world, agents) = build_world(&game, mode, 0, 0, 1);
+    fn seen(game: &dyn Game, mode: &str, place: [f64; 2]) -> Vec<f32> {
+        let (mut world, agents) = build_world(game, mode, 0, 0, 1);
         let still = Action(ActionValue::Continuous(vec![0.0; 2]));
         world.entity_mut(agents[0]).insert((Control::Human, still, LevelQueue::Always(0)));
         world.tick().expect("sound");
@@ -88,15 +125,44 @@ mod tests {
         let walls = |[e, ne, n, nw, w, sw, s, se]: [f32; 8]| {
             [2.1, 2.05, 0.0, 0.0, 3.9, 3.95, e, SQRT_2 * ne, n, SQRT_2 * nw, w, SQRT_2 * sw, s, SQRT_2 * se]
         };
-        assert_near(&seen("medium+no-offset", place), &walls([0.45, 0.45, 1.6, 1.55, 1.55, 0.55, 2.4, 1.4]));
+        assert_near(
+            &seen(&Maze2dWithRays::default(), "medium+no-offset", place),
+            &walls([0.45, 0.45, 1.6, 1.55, 1.55, 0.55, 2.4, 1.4]),
+        );
         // With D4RL's offset they stand 0.2 nearer in the east and south, and farther in the west and north; the goal stays.
-        assert_near(&seen("medium", place), &walls([0.25, 0.25, 1.8, 1.75, 1.75, 0.75, 2.2, 1.2]));
+        assert_near(
+            &seen(&Maze2dWithRays::default(), "medium", place),
+            &walls([0.25, 0.25, 1.8, 1.75, 1.75, 0.75, 2.2, 1.2]),
+        );
     }
 
     #[test]
     fn no_ray_reaches_farther_than_four_cells() {
         // Six free cells to the east of (3, 1), a wall right behind it.
-        let seen = seen("large+no-offset", [3.0, 1.0]);
+        let seen = seen(&Maze2dWithRays::default(), "large+no-offset", [3.0, 1.0]);
         assert_near(&[seen[6], seen[10]], &[4.0, 0.5]);
+    }
+    #[test]
+    fn the_map_has_the_cells_around_and_walls_outside() {
+        let seen = seen(&Maze2dWithMap::default(), "medium+no-offset", [2.1, 2.05]);
+        let rows: Vec<String> = seen[14..]
+            .chunks(11)
+            .map(|row| row.iter().map(|&cell| if cell > 0.5 { '#' } else { 'O' }).collect())
+            .collect();
+        // Medium from row -3 to row 7, and from column -3 to column 7.
+        let wanted = [
+            "###########",
+            "###########",
+            "###########",
+            "###########",
+            "####OO##OO#",
+            "####OO#OOO#",
+            "#####OOO###",
+            "####OO#OOO#",
+            "####O#OO#O#",
+            "####OOO#OO#",
+            "###########",
+        ];
+        assert_eq!(rows, wanted);
     }
 }

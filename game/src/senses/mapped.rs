@@ -1,0 +1,68 @@
+//! Knowing the map: which of the cells around are walls.
+
+use bevy_playbot::prelude::Observation;
+
+use super::sighted;
+
+/// How many cells the map reaches to each side: in a maze of 9 × 9 cells, to the far wall from all but the outermost.
+pub const REACH: i32 = 5;
+
+/// Agents are told what [`Sighted`](super::Sighted) ones are, and which of the 11 × 11 cells around them are walls.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mapped;
+
+/// How far the cells of the map lie to the east and to the north of the agent's own: rows from north to south, each from
+/// west to east, as on a map.
+fn around() -> impl Iterator<Item = [i32; 2]> {
+    (-REACH..=REACH).rev().flat_map(|north| (-REACH..=REACH).map(move |east| [east, north]))
+}
+
+/// Names of what [`sighted::push_rays`] and then [`push_map`] add.
+pub fn names() -> Vec<String> {
+    let cells = around().map(|[east, north]| format!("cell {east:+} east {north:+} north"));
+    sighted::names().into_iter().chain(cells).collect()
+}
+
+/// Adds the map to an observation: 1 for walls, and for what lies outside, 0 for free cells. `is_wall` tells it of the cell
+/// so far to the east and to the north.
+pub fn push_map(observation: &mut Observation, is_wall: impl Fn([i32; 2]) -> bool) {
+    observation.vector.extend(around().map(|cell| f32::from(u8::from(is_wall(cell)))));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        antmaze::{AntMazeWithMap, AntMazeWithRays},
+        maze2d::{Maze2dWithMap, Maze2dWithRays},
+    };
+    use playbot_lab::game::Game;
+
+    #[test]
+    fn a_map_is_read_from_the_north_west_on() {
+        let mut observation = Observation::default();
+        push_map(&mut observation, |[east, north]| (east, north) == (-5, 5) || (east, north) == (1, 0));
+        let walls: Vec<usize> = (0..121).filter(|&at| observation.vector[at] > 0.5).collect();
+        assert_eq!((observation.vector.len(), walls.as_slice()), (121, &[0, 61][..]));
+        assert_eq!((&*names()[10], &*names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
+    }
+
+    #[test]
+    fn names_are_told_apart_and_go_on_from_those_of_the_game_that_tells_less() {
+        let games: [(&dyn Game, usize, usize); 4] = [
+            (&AntMazeWithRays::default(), 29, 10),
+            (&Maze2dWithRays::default(), 4, 10),
+            (&AntMazeWithMap::default(), 29, 131),
+            (&Maze2dWithMap::default(), 4, 131),
+        ];
+        for (game, own, more) in games {
+            let names = game.observation().names;
+            let found = (names.len(), names[own].as_str(), names[own + 2].as_str());
+            assert_eq!(found, (own + more, "goal x", "wall east"), "{}", game.name());
+            let mut different = names.clone();
+            different.sort();
+            different.dedup();
+            assert_eq!(names.len(), different.len(), "{}", game.name());
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Seeing: the way to the goal, and the distance of the walls around.
+
+use bevy_playbot::prelude::Observation;
+
+/// Agents are told the way to the goal and the distance of the walls around.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sighted;
+
+/// The eight ways that rays go, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
+/// a turn to the left. North is up in the game's own picture.
+pub const WAYS: [(&str, [f64; 2]); 8] = {
+    const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
+    [
+        ("east", [1.0, 0.0]),
+        ("north-east", [DIAGONAL, DIAGONAL]),
+        ("north", [0.0, 1.0]),
+        ("north-west", [-DIAGONAL, DIAGONAL]),
+        ("west", [-1.0, 0.0]),
+        ("south-west", [-DIAGONAL, -DIAGONAL]),
+        ("south", [0.0, -1.0]),
+        ("south-east", [DIAGONAL, -DIAGONAL]),
+    ]
+};
+
+/// Names of what [`push_rays`] adds.
+pub fn names() -> Vec<String> {
+    let goal = ["goal x", "goal y"].map(str::to_owned);
+    let walls = WAYS.map(|(way, _)| format!("wall {way}"));
+    goal.into_iter().chain(walls).collect()
+}
+
+/// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the
+/// distance of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
+pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
+    observation.vector.extend(to_goal);
+    observation.vector.extend(WAYS.map(|(_, way)| wall(way)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_go_round_by_eighths_of_a_turn() {
+        for (index, (name, [east, north])) in WAYS.into_iter().enumerate() {
+            let angle = std::f64::consts::FRAC_PI_4 * index as f64;
+            assert!((east - libm::cos(angle)).abs() < 1e-12 && (north - libm::sin(angle)).abs() < 1e-12, "{name}");
+        }
+    }
+}

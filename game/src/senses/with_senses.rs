@@ -1,0 +1,100 @@
+//! A game whose agents are told more than the game tells them.
+
+use bevy::{app::PluginGroupBuilder, prelude::*};
+use bevy_playbot::{headless_plugins::HeadlessPlugins, vision::Picture};
+use playbot_lab::prelude::*;
+use playbot_lab::{
+    benchmark::Benchmark,
+    defect::DefectKind,
+    detector::Detector,
+    floor_plan::FloorPlan,
+    inspect::{InspectError, LevelRequest, LevelView},
+    level_files::{LevelDesign, LevelTextError},
+    mode::ModeError,
+    proof::LevelProof,
+};
+
+/// What agents of a game are told beside what it tells them.
+pub trait Senses<G>: Copy + Send + Sync + 'static {
+    /// Name of the game with these senses.
+    const NAME: &'static str;
+
+    /// Names of the numbers that are added, in their order.
+    fn names(self) -> Vec<String>;
+
+    /// Adds systems that add them for every agent that plays and reads a vector, once the game has filled that.
+    fn build(self, app: &mut App);
+}
+
+/// A game with senses: the inner one in everything but its name and what its agents observe.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WithSenses<G, S>(pub G, pub S);
+
+/// Methods of the inner game that are this game's too.
+macro_rules! as_without_senses {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
+        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
+            self.0.$name($($argument),*)
+        })*
+    };
+}
+
+impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
+    as_without_senses! {
+        fn version() -> u32;
+        fn modes() -> &'static [&'static str];
+        fn check_mode(mode: &str) -> Result<(), ModeError>;
+        fn family(mode: &str) -> String;
+        fn fingerprint(mode: &str, level: u64) -> Option<u64>;
+        fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
+        fn tick_hz() -> f64;
+        fn placement() -> TickPlacement;
+        fn headless_plugins(usual: HeadlessPlugins) -> PluginGroupBuilder;
+        fn arenas_per_world() -> Option<u32>;
+        fn problem() -> Option<String>;
+        fn actions() -> ActionSpace;
+        fn action_names() -> Vec<String>;
+        fn key_bindings() -> Option<KeyBindings>;
+        fn picture() -> Option<Picture>;
+        fn has_camera() -> bool;
+        fn build_picture(app: &mut App);
+        fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
+        fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
+        fn end_cause(world: &World, agent: Entity) -> Option<&'static str>;
+        fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
+        fn prove(mode: &str, level: u64) -> LevelProof;
+        fn prove_from(world: &World, agent: Entity) -> LevelProof;
+        fn detectors() -> Vec<Box<dyn Detector>>;
+        fn defects() -> Vec<DefectKind>;
+        fn blind_bots() -> Vec<(&'static str, BlindBot)>;
+        fn demonstrator() -> Option<&'static str>;
+        fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);
+        fn show_level(request: &LevelRequest) -> Result<LevelView, InspectError>;
+        fn has_space_view() -> bool;
+        fn build_space_view(app: &mut App);
+    }
+
+    fn name(&self) -> &'static str {
+        S::NAME
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        ObservationSpace { names: self.0.observation().names.into_iter().chain(self.1.names()).collect() }
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        self.0.build(app, mode);
+        self.1.build(app);
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let agent = self.0.spawn_agent(world, index);
+        world.entity_mut(agent).insert(VectorSensor::new(self.observation().names));
+        agent
+    }
+
+    fn benchmarks(&self) -> Vec<Benchmark> {
+        // Measured beside the game that sees less.
+        Vec::new()
+    }
+}
