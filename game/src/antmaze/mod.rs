@@ -2,7 +2,8 @@
 //!
 //! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`]) and a
 //! seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at the time
-//! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal, [`AntMazeWithMap`] for those that know the map.
+//! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal,
+//! [`AntMazeWithMap`] for those that know the map.
 
 mod against_rules;
 mod arena;

@@ -93,6 +93,7 @@ mod tests {
     use playbot_lab::worlds::build_world;
 
     use super::*;
+    use crate::maze::Cell;
 
     #[test]
     fn an_ant_at_the_start_of_medium_sees_its_room_and_the_way_to_the_goal() {
@@ -114,6 +115,7 @@ mod tests {
         let slant = std::f32::consts::SQRT_2 * (2.0 + place.min_element());
         near(seen[36], slant);
     }
+
     #[test]
     fn the_map_has_the_north_first_which_is_the_end_of_the_rows() {
         let game = AntMazeWithMap::default();
@@ -130,5 +132,23 @@ mod tests {
             ["#####OOO#OO", "#####O#OO#O", "#####OO#OOO", "######OOO##", "#####OO#OOO", "#####OO##OO", "###########"];
         assert_eq!(rows[..7], wanted[..]);
         assert!(rows[7..].iter().all(|row| row == "###########"));
+    }
+    #[test]
+    fn the_map_goes_with_the_ant() {
+        let game = AntMazeWithMap::default();
+        for level in 0..8 {
+            let (mut world, agents) = build_world(&game, "medium+random-start", 0, 0, 1);
+            world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(level)));
+            world.tick().expect("sound");
+            let InMaze(played) = world.get::<InMaze>(agents[0]).expect("a level");
+            let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector[39..];
+            for (at, &told) in seen.iter().enumerate() {
+                let (north, east) = (5 - (at / 11) as i32, (at % 11) as i32 - 5);
+                let [row, col] = [played.start.row as i32 + north, played.start.col as i32 + east];
+                let inside = (0..8).contains(&row) && (0..8).contains(&col);
+                let free = inside && played.maze.is_free(Cell::new(row as usize, col as usize));
+                assert_eq!(told > 0.5, !free, "level {level}, from {} to ({row}, {col})", played.start);
+            }
+        }
     }
 }

@@ -3,7 +3,8 @@
 //! [`ball`], [`soft_contact`] and [`sim`] are the rules, without an engine: with [`Contact::Soft`] they reproduce the original
 //! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
-//! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal, [`Maze2dWithMap`] for those that know the map.
+//! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal, [`Maze2dWithMap`] for those
+//! that know the map.
 
 mod against_rules;
 pub mod arena;

@@ -142,13 +142,14 @@ mod tests {
         let seen = seen(&Maze2dWithRays::default(), "large+no-offset", [3.0, 1.0]);
         assert_near(&[seen[6], seen[10]], &[4.0, 0.5]);
     }
+
     #[test]
     fn the_map_has_the_cells_around_and_walls_outside() {
-        let seen = seen(&Maze2dWithMap::default(), "medium+no-offset", [2.1, 2.05]);
-        let rows: Vec<String> = seen[14..]
-            .chunks(11)
-            .map(|row| row.iter().map(|&cell| if cell > 0.5 { '#' } else { 'O' }).collect())
-            .collect();
+        let rows = |mode, place| -> Vec<String> {
+            let seen = seen(&Maze2dWithMap::default(), mode, place);
+            let row = |row: &[f32]| row.iter().map(|&cell| if cell > 0.5 { '#' } else { 'O' }).collect();
+            seen[14..].chunks(11).map(row).collect()
+        };
         // Medium from row -3 to row 7, and from column -3 to column 7.
         let wanted = [
             "###########",
@@ -163,6 +164,10 @@ mod tests {
             "####OOO#OO#",
             "###########",
         ];
-        assert_eq!(rows, wanted);
+        assert_eq!(rows("medium+no-offset", [2.1, 2.05]), wanted);
+        // With D4RL's offset the same place is in cell (2, 2), and 0.3 further down in (3, 2): the map moves by a row.
+        assert_eq!(rows("medium", [2.1, 2.05]), wanted);
+        assert_eq!(rows("medium", [2.35, 2.05])[..10], wanted[1..]);
+        assert_eq!(rows("medium+no-offset", [2.35, 2.05]), wanted);
     }
 }

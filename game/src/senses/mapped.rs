@@ -4,7 +4,8 @@ use bevy_playbot::prelude::Observation;
 
 use super::sighted;
 
-/// How many cells the map reaches to each side: in a maze of 9 × 9 cells, to the far wall from all but the outermost.
+/// How many cells the map reaches to each side: in a maze of 9 × 9 cells all that are free, from all but the outermost of
+/// them.
 pub const REACH: i32 = 5;
 
 /// Agents are told what [`Sighted`](super::Sighted) ones are, and which of the 11 × 11 cells around them are walls.

@@ -93,6 +93,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["config", "show", "--set", "train=hrad:0..3"], "`train` is hrad:0..3: unknown mode `hrad`"),
         (&["eval", "--set", "game=maze2d", "--bot", "random"], "`test` is hard:64..1087: unknown map `hard`"),
         (&["eval", "--set", "game=maze2d", "--bot", "random"], "or with --levels"),
+        (&["eval", "--bot", "random", "--levels", "umaze:0..3"], "name the game, as in --set game=maze2d"),
         (&["eval", "--bot", "random", "--plot", "plot.gif"], "is written as .png or .svg"),
         (&["config", "presets", "skil-paper"], "did you mean `skill-paper`?"),
         (&["study", "--out", "o", "--seeds", "1,1"], "seed 1 is there twice"),

@@ -22,6 +22,10 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
     assert_eq!((&ball["goal"], &ant["goal"]), (&json!([1, 1]), &json!([3, 1])));
     assert_eq!(
         (level(&["maze2d-sighted", "--map", "umaze"]), level(&["antmaze-sighted", "--map", "umaze"])),
+        (ball.clone(), ant.clone())
+    );
+    assert_eq!(
+        (level(&["maze2d-mapped", "--map", "umaze"]), level(&["antmaze-mapped", "--map", "umaze"])),
         (ball, ant)
     );
 }

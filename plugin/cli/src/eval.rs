@@ -11,6 +11,7 @@ use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
     held_out::HeldOut,
+    mode::ModeError,
     report::to_text_table,
     split::LevelSplit,
     train::{
@@ -42,6 +43,7 @@ use super::{
   playbot eval --run runs/first
   playbot eval --bot BOT --bot random --levels MODE:0..63 --json
   playbot eval --bot BOT --levels files:levels/**/*.json
+  playbot eval --set game=GAME --bot BOT --levels MODE:0..63
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
@@ -111,7 +113,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
         experiment.check_test(game).map_err(or_levels)?;
     }
-    splits.iter().try_for_each(|split| split.check(game))?;
+    splits.iter().try_for_each(|split| split.check(game).map_err(|error| misfit(&error, split, games)))?;
     // Not after some of it was measured.
     let plan_of = |split| EvalPlan::of(&experiment, split, args.compute.threads());
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
@@ -147,6 +149,18 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         footprints.write(game)?;
     }
     Ok(Outcome::Pass)
+}
+
+/// Levels of a mode that the game does not have, with the games that do: who names it thinks of its game.
+fn misfit(error: &ModeError, split: &LevelSplit, games: &Games) -> CliError {
+    let others: Vec<_> = games.iter().filter(|other| split.check(*other).is_ok()).map(Game::name).collect();
+    CliError::Usage(match others.first() {
+        Some(first) => {
+            let others = others.join(", ");
+            format!("{error}; it is one of {others}: name the game, as in --set game={first}")
+        }
+        None => error.to_string(),
+    })
 }
 
 fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
