@@ -1,10 +1,8 @@
 //! The replay buffer.
 
 use super::transitions::{slice, transitions};
-use crate::file::TensorFile;
-use crate::nn::path;
 use crate::rng::below;
-use crate::{ActionSpace, Actions, FileError, LearnError, Rollout, TimeLimit};
+use crate::{ActionSpace, Actions, LearnError, Rollout, TimeLimit};
 use rand::Rng;
 
 /// How many numbers of each kind a transition has.
@@ -40,8 +38,8 @@ pub(super) struct ReplayBuffer {
     pub(super) weights: Vec<f32>,
     pub(super) actions: Actions,
     pub(super) rewards: Vec<f32>,
-    terminated: Vec<bool>,
-    truncated: Vec<bool>,
+    pub(super) terminated: Vec<bool>,
+    pub(super) truncated: Vec<bool>,
 }
 
 impl ReplayBuffer {
@@ -159,58 +157,6 @@ impl ReplayBuffer {
         let over = self.terminated[slot] || (self.truncated[slot] && limit == TimeLimit::Legacy);
         if over { 0.0 } else { self.weights.get(slot).copied().unwrap_or(1.0) }
     }
-
-    /// Adds all transitions to a file, under names that begin with `prefix`.
-    pub(super) fn put(&self, file: &mut TensorFile, prefix: &str) {
-        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
-        file.put(&path(prefix, "obs"), &[n, obs], &self.obs);
-        file.put(&path(prefix, "z"), &[n, latent], &self.z);
-        file.put(&path(prefix, "next_obs"), &[n, obs], &self.next_obs);
-        file.put(&path(prefix, "next_z"), &[n, latent], &self.next_z);
-        if clock > 0 {
-            file.put(&path(prefix, "left"), &[n], &self.left);
-            file.put(&path(prefix, "next_left"), &[n], &self.next_left);
-        }
-        if weight > 0 {
-            file.put(&path(prefix, "weights"), &[n], &self.weights);
-        }
-        match &self.actions {
-            Actions::Discrete(values) => file.put_u32(&path(prefix, "actions"), values),
-            Actions::Continuous { dim, values } => file.put(&path(prefix, "actions"), &[n, *dim], values),
-        }
-        file.put(&path(prefix, "rewards"), &[n], &self.rewards);
-        file.put_flags(&path(prefix, "terminated"), &self.terminated);
-        file.put_flags(&path(prefix, "truncated"), &self.truncated);
-    }
-
-    /// Takes all transitions out of a file, of which `seen` were ever taken in.
-    pub(super) fn take(&mut self, file: &mut TensorFile, prefix: &str, seen: u64) -> Result<(), FileError> {
-        self.seen = seen;
-        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
-        self.obs = file.take(&path(prefix, "obs"), &[n, obs])?;
-        self.z = file.take(&path(prefix, "z"), &[n, latent])?;
-        self.next_obs = file.take(&path(prefix, "next_obs"), &[n, obs])?;
-        self.next_z = file.take(&path(prefix, "next_z"), &[n, latent])?;
-        if clock > 0 {
-            self.left = file.take(&path(prefix, "left"), &[n])?;
-            self.next_left = file.take(&path(prefix, "next_left"), &[n])?;
-        }
-        let weights = path(prefix, "weights");
-        self.weights = match weight {
-            0 => Vec::new(),
-            // The first checkpoints of SPiRL discounted all skills alike.
-            _ if !file.has(&weights) => vec![1.0; n],
-            _ => file.take(&weights, &[n])?,
-        };
-        match &mut self.actions {
-            Actions::Discrete(values) => *values = file.take_u32(&path(prefix, "actions"), n)?,
-            Actions::Continuous { dim, values } => *values = file.take(&path(prefix, "actions"), &[n, *dim])?,
-        }
-        self.rewards = file.take(&path(prefix, "rewards"), &[n])?;
-        self.terminated = file.take_flags(&path(prefix, "terminated"), n)?;
-        self.truncated = file.take_flags(&path(prefix, "truncated"), n)?;
-        Ok(())
-    }
 }
 
 /// Puts `from` in slot `at` of `to`, or behind its end if that is where the slot lies.
@@ -228,13 +174,16 @@ mod tests {
     use super::super::transitions::tests::rollout;
     use super::*;
     use crate::ActionSpace;
-    use crate::file::FileKind;
     use crate::rng::Streams;
-    use std::path::Path;
+
+    const PLAIN: Widths = Widths { obs: 1, latent: 1, clock: 0, weight: 0 };
+
+    fn new(capacity: usize, widths: Widths) -> ReplayBuffer {
+        ReplayBuffer::new(capacity, widths, &ActionSpace::Discrete(3))
+    }
 
     fn filled(capacity: usize) -> ReplayBuffer {
-        let widths = Widths { obs: 1, latent: 1, clock: 1, weight: 1 };
-        let mut buffer = ReplayBuffer::new(capacity, widths, &ActionSpace::Discrete(3));
+        let mut buffer = new(capacity, Widths { clock: 1, weight: 1, ..PLAIN });
         buffer.push(&rollout(), &[2.0, 1.0, 1.0, 1.0, 0.5, 1.0]).expect("it fits");
         buffer
     }
@@ -259,29 +208,13 @@ mod tests {
         let picked = buffer.picked(&[4, 0], None).expect("the same actions");
         assert_eq!([picked.left, picked.next_left, picked.weights], [[0.5, 1.0], [1.0, 0.25], [0.5, 2.0]]);
         let silent = Rollout { left: Vec::new(), ..rollout() };
-        let widths = Widths { obs: 1, latent: 1, ..Widths::default() };
-        let new = |widths| ReplayBuffer::new(6, widths, &ActionSpace::Discrete(3));
-        let mut plain = new(widths);
+        let mut plain = new(6, PLAIN);
         plain.push(&silent, &[]).expect("nothing is missed");
         assert_eq!((plain.left.len(), plain.next_left.len(), plain.continues(0, TimeLimit::Bootstrap)), (0, 0, 1.0));
-        let error = new(Widths { clock: 1, ..widths }).push(&silent, &[]).expect_err("it does not tell");
+        let error = new(6, Widths { clock: 1, ..PLAIN }).push(&silent, &[]).expect_err("it does not tell");
         assert!(error.to_string().contains("rollout left"), "{error}");
-        let error = new(Widths { weight: 1, ..widths }).push(&silent, &[]).expect_err("no weights");
+        let error = new(6, Widths { weight: 1, ..PLAIN }).push(&silent, &[]).expect_err("no weights");
         assert!(error.to_string().contains("weights"), "{error}");
-    }
-
-    #[test]
-    fn files_from_before_there_were_weights_hold_transitions_that_all_count_alike() {
-        let widths = Widths { obs: 1, latent: 1, ..Widths::default() };
-        let new = |widths| ReplayBuffer::new(6, widths, &ActionSpace::Discrete(3));
-        let mut plain = new(widths);
-        plain.push(&rollout(), &[]).expect("it fits");
-        let kind = FileKind { name: "buffer", version: 1 };
-        let mut file = TensorFile::new(Path::new("buffer"), kind, &serde_json::json!({})).expect("a header");
-        plain.put(&mut file, "old");
-        let mut loaded = new(Widths { weight: 1, ..widths });
-        loaded.take(&mut file, "old", plain.seen).expect("read");
-        assert_eq!((loaded.weights.as_slice(), &loaded.obs), (&[1.0; 6][..], &plain.obs));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 mod batch;
 mod buffer;
+mod buffer_file;
 mod config;
 mod critics;
 mod demos;
