@@ -13,11 +13,7 @@ use super::{
 };
 use crate::{
     ant::walls::Walls,
-    senses::{
-        Mapped, Senses, Sighted, WithSenses,
-        mapped::{self, push_map},
-        sighted::{self, push_rays},
-    },
+    senses::{Mapped, Senses, Sighted, WithSenses, mapped::push_map, sighted::push_rays},
 };
 
 /// How far a ray reaches, in metres: two cells.
@@ -34,10 +30,6 @@ pub type AntMazeWithMap = WithSenses<AntMaze, Mapped>;
 impl Senses<AntMaze> for Sighted {
     const NAME: &'static str = "antmaze-sighted";
 
-    fn names(self) -> Vec<String> {
-        sighted::names()
-    }
-
     fn build(self, app: &mut App) {
         app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
     }
@@ -45,10 +37,6 @@ impl Senses<AntMaze> for Sighted {
 
 impl Senses<AntMaze> for Mapped {
     const NAME: &'static str = "antmaze-mapped";
-
-    fn names(self) -> Vec<String> {
-        mapped::names()
-    }
 
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();

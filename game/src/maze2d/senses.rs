@@ -10,11 +10,7 @@ use super::{
     game::Maze2d,
     play,
 };
-use crate::senses::{
-    Mapped, Senses, Sighted, WithSenses,
-    mapped::{self, push_map},
-    sighted::{self, push_rays},
-};
+use crate::senses::{Mapped, Senses, Sighted, WithSenses, mapped::push_map, sighted::push_rays};
 
 /// How far a ray reaches from the centre of a ball, in metres: four cells.
 pub const RAY_LENGTH: f64 = 4.0;
@@ -29,10 +25,6 @@ pub type Maze2dWithMap = WithSenses<Maze2d, Mapped>;
 impl Senses<Maze2d> for Sighted {
     const NAME: &'static str = "maze2d-sighted";
 
-    fn names(self) -> Vec<String> {
-        sighted::names()
-    }
-
     fn build(self, app: &mut App) {
         app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
     }
@@ -40,10 +32,6 @@ impl Senses<Maze2d> for Sighted {
 
 impl Senses<Maze2d> for Mapped {
     const NAME: &'static str = "maze2d-mapped";
-
-    fn names(self) -> Vec<String> {
-        mapped::names()
-    }
 
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();

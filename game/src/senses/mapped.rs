@@ -2,26 +2,27 @@
 
 use bevy_playbot::prelude::Observation;
 
-use super::sighted;
+use super::{Sighted, Told};
 
 /// How many cells the map reaches to each side: in a maze of 9 × 9 cells all that are free, from all but the outermost of
 /// them.
 pub const REACH: i32 = 5;
 
-/// Agents are told what [`Sighted`](super::Sighted) ones are, and which of the 11 × 11 cells around them are walls.
+/// Agents are told what [`Sighted`] ones are, and which of the 11 × 11 cells around them are walls.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mapped;
+
+impl Told for Mapped {
+    fn names(self) -> Vec<String> {
+        let cells = around().map(|[east, north]| format!("cell {east:+} east {north:+} north"));
+        Sighted.names().into_iter().chain(cells).collect()
+    }
+}
 
 /// How far the cells of the map lie to the east and to the north of the agent's own: rows from north to south, each from
 /// west to east, as on a map.
 fn around() -> impl Iterator<Item = [i32; 2]> {
     (-REACH..=REACH).rev().flat_map(|north| (-REACH..=REACH).map(move |east| [east, north]))
-}
-
-/// Names of what [`sighted::push_rays`] and then [`push_map`] add.
-pub fn names() -> Vec<String> {
-    let cells = around().map(|[east, north]| format!("cell {east:+} east {north:+} north"));
-    sighted::names().into_iter().chain(cells).collect()
 }
 
 /// Adds the map to an observation: 1 for walls, and for what lies outside, 0 for free cells. `is_wall` tells it of the cell
@@ -45,7 +46,7 @@ mod tests {
         push_map(&mut observation, |[east, north]| (east, north) == (-5, 5) || (east, north) == (1, 0));
         let walls: Vec<usize> = (0..121).filter(|&at| observation.vector[at] > 0.5).collect();
         assert_eq!((observation.vector.len(), walls.as_slice()), (121, &[0, 61][..]));
-        assert_eq!((&*names()[10], &*names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
+        assert_eq!((&*Mapped.names()[10], &*Mapped.names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
     }
 
     #[test]

@@ -11,4 +11,4 @@ mod with_senses;
 
 pub use mapped::Mapped;
 pub use sighted::Sighted;
-pub use with_senses::{Senses, WithSenses};
+pub use with_senses::{Senses, Told, WithSenses};

@@ -2,9 +2,19 @@
 
 use bevy_playbot::prelude::Observation;
 
+use super::Told;
+
 /// Agents are told the way to the goal and the distance of the walls around.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sighted;
+
+impl Told for Sighted {
+    fn names(self) -> Vec<String> {
+        let goal = ["goal x", "goal y"].map(str::to_owned);
+        let walls = WAYS.map(|(way, _)| format!("wall {way}"));
+        goal.into_iter().chain(walls).collect()
+    }
+}
 
 /// The eight ways that rays go, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
 /// a turn to the left. North is up in the game's own picture.
@@ -21,13 +31,6 @@ pub const WAYS: [(&str, [f64; 2]); 8] = {
         ("south-east", [DIAGONAL, -DIAGONAL]),
     ]
 };
-
-/// Names of what [`push_rays`] adds.
-pub fn names() -> Vec<String> {
-    let goal = ["goal x", "goal y"].map(str::to_owned);
-    let walls = WAYS.map(|(way, _)| format!("wall {way}"));
-    goal.into_iter().chain(walls).collect()
-}
 
 /// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the
 /// distance of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.

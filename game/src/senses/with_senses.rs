@@ -14,13 +14,16 @@ use playbot_lab::{
     proof::LevelProof,
 };
 
-/// What agents of a game are told beside what it tells them.
-pub trait Senses<G>: Copy + Send + Sync + 'static {
-    /// Name of the game with these senses.
-    const NAME: &'static str;
-
+/// What agents are told beside what a game tells them: the same in every game that has it.
+pub trait Told: Copy + Send + Sync + 'static {
     /// Names of the numbers that are added, in their order.
     fn names(self) -> Vec<String>;
+}
+
+/// How a game tells it.
+pub trait Senses<G>: Told {
+    /// Name of the game with these senses.
+    const NAME: &'static str;
 
     /// Adds systems that add them for every agent that plays and reads a vector, once the game has filled that.
     fn build(self, app: &mut App);
