@@ -201,5 +201,27 @@ fn what_any_variant_lacks_is_said_before_the_first_one_begins() {
     refuse(r#""algorithm=rlpd", "demos=elsewhere""#, "elsewhere");
     refuse(r#""ppo.augment=[Translate(2)]""#, "changes images");
     refuse(r#""skills.augment=[Cutout(0.5)]""#, "changes images");
+    refuse(r#""algorithm=score-sac", "observation=Raster""#, "`observation` is Raster");
     refuse(r#""algorithm=spirl-sac", "skills.tanh_latent=false""#, "`skills.tanh_latent` is false");
+}
+
+#[test]
+fn the_table_follows_from_the_results() {
+    let folder = prepared();
+    let folder = folder.path();
+    ok(study(folder, "runs", &["--variant", "full", "--variant", "cloned"]));
+    let table = folder.join("out/table.md");
+    let written = fs::read(&table).expect("written");
+    fs::remove_file(&table).expect("there");
+    let rewrite = || playbot(folder, &["study", "--out", "out", "--rewrite"]);
+    ok(rewrite());
+    assert!(fs::read(&table).expect("written again") == written);
+    // What a variant sets itself stays as it is, and somebody who sets it is told.
+    let set = study(folder, "others", &["--variant", "cloned", "--set", "algorithm=ppo", "--resume"]);
+    assert!(errors(&set).contains("--set algorithm=ppo does not change cloned"), "{}", errors(&set));
+    fs::write(folder.join("out/results.json"), "{").expect("writable");
+    refused(&rewrite(), "results.json");
+    fs::remove_file(folder.join("out/results.json")).expect("there");
+    refused(&rewrite(), "results.json");
+    assert!(fs::read(&table).expect("kept").starts_with(b"# coinrun: cloned"));
 }

@@ -26,6 +26,21 @@ fn write_experiment(folder: &Path) {
 }
 
 #[test]
+fn a_game_that_is_set_brings_its_own_experiment() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let shown = |set: &str| done(temporary.path(), &["config", "show", "--set", set]).0;
+    for set in ["game=maze2d", "game=\"maze2d\""] {
+        let shown = shown(set);
+        for part in
+            ["train: \"umaze:0..63\"", "test: \"umaze:64..127\"", "demos: \"demos/maze2d\"", "action_noise: 0.0"]
+        {
+            assert!(shown.contains(part), "{part}: {shown}");
+        }
+    }
+    assert_eq!(shown("game=coinrun"), shown("seed=1"), "the program's first game");
+}
+
+#[test]
 fn a_recording_holds_what_the_switches_of_record_say() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();

@@ -34,6 +34,7 @@ fn recording_verifying_and_repairing_from_the_shell() {
     assert_eq!(code(&verified), 0, "{}", errors(&verified));
     assert_eq!(lines(&verified)[0]["report"]["episodes"], 4);
     assert_eq!(lines(&run(&["demo", "ls", "a.demo", "--json"]))[0]["episodes"], 4);
+    assert_eq!(lines(&run(&["demo", "ls", "a.demo", "a.demo", "--json"])).len(), 2, "a line for each that is named");
     assert_eq!(lines(&run(&["demo", "show", "a.demo", "--json"])).len(), 4);
 
     let bytes = std::fs::read(folder.path().join("a.demo")).expect("readable");

@@ -74,4 +74,29 @@ fn stopped_learning_is_not_done() {
         let said = errors(&output);
         assert!(said.contains("stopped and saved") && said.contains(words), "{args:?}: {said}");
     }
+    let shorter = playbot(folder, &["train", "--run", "run", "--resume", "--steps", "1"]);
+    let said = errors(&shorter);
+    assert!(code(&shorter) == 3 && said.contains("leave --steps out to go on to 1000000000"), "{said}");
+}
+
+#[test]
+fn a_quickstart_stopped_during_its_further_seeds_keeps_both_trainings() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let text = r#"(
+    game: "coinrun", train: "hard:0..7", test: "hard:64..71", demos: "few.demo", steps: 128, arenas: 8, worlds: 2,
+    skills: (window: 5, epochs: 20, batch: 16, hidden: [16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+    ppo: (num_steps: 16, minibatches: 2, hidden: [16]),
+)"#;
+    fs::write(folder.join("small.ron"), text).expect("writable");
+    let recorded = playbot(folder, &["record", "coinrun", "--levels", "easy:0..3", "--out", "few.demo"]);
+    assert_eq!(code(&recorded), 0, "{}", errors(&recorded));
+    let trained = |method: &str| folder.join("q").join(method).join("checkpoints/step-000000000128/summary.json");
+    let args = ["quickstart", "--experiment", "small.ron", "--seeds", "100", "--run", "q"];
+    let said = errors(&interrupted(folder, &args, || trained("ppo").exists()));
+    assert!(said.contains("both trainings are saved in q, without a report"), "{said}");
+    assert!(!folder.join("q/report.html").exists());
+    let advice = said.rsplit_once("`playbot ").and_then(|(_, advice)| advice.split_once('`')).expect("a command").0;
+    let measured = playbot(folder, &advice.split(' ').collect::<Vec<_>>());
+    assert_eq!(code(&measured), 0, "{advice}: {}", errors(&measured));
 }

@@ -37,9 +37,9 @@ pub struct Args {
 enum Verb {
     /// List recordings.
     Ls {
-        /// File or folder.
+        /// Files or folders.
         #[arg(default_value = "demos")]
-        path: PathBuf,
+        paths: Vec<PathBuf>,
         /// One line of JSON per recording.
         #[arg(long)]
         json: bool,
@@ -95,7 +95,7 @@ enum Verb {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
-        Verb::Ls { path, json } => ls(&path, json),
+        Verb::Ls { paths, json } => ls(&paths, json),
         Verb::Show { file, episode, json } => show(&file, episode, json),
         Verb::Verify { paths, json } => verify(&paths, json, games),
         Verb::Repair { file, out, header_from, json } => {
@@ -105,9 +105,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
 }
 
-fn ls(path: &Path, as_json: bool) -> Result<Outcome, CliError> {
+fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Pass;
-    for file in find_demos(path).map_err(open::missing_recording)? {
+    for file in all_demos(paths)? {
         let summary = match DemoSummary::read(&file) {
             Ok(summary) => summary,
             Err(error) => {
@@ -154,11 +154,17 @@ fn success(summary: &DemoSummary) -> String {
     if notes.is_empty() { share } else { format!("{share} ({})", notes.join(", ")) }
 }
 
-fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, CliError> {
+/// The recordings of all files and folders.
+fn all_demos(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     let mut files = Vec::new();
     for path in paths {
         files.extend(find_demos(path).map_err(open::missing_recording)?);
     }
+    Ok(files)
+}
+
+fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, CliError> {
+    let files = all_demos(paths)?;
     let mut outcome = Outcome::Pass;
     let _replaying = NothingToSave::listen();
     for (done, file) in files.iter().enumerate() {

@@ -15,14 +15,15 @@ use playbot_lab::{
         config_file::{
             ConfigError, locate, parse_experiment, parse_experiment_with, read_experiment_text, read_experiment_with,
         },
-        default_experiment::default_experiment,
+        default_experiment::{default_experiment, experiment_of},
     },
 };
 
 /// Which experiment, and what to change in it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct ExperimentArgs {
-    /// Experiment file; that of the program's first game (for `eval --run` the run's own) if none is named.
+    /// Experiment file; if none is named, that of the game that `--set game=` names, or else of the program's first game (for
+    /// `eval --run` the run's own).
     #[arg(long, value_name = "FILE")]
     pub experiment: Option<PathBuf>,
     /// Change a value of the experiment, such as ppo.lr=0.0003; may be given several times.
@@ -45,7 +46,7 @@ impl ExperimentArgs {
         match &self.experiment {
             Some(path) => read_experiment_with(path, &sets),
             None => {
-                let ExperimentText { origin, text } = default_experiment(games);
+                let ExperimentText { origin, text } = unnamed(games, &sets);
                 parse_experiment_with(&text, Path::new(&*origin), &sets)
             }
         }
@@ -63,7 +64,7 @@ impl ExperimentArgs {
         match &self.experiment {
             Some(path) => locate(&read_experiment_text(path).unwrap_or_default(), path, &sets, error),
             None => {
-                let ExperimentText { origin, text } = default_experiment(games);
+                let ExperimentText { origin, text } = unnamed(games, &sets);
                 locate(&text, Path::new(&*origin), &sets, error)
             }
         }
@@ -114,6 +115,14 @@ impl ExperimentArgs {
     pub fn sets(&self, options: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
         self.set.iter().cloned().chain(options.into_iter().flatten()).collect()
     }
+}
+
+/// The experiment where no file is named: that of the game that `sets` name, since levels and settings of another one would not
+/// fit it. A game that does not exist is refused when it is looked for.
+fn unnamed(games: &Games, sets: &[String]) -> ExperimentText {
+    let named = sets.iter().rev().find(|set| sets_key(set, "game")).and_then(|set| set.split_once('='));
+    let game = named.and_then(|(_, name)| games.get(name.trim().trim_matches('"')).ok());
+    game.map_or_else(|| default_experiment(games), experiment_of)
 }
 
 /// Whether these are the recordings of an experiment that lies in the sources, as nobody has changed it.

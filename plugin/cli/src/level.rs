@@ -79,7 +79,7 @@ fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, Inspec
     match game.show_level(&LevelRequest { mode: Some(mode), ..request }) {
         Err(InspectError::Usage(_)) => {
             let level = game.show_level(&request)?;
-            tell!("no --map is named: one that the game chooses, level {seed}");
+            tell!("no --map is named: one that the game chooses, level {seed}; it is trained in --map {mode}");
             Ok(level)
         }
         level => {

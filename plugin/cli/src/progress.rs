@@ -4,12 +4,14 @@
 use std::{
     fmt::Write as _,
     io::{IsTerminal, Write as _, stderr},
-    sync::{LazyLock, Mutex, MutexGuard, Once, PoisonError},
+    sync::{Arc, LazyLock, Mutex, MutexGuard, Once, PoisonError},
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle, WeakProgressBar};
+
+use crate::pace::Pace;
 
 /// All bars, so that a part's bar stands below that of the whole.
 static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
@@ -25,25 +27,32 @@ static REPORTER: Once = Once::new();
 pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{left}}  {{msg}}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let pace = Arc::new(Mutex::new(Pace::default()));
+    let left = move |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        let mut pace = pace.lock().unwrap_or_else(PoisonError::into_inner);
+        let left = pace.left(Instant::now(), state.pos(), state.len().unwrap_or_default());
+        // What cannot be written is not drawn.
+        let _ = out.write_str(&describe_left(left));
+    };
     let bar = BARS.add(ProgressBar::new(length)).with_style(style.with_key("left", left).progress_chars("=> "));
     bar.enable_steady_tick(Duration::from_millis(250));
     if !stderr().is_terminal() {
-        text_progress().push(TextProgress { title: title.to_owned(), unit: unit.to_owned(), bar: bar.downgrade() });
+        text_progress().push(TextProgress {
+            title: title.to_owned(),
+            unit: unit.to_owned(),
+            bar: bar.downgrade(),
+            pace: Pace::default(),
+        });
         // Without a thread for it nothing is reported.
         REPORTER.call_once(|| drop(thread::Builder::new().spawn(report)));
     }
     bar
 }
 
-/// The time that is left, if anything has been done from which it can be told.
-fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
-    // What cannot be written is not drawn.
-    let _ = out.write_str(&describe_left(state.eta()));
-}
-
-/// indicatif estimates no time at all as long as nothing is done; less than a second is not worth a word.
-fn describe_left(left: Duration) -> String {
-    if left < Duration::from_secs(1) { String::new() } else { format!("{:#} left", HumanDuration(left)) }
+/// The time that is left, if it can be told; less than a second is not worth a word.
+fn describe_left(left: Option<Duration>) -> String {
+    let left = left.filter(|left| *left >= Duration::from_secs(1));
+    left.map_or(String::new(), |left| format!("{:#} left", HumanDuration(left)))
 }
 
 /// A bar that nobody sees, whose progress is reported in lines.
@@ -51,18 +60,19 @@ struct TextProgress {
     title: String,
     unit: String,
     bar: WeakProgressBar,
+    pace: Pace,
 }
 
 impl TextProgress {
     /// Where the work is, as `record: 1200 of 20000 steps`; `None` if it is over.
-    fn line(&self) -> Option<String> {
+    fn line(&mut self) -> Option<String> {
         let bar = self.bar.upgrade().filter(|bar| !bar.is_finished())?;
         let (title, unit, done) = (&self.title, &self.unit, bar.position());
         let mut line = match bar.length() {
             Some(length) if length > done => format!("{title}: {done} of {length} {unit}"),
             _ => format!("{title}: {done} {unit}"),
         };
-        let left = describe_left(bar.eta());
+        let left = describe_left(self.pace.left(Instant::now(), done, bar.length().unwrap_or_default()));
         if !left.is_empty() {
             let _ = write!(line, ", {left}");
         }
@@ -83,7 +93,7 @@ fn report() {
     loop {
         thread::park_timeout(PAUSE);
         let mut lines = String::new();
-        text_progress().retain(|progress| {
+        text_progress().retain_mut(|progress| {
             let line = progress.line();
             line.iter().for_each(|line| lines.extend([line, "\n"]));
             line.is_some()
@@ -98,7 +108,8 @@ mod tests {
     use super::*;
 
     fn words(bar: &ProgressBar) -> Option<String> {
-        TextProgress { title: "record".to_owned(), unit: "steps".to_owned(), bar: bar.downgrade() }.line()
+        let (title, unit) = ("record".to_owned(), "steps".to_owned());
+        TextProgress { title, unit, bar: bar.downgrade(), pace: Pace::default() }.line()
     }
 
     #[test]
@@ -117,10 +128,8 @@ mod tests {
     }
 
     #[test]
-    fn no_time_is_left_before_anything_is_done() {
-        let bar = ProgressBar::hidden();
-        bar.set_length(100);
-        assert_eq!(describe_left(bar.eta()), "");
-        assert_eq!(describe_left(Duration::from_secs(5)), "5s left");
+    fn less_than_a_second_is_not_worth_a_word() {
+        let words = [None, Some(Duration::from_millis(900)), Some(Duration::from_secs(5))].map(describe_left);
+        assert_eq!(words, ["", "", "5s left"]);
     }
 }

@@ -13,7 +13,7 @@ use playbot_lab::{
     train::{
         Experiment,
         run_dir::{is_unstarted, write_atomically},
-        study::{StudyRun, study_runs},
+        study::{StudyError, StudyRun, study_runs},
     },
 };
 use playbot_learner::DeviceKind;
@@ -22,9 +22,10 @@ use serde_json::json;
 use super::{
     compute::Compute,
     error::{CliError, Outcome, print_line},
-    experiment::{ExperimentArgs, quoted},
+    experiment::{ExperimentArgs, quoted, sets_key},
     interrupt, open, output, program, progress,
     study_cost::cost_table,
+    study_rewrite::rewrite,
     study_run::Runner,
     train::{never_learns, rounded},
 };
@@ -38,7 +39,8 @@ use super::{
   playbot study --experiment my.ron --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
   playbot study --experiment my.ron --variant full --variant no-kl --out study
-  playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume")]
+  playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume
+  playbot study --out study --rewrite")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
@@ -60,6 +62,9 @@ pub struct Args {
     /// Replace the runs that are there.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
+    /// Run nothing: write table.md anew from the results.json that is in the folder.
+    #[arg(long, conflicts_with_all = ["experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
+    rewrite: bool,
     #[command(flatten)]
     compute: Compute,
     /// One line of JSON per run instead of the table.
@@ -68,11 +73,16 @@ pub struct Args {
 }
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.rewrite {
+        rewrite(&args.out)?;
+        return Ok(Outcome::Pass);
+    }
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
     let mut experiment = args.from.load(games, [seeds])?;
     let runs = chosen(study_runs(&experiment)?, &args.variant)?;
     experiment.variants.retain(|variant| runs.iter().any(|run| run.variant == variant.name));
     check_games(&runs, &args.from, games)?;
+    tell_taken_back(&experiment, &args.from.set);
     let folder = runs_folder(&args);
     check_folder(&folder, &args)?;
     for path in [&folder, &args.out] {
@@ -156,12 +166,25 @@ fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>,
 }
 
 fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
-    for StudyRun { experiment, .. } in runs {
+    for StudyRun { variant, experiment } in runs {
         let game = open::game(games, from, experiment)?;
-        experiment.check_game(game)?;
-        experiment.check_memory(game)?;
+        let of_variant = |source| StudyError::Values { variant: variant.clone(), source };
+        experiment.check_game(game).map_err(of_variant)?;
+        experiment.check_memory(game).map_err(of_variant)?;
     }
     Ok(())
+}
+
+/// Says which of the `--set` some variants take back.
+fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
+    for (key, value) in sets.iter().filter_map(|set| set.split_once('=')) {
+        let variants = experiment.variants.iter();
+        let own = variants.filter(|variant| variant.set.iter().any(|set| sets_key(set, key.trim())));
+        let names: Vec<&str> = own.map(|variant| variant.name.as_str()).collect();
+        if !names.is_empty() {
+            tell!("warning: --set {key}={value} does not change {}: their own value comes last", names.join(", "));
+        }
+    }
 }
 
 fn runs_folder(args: &Args) -> PathBuf {

@@ -1,22 +1,20 @@
 //! `playbot train`.
 
 mod length;
+mod new_run;
 mod repeated;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use playbot_lab::{
-    game::Game,
     games::{Artifact, Games},
     report::whole,
     train::{
         Algorithm, Experiment, LearnerKind, TrainError, Trainer, UpdateReport,
         checkpoint::CheckpointChoice,
-        checksum::file_checksum,
-        run_dir::{OpenedRun, RunDir, RunError, RunInfo},
+        run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::DeviceKind;
 
 use super::{
     compute::Compute,
@@ -29,6 +27,7 @@ use bevy_playbot::unknown_name::UnknownName;
 use repeated::resumed;
 
 pub use length::{never_learns, rounded};
+pub use new_run::{create_run, run_info};
 
 /// Train a policy, headless, over the experiment's training levels.
 #[derive(clap::Args)]
@@ -171,6 +170,13 @@ fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = resumed(args, &saved, &info, games)?;
     let trainer = run.resume(game, &experiment, args.compute.device(), args.compute.threads())?;
     if trainer.is_done() {
+        let (steps, whole) = (trainer.steps(), saved.whole_steps());
+        if steps < whole {
+            return Err(CliError::Usage(format!(
+                "{} has {steps} steps already, and no fewer can be asked for: leave --steps out to go on to {whole}",
+                args.run.display()
+            )));
+        }
         // Nothing is to be trained, so the run stays what it is.
         return Ok((run, trainer));
     }
@@ -183,46 +189,6 @@ fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         tell!("it was begun on {} and goes on on {device}: what it learns is alike, but not the same", info.device);
     }
     Ok((run, trainer))
-}
-
-/// Makes the folder of a run, which says what file its skills are from.
-///
-/// # Errors
-///
-/// It exists and `force` is off, it is in use or no run, or it cannot be written.
-pub fn create_run(
-    path: &Path,
-    game: &dyn Game,
-    experiment: &Experiment,
-    skills: Option<&Path>,
-    device: DeviceKind,
-    force: bool,
-) -> Result<RunDir, RunError> {
-    let info = run_info(game, experiment, skills, device)?;
-    RunDir::create(path, &experiment.without_study(), &info, force)
-}
-
-/// What the folder of a run says of it.
-///
-/// # Errors
-///
-/// The skill model's file cannot be read.
-pub fn run_info(
-    game: &dyn Game,
-    experiment: &Experiment,
-    skills: Option<&Path>,
-    device: DeviceKind,
-) -> Result<RunInfo, RunError> {
-    let skills = skills.filter(|_| experiment.algorithm.needs_skills());
-    Ok(RunInfo {
-        algorithm: experiment.algorithm,
-        seed: experiment.seed,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        revision: env!("PLAYBOT_REVISION").to_owned(),
-        game_version: game.version(),
-        skills: skills.map(file_checksum).transpose()?,
-        device,
-    })
 }
 
 /// Trains to the end of the experiment or to Ctrl-C, with progress bar, log and checkpoints. Returns whether the end

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use playbot_lab::{
-    report::{Chart, Curve, Report, ResultRow, ResultTable, Section, Table},
+    report::{Chart, Curve, Report, ResultRow, ResultTable, Section, Table, times},
     train::{
         Experiment,
         metrics_log::{SUCCESS_RATE, range_of},
@@ -39,11 +39,12 @@ pub(super) fn write_report(
         true => "",
         false => "The paper does not say which unseen levels it used; its figures are shown for orientation. ",
     };
+    let times = times(experiment.eval.episodes_per_level);
     let table = ResultTable {
         caption: format!(
-            "Return per episode on {}, each level {} times, ± one standard error over the levels; steps/s are those of the \
+            "Return per episode on {}, each level {times}, ± one standard error over the levels; steps/s are those of the \
              training where there was one",
-            experiment.test, experiment.eval.episodes_per_level
+            experiment.test
         ),
         rows: rows.to_vec(),
         references,

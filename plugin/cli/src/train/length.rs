@@ -21,25 +21,49 @@ pub fn rounded(experiment: &Experiment) -> Option<String> {
     })
 }
 
-/// What is to be said of a training that is over before it learns; nothing of others.
+/// What is to be said of a training that is over before its policy learns; nothing of others.
 pub fn never_learns(experiment: &Experiment) -> Option<String> {
     let algorithm = experiment.algorithm;
-    if algorithm.learner() != LearnerKind::Sac || !algorithm.is_trained() {
+    if !algorithm.is_trained() {
         return None;
     }
+    match algorithm.learner() {
+        LearnerKind::Ppo => (experiment.updates() <= experiment.ppo.critic_warmup).then(|| {
+            format!(
+                "the policy will stay as it is: only its critic learns in the first {} updates (`ppo.critic_warmup`), and \
+                 this training has {}; train for longer, or set it lower",
+                whole(experiment.ppo.critic_warmup as f64),
+                whole(experiment.updates() as f64)
+            )
+        }),
+        LearnerKind::Sac => sac_never_learns(experiment),
+    }
+}
+
+fn sac_never_learns(experiment: &Experiment) -> Option<String> {
+    let (algorithm, sac) = (experiment.algorithm, &experiment.sac);
     // Policies over skills learn from skills, not from ticks.
     let (held, what) = match algorithm.learns_prior() {
         true => (experiment.score.horizon as u64, "skills"),
         false => (1, "steps"),
     };
-    let (starts, seen) = (experiment.sac.learning_starts, experiment.whole_steps() / held);
-    (seen < starts).then(|| {
-        format!(
-            "nothing will be learned: {algorithm} begins to learn after {} {what} (`sac.learning_starts`), and {} steps \
-             are {} of them at most; train for longer, or set it lower",
+    let (starts, seen) = (sac.learning_starts, experiment.whole_steps() / held);
+    if seen < starts {
+        return Some(format!(
+            "nothing will be learned: {algorithm} begins to learn after {} {what} (`sac.learning_starts`), and this training \
+             has {} of them at most; train for longer, or set it lower",
             whole(starts as f64),
-            whole(experiment.whole_steps() as f64),
             whole(seen as f64),
+        ));
+    }
+    // What comes in with the update that reaches the start counts, too.
+    let steps = sac.updates_per_step * seen as f64;
+    (steps <= sac.critic_warmup as f64).then(|| {
+        format!(
+            "the policy will stay as it is: only its critics learn in the first {} gradient steps (`sac.critic_warmup`), \
+             and this training has {} at most; train for longer, or set it lower",
+            whole(sac.critic_warmup as f64),
+            whole(steps.floor())
         )
     })
 }
@@ -77,11 +101,34 @@ mod tests {
             never_learns(&parse_experiment(&text, Path::new("x.ron")).expect("valid"))
         };
         let words = said("sac", 900).expect("too short");
-        assert!(words.contains("after 1,000 steps (`sac.learning_starts`), and 900 steps"), "{words}");
+        assert!(words.contains("after 1,000 steps (`sac.learning_starts`), and this training has 900"), "{words}");
         let words = said("spirl-sac", 3900).expect("too few skills");
-        assert!(words.contains("after 1,000 skills") && words.contains("3,900 steps are 975 of them"), "{words}");
+        assert!(words.contains("after 1,000 skills") && words.contains("this training has 975 of them"), "{words}");
         for (algorithm, steps) in [("sac", 1000), ("spirl-sac", 4000), ("ppo", 900), ("bc", 900)] {
             assert_eq!(said(algorithm, steps), None, "{algorithm}");
         }
+    }
+
+    #[test]
+    fn a_warm_up_that_never_ends_is_told() {
+        let said = |algorithm: &str, steps: u64| {
+            let text = format!(
+                r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: {steps}, algorithm: "{algorithm}", demos: "d",
+                arenas: 4, worlds: 1, ppo: (num_steps: 100, critic_warmup: 3), score: (init_from_decoder: false),
+                sac: (num_steps: 100, learning_starts: 100, updates_per_step: 0.5, critic_warmup: 1000))"#
+            );
+            never_learns(&parse_experiment(&text, Path::new("x.ron")).expect("valid"))
+        };
+        for algorithm in ["ppo", "score-ppo", "spirl-ppo"] {
+            let words = said(algorithm, 1200).expect("three updates");
+            assert!(words.contains("the first 3 updates (`ppo.critic_warmup`), and this training has 3;"), "{words}");
+            assert_eq!(said(algorithm, 1201), None, "{algorithm}");
+        }
+        let words = said("score-sac", 2000).expect("too short");
+        assert!(
+            words.contains("1,000 gradient steps (`sac.critic_warmup`), and this training has 1,000 at most"),
+            "{words}"
+        );
+        assert_eq!((said("score-sac", 2400), said("bc", 100)), (None, None));
     }
 }

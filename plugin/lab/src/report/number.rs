@@ -35,6 +35,11 @@ pub fn whole(value: f64) -> String {
     fixed(value, 0)
 }
 
+/// How often something is done, in words.
+pub fn times(count: u32) -> String {
+    if count == 1 { "once".to_owned() } else { format!("{count} times") }
+}
+
 /// `value` with about four significant digits, for numbers whose size is not known beforehand; NaN is unknown.
 pub fn readable(value: f64) -> String {
     let size = value.abs();

@@ -81,7 +81,7 @@ impl From<&EvalSummary> for TestResult {
 }
 
 /// A study that is done. It says nothing of the machine or the time: the same study gives the same bytes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StudyReport {
     /// The command that made it.
     pub command: String,

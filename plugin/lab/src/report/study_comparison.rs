@@ -3,6 +3,7 @@
 use super::{
     bootstrap::{Estimate, interquartile_mean, probability_of_improvement},
     number::{UNKNOWN, fixed, mean_and_error},
+    paired::{PairedDifference, holm},
     study::StudyReport,
     study_table::markdown_table,
 };
@@ -12,32 +13,32 @@ impl StudyReport {
     pub(super) fn differences(&self) -> String {
         let variants = self.variants();
         let Some((first, others)) = variants.split_first() else { return String::new() };
-        let paired = others.iter().filter_map(|other| Some((*other, self.difference(first, other)?)));
-        let rows: Vec<Vec<String>> = paired
-            .map(|(other, found)| {
-                let words = match (found.is_clear(), found.mean > 0.0) {
-                    (None, _) => "not to be told from one seed",
-                    (Some(false), _) => "no difference that is clear",
-                    (Some(true), true) => "clearly above",
-                    (Some(true), false) => "clearly below",
-                };
-                let p = found.p_value().map_or(UNKNOWN.to_owned(), |p| match p < 0.001 {
-                    true => "< 0.001".to_owned(),
-                    false => fixed(p, 3),
-                });
-                let [levels, seeds] = [found.levels, found.seeds].map(|count| count.to_string());
-                vec![other.to_owned(), mean_and_error(found.mean, found.se, 2), levels, seeds, p, words.to_owned()]
-            })
-            .collect();
-        if rows.is_empty() {
+        let paired: Vec<(&str, PairedDifference)> =
+            others.iter().filter_map(|other| Some((*other, self.difference(first, other)?))).collect();
+        if paired.is_empty() {
             return String::new();
         }
-        let headings = ["other", "difference", "levels", "seeds", "p", &format!("{first} is")];
+        let p_values: Vec<f64> = paired.iter().filter_map(|(_, found)| found.p_value()).collect();
+        let mut together = holm(&p_values).into_iter();
+        let rows = paired.iter().map(|(other, found)| {
+            let p = found.p_value();
+            let p_together = p.and_then(|_| together.next());
+            let words = match (p_together, found.mean > 0.0) {
+                (None, _) => "not to be told from one seed",
+                (Some(0.05..), _) => "no difference that is clear",
+                (Some(_), true) => "clearly above",
+                (Some(_), false) => "clearly below",
+            };
+            let [levels, seeds] = [found.levels, found.seeds].map(|count| count.to_string());
+            let difference = mean_and_error(found.mean, found.se, 2);
+            vec![(*other).to_owned(), difference, levels, seeds, p_cell(p), p_cell(p_together), words.to_owned()]
+        });
+        let headings = ["other", "difference", "levels", "seeds", "p", "p of all", &format!("{first} is")];
         format!(
             "The held-out return of **{first}** less that of each other variant, on the same levels and with the same seeds. ± is \
-             the standard error over levels and seeds; p is Student's t with one degree of freedom less than there are seeds, and \
-             below 0.05 the difference is called clear.\n\n{}\n",
-            markdown_table(&headings, rows.into_iter())
+             the standard error over levels and seeds; p is Student's t with one degree of freedom less than there are seeds. \
+             The p of all allows for that many comparisons (Holm), and below 0.05 the difference is called clear.\n\n{}\n",
+            markdown_table(&headings, rows)
         )
     }
 
@@ -76,4 +77,9 @@ impl StudyReport {
             markdown_table(&["variant", "interquartile mean", &above], rows.into_iter())
         )
     }
+}
+
+/// A p-value; unknown where there is none.
+fn p_cell(p: Option<f64>) -> String {
+    p.map_or(UNKNOWN.to_owned(), |p| if p < 0.001 { "< 0.001".to_owned() } else { fixed(p, 3) })
 }

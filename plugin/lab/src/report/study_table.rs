@@ -33,28 +33,6 @@ impl StudyReport {
         Ok(page)
     }
 
-    fn conditions(&self) -> String {
-        let experiment = &self.experiment;
-        let mut seeds: Vec<u64> = self.results.iter().map(|result| result.seed).collect();
-        seeds.sort_unstable();
-        seeds.dedup();
-        let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
-        let times = match experiment.eval.episodes_per_level {
-            1 => "once".to_owned(),
-            n => format!("{n} times"),
-        };
-        format!(
-            "Trained on {} for {} environment steps, measured on {}, each level {times}. Means ± standard deviations \
-             over the seeds {}. Training figures are those of the last 100 episodes; the steps are those until their \
-             success rate first was {}.",
-            experiment.train,
-            fixed(experiment.whole_steps() as f64, 0),
-            experiment.test,
-            seeds.join(", "),
-            rate_cell(experiment.study.threshold),
-        )
-    }
-
     /// The table of means over the seeds, one row for each variant.
     pub fn summary(&self) -> String {
         let threshold = format!("steps to {} success", rate_cell(self.experiment.study.threshold));
@@ -127,7 +105,7 @@ fn mean_cell(values: &[f64], decimals: usize) -> String {
 }
 
 /// A success rate as the cells below it are written, `70.0 ± 14.1%`: without a blank, which would widen every column.
-fn rate_cell(share: f64) -> String {
+pub(super) fn rate_cell(share: f64) -> String {
     format!("{}%", fixed(100.0 * share, 1))
 }
 

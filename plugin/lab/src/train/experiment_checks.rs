@@ -58,12 +58,13 @@ impl Experiment {
         if self.algorithm.learns_from_demos() {
             self.recordings()?;
         }
-        if self.algorithm.trains_on_demos() && self.observation_config().is_image() {
-            let why = format!("{} learns from vectors only", self.algorithm);
+        let by_sac = self.algorithm.is_trained() && self.algorithm.learner() == LearnerKind::Sac;
+        if by_sac && self.observation_config().is_image() {
+            let why = format!("{} learns from vectors only; with PPO pictures can be learned from", self.algorithm);
             return refuse("observation", format!("{:?}", self.observation), why);
         }
         self.check_normalisers()?;
-        self.check_what_sac_lacks()?;
+        self.check_end_of_penalty()?;
         self.check_skill_draws()?;
         self.check_batches()
     }
@@ -104,17 +105,20 @@ impl Experiment {
         Ok(())
     }
 
-    /// Settings of SCORE that only PPO has.
-    fn check_what_sac_lacks(&self) -> Result<(), ExperimentError> {
-        if self.algorithm != Algorithm::ScoreSac {
-            return Ok(());
-        }
-        match self.score.kl_coef_end {
-            Some(end) => {
-                refuse("score.kl_coef_end", end, "is for PPO; with SAC the penalty keeps its weight, `score.kl_coef`")
+    /// A penalty that falls is one of SCORE-PPO, and of the decoder of SPiRL that goes on learning.
+    fn check_end_of_penalty(&self) -> Result<(), ExperimentError> {
+        let Some(end) = self.score.kl_coef_end else { return Ok(()) };
+        let why = match self.algorithm {
+            Algorithm::ScoreSac => "with SAC the penalty keeps its weight, `score.kl_coef`; leave it out, or take PPO",
+            Algorithm::SpirlPpo | Algorithm::SpirlSac if !self.spirl.learn_decoder => {
+                "the decoder stays as it is and pays no penalty; leave it out, or set `spirl.learn_decoder`"
             }
-            None => Ok(()),
-        }
+            Algorithm::ScorePpo | Algorithm::SpirlPpo | Algorithm::SpirlSac if !self.score.kl => {
+                "there is no penalty that could end, since `score.kl` is false; leave it out"
+            }
+            _ => return Ok(()),
+        };
+        refuse("score.kl_coef_end", end, why)
     }
 
     fn check_batches(&self) -> Result<(), ExperimentError> {
@@ -186,6 +190,34 @@ mod tests {
         assert!(text.starts_with("`score.kl_coef_end` is ") && text.contains("PPO"), "{text}");
         assert_eq!(check(&format!(r#"demos: "d", {end}"#)), Ok(()));
         assert_eq!(check(&format!("{sac}, score: (critic_clock: true)")), Ok(()), "both have critics that count");
+    }
+
+    #[test]
+    fn a_penalty_that_nobody_pays_has_no_end() {
+        for algorithm in ["spirl-ppo", "spirl-sac"] {
+            let spirl = |learn| {
+                format!(
+                    r#"algorithm: "{algorithm}", demos: "d", score: (kl_coef_end: Some(0.0)), spirl: (learn_decoder: {learn})"#
+                )
+            };
+            assert_eq!(check(&spirl(true)), Ok(()));
+            assert!(check(&spirl(false)).expect_err("does nothing").contains("`spirl.learn_decoder`"));
+        }
+        let text = check(r#"demos: "d", score: (kl: false, kl_coef_end: Some(0.0))"#).expect_err("does nothing");
+        assert!(text.contains("`score.kl` is false"), "{text}");
+    }
+
+    #[test]
+    fn only_ppo_learns_from_pictures() {
+        for algorithm in Algorithm::ALL {
+            let found = check(&format!(
+                r#"algorithm: "{algorithm}", demos: "d", observation: Raster, score: (init_from_decoder: false)"#
+            ));
+            match ["sac", "score-sac", "spirl-sac", "rlpd"].contains(&algorithm.name()) {
+                true => assert!(found.expect_err("vectors").starts_with("`observation` is Raster"), "{algorithm}"),
+                false => assert_eq!(found, Ok(()), "{algorithm}"),
+            }
+        }
     }
 
     #[test]

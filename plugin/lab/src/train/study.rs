@@ -33,7 +33,10 @@ pub enum StudyError {
     #[error("seed {0} is there twice: another run with it would be the same run")]
     SameSeed(u64),
     /// A variant changes what the study itself says.
-    #[error("variant `{variant}`: `{key}` is not for a variant: every one runs with each of the study's `seeds`")]
+    #[error(
+        "variant `{variant}`: `{key}` is not for a variant: all are trained with the study's `seeds` and measured in the same \
+         way on the same levels"
+    )]
     OfTheStudy {
         /// Its name.
         variant: String,
@@ -120,8 +123,9 @@ pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> 
 }
 
 fn check_keys(variant: &Variant) -> Result<(), StudyError> {
-    let keys = variant.set.iter().filter_map(|set| Some(set.split_once('=')?.0.trim()));
-    match keys.into_iter().find(|key| ["seed", "seeds", "variants"].contains(key)) {
+    let of_the_study = ["seed", "seeds", "variants", "test", "eval", "study"];
+    let mut keys = variant.set.iter().filter_map(|set| Some(set.split_once('=')?.0.trim()));
+    match keys.find(|key| of_the_study.contains(&key.split('.').next().unwrap_or(key))) {
         Some(key) => Err(StudyError::OfTheStudy { variant: variant.name.clone(), key: key.to_owned() }),
         None => Ok(()),
     }
@@ -215,7 +219,8 @@ mod tests {
         assert!(text.contains("variant `b`") && text.contains("`score.kl`"), "{text}");
         let text = error(r#"(name: "b", set: ["ppo.minibatches=7"])"#);
         assert!(text.contains("variant `b`") && text.contains("must divide"), "{text}");
-        for set in ["seed=9", " seeds = [1]", "variants=[]"] {
+        let measured = ["test=hard:64..70", "eval.greedy=true", "eval=(greedy: true)", "study.threshold=0.1"];
+        for set in ["seed=9", " seeds = [1]", "variants=[]"].into_iter().chain(measured) {
             let text = error(&format!(r#"(name: "b", set: ["{set}"])"#));
             assert!(text.contains("variant `b`") && text.contains("the study's `seeds`"), "{text}");
         }

@@ -48,6 +48,9 @@ pub struct SacConfig {
     pub buffer: usize,
     /// Transitions before the first gradient step.
     pub learning_starts: u64,
+    /// Gradient steps that only the critics take, before the actor and the temperature begin. A copied policy is not led away
+    /// by critics that know nothing yet.
+    pub critic_warmup: u64,
     /// Whether actions are random, whatever the observation, until then: uniform (discrete) or nearly uniform in
     /// [-1, 1] (continuous). A policy that starts as a copy of the decoder plays itself instead.
     pub random_start: bool,
@@ -99,6 +102,7 @@ impl Default for SacConfig {
             batch: 256,
             buffer: 1_000_000,
             learning_starts: 5000,
+            critic_warmup: 0,
             random_start: true,
             num_steps: 16,
             updates_per_step: 1.0,

@@ -84,7 +84,8 @@ impl SacLearner {
         let seen_by_target = self.critics_of_target(number);
         let mut rng = self.base.streams.stream("sac.noise", number);
         self.gradient_steps += 1;
-        let with_actor = self.gradient_steps.is_multiple_of(self.config.actor_every);
+        let is_warming_up = number < self.config.critic_warmup;
+        let with_actor = !is_warming_up && self.gradient_steps.is_multiple_of(self.config.actor_every);
         let start = Instant::now();
         let batch = self.batch(&drawn, seen_by_target, with_actor)?;
         self.base.gathering += start.elapsed();

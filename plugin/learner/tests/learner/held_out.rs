@@ -144,3 +144,19 @@ fn what_cannot_be_kept_apart_is_refused() {
     ));
     assert_eq!(epoch(&mut trainer(crate::skill::config(), corridor_demos(9))).held_out, None);
 }
+
+#[test]
+fn weights_of_skills_decay_if_they_shall() {
+    let size = |weight_decay| {
+        let mut trainer = trainer(SkillConfig { weight_decay, lr: 1e-6, ..config() }, coins());
+        epoch(&mut trainer);
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        trainer.model().save(file.path()).expect("written");
+        let bytes = std::fs::read(file.path()).expect("readable");
+        let tensors = safetensors::SafeTensors::deserialize(&bytes).expect("tensors");
+        let numbers = tensors.iter().flat_map(|(_, tensor)| tensor.data().chunks_exact(4).collect::<Vec<_>>());
+        numbers.map(|four| f64::from(f32::from_le_bytes(four.try_into().expect("four")).abs())).sum::<f64>()
+    };
+    let (plain, decayed) = (size(0.0), size(1e5));
+    assert!(decayed < 0.8 * plain, "{decayed} of {plain}");
+}

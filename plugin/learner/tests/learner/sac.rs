@@ -133,6 +133,23 @@ fn gradient_steps_keep_pace_with_the_transitions() {
     assert_eq!(warming.scalars(), [("charts/transitions", 16.0), ("charts/gradient_steps", 0.0)]);
 }
 
+#[test]
+fn while_the_critics_warm_up_the_actor_stays_where_it_is() {
+    let warm = SacConfig { critic_warmup: 10, learning_starts: 16, updates_per_step: 0.5, batch: 4, ..config() };
+    let mut learner = learner(SacConfig { random_start: false, actor_every: 1, ..warm });
+    let mut driver = Driver::new(4, 1);
+    let played = driver.rollout(&learner, 4);
+    let head =
+        |learner: &SacLearner| learner.policy().forward(&played.z, &played.obs, played.rows()).expect("finite").head;
+    let start = head(&learner);
+    let first = learner.update(&played).expect("finite");
+    assert_eq!((first.gradient_steps, first.actor_loss, first.temperature_loss), (8, None, None));
+    assert!(first.qf_loss.is_some() && head(&learner) == start, "only the critics learn");
+    let second = learner.update(&played).expect("finite");
+    assert!(second.gradient_steps == 16 && second.actor_loss.is_some());
+    assert!(head(&learner) != start && second.entropy_coef != first.entropy_coef, "and then all do");
+}
+
 /// Plays on and compares every report and the whole states.
 fn goes_on(mut learner: SacLearner, mut rollout: impl FnMut(&SacLearner) -> Rollout) {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,6 +1,7 @@
 //! The experiments that come with the program can be run: names, modes, levels and values fit.
 
-#[path = "shared/program.rs"]
+mod fair;
+#[path = "../shared/program.rs"]
 mod program;
 
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use playbot_lab::{
     games::Games,
     held_out::HeldOut,
     split::LevelSplit,
-    train::{Experiment, LearnerKind, config_file::read_experiment, study::study_runs},
+    train::{Experiment, config_file::read_experiment, study::study_runs},
 };
 use program::done;
 use serde_json::Value;
@@ -73,8 +74,8 @@ fn what_is_held_out_is_not_trained_on_by_another_name() {
 /// Mazes of the paper's tables and figures, with the methods that are compared there.
 const MAZES: [(&str, &[&str]); 10] = [
     ("antmaze-medium", &["score-ppo", "sac", "ppo", "spirl-ppo", "rlpd"]),
-    ("antmaze-large", &["score-ppo", "sac", "ppo"]),
-    ("antmaze-xl", &["score-ppo", "sac", "ppo"]),
+    ("antmaze-large", &["score-ppo", "sac", "ppo", "spirl-ppo", "rlpd"]),
+    ("antmaze-xl", &["score-ppo", "sac", "ppo", "spirl-ppo", "rlpd"]),
     ("antmaze-to-large", &["score-medium", "score-large", "ppo-medium"]),
     ("antmaze-to-xl", &["score-medium", "score-large", "score-xl", "ppo-large"]),
     (
@@ -122,68 +123,6 @@ fn mazes_come_at_the_papers_size_and_at_one_for_an_hour() {
         };
         assert!(steps(&paper).iter().all(|&steps| [3_500_000, 17_500_000].contains(&steps)), "{name}");
         assert!(steps(&hour).iter().all(|&steps| steps == hour_steps), "{name}");
-    }
-}
-
-/// Experiments and their variants that are told to differ: one is named for another worth of entropy, one counts its steps in
-/// skills, and two have the schedule that suits them better.
-const TOLD: [(&str, &str); 4] =
-    [("coinrun-sac", "sac-explore"), ("coinrun-sac", "spirl-sac"), ("coinrun-taught", "ppo"), ("maze2d-mapped", "ppo")];
-
-/// How much entropy is worth, how fast its learner learns and how often it goes over what was played.
-fn effort(experiment: &Experiment) -> String {
-    match experiment.algorithm.learner() {
-        LearnerKind::Ppo => {
-            let ppo = &experiment.ppo;
-            let rate = (ppo.lr, ppo.anneal_lr, ppo.total_updates, ppo.weight_decay, ppo.max_grad_norm);
-            let schedule = (experiment.arenas, ppo.num_steps, ppo.epochs, ppo.minibatches, ppo.clip, ppo.norm_adv);
-            format!("PPO: entropy {}, {rate:?}, {schedule:?}", ppo.ent_coef)
-        }
-        LearnerKind::Sac => {
-            let sac = &experiment.sac;
-            let rates = (sac.actor_lr, sac.critic_lr, sac.temperature_lr, sac.tau, sac.learning_starts);
-            let schedule =
-                (experiment.arenas, sac.num_steps, sac.updates_per_step, sac.batch, sac.actor_every, sac.target_every);
-            format!("SAC: {:?}, {rates:?}, {schedule:?}", sac.entropy)
-        }
-    }
-}
-
-#[test]
-fn variants_that_are_compared_have_the_same_entropy_and_schedule() {
-    let mut compared = 0;
-    for name in names() {
-        let mut first: Vec<(LearnerKind, String, String)> = Vec::new();
-        for run in study_runs(&read(&name)).expect("valid") {
-            let algorithm = run.experiment.algorithm;
-            let is_told = TOLD.iter().any(|&(file, variant)| file == name && variant == run.variant);
-            if !algorithm.is_trained() || is_told {
-                continue;
-            }
-            let found = effort(&run.experiment);
-            match first.iter().find(|(learner, ..)| *learner == algorithm.learner()) {
-                Some((_, other, expected)) => {
-                    assert_eq!(&found, expected, "{name}: {} is not comparable with {other}", run.variant);
-                    compared += usize::from(run.variant != *other);
-                }
-                None => first.push((algorithm.learner(), run.variant, found)),
-            }
-        }
-    }
-    assert!(compared >= 50, "only {compared} runs are compared with others");
-}
-
-#[test]
-fn a_variant_that_differs_is_seen() {
-    let experiment = read("coinrun-ablation");
-    let with = |set: &str| effort(&experiment.with_set(&[set]).expect("a key"));
-    assert_eq!(with("score.kl=false"), effort(&experiment));
-    for set in ["ppo.ent_coef=0.02", "ppo.lr=0.1", "ppo.epochs=9", "ppo.minibatches=16", "ppo.anneal_lr=true"] {
-        assert_ne!(with(set), effort(&experiment), "{set}");
-    }
-    for set in ["sac.entropy=Fixed(0.5)", "sac.updates_per_step=0.3"] {
-        let sac = |more: &[&str]| effort(&experiment.with_set(&[&["algorithm=sac"], more].concat()).expect("keys"));
-        assert_ne!(sac(&[set]), sac(&[]), "{set}");
     }
 }
 

@@ -1,0 +1,100 @@
+//! What is compared is comparable: the variants of an experiment differ in what their names say.
+
+use playbot_lab::train::{Experiment, LearnerKind, study::study_runs};
+
+use crate::{MAZES, names, read};
+
+/// Experiments and their variants that are told to differ: one is named for another worth of entropy, one counts its steps in
+/// skills, and two have the schedule that suits them better.
+const TOLD: [(&str, &str); 4] =
+    [("coinrun-sac", "sac-explore"), ("coinrun-sac", "spirl-sac"), ("coinrun-taught", "ppo"), ("maze2d-mapped", "ppo")];
+
+/// How much entropy is worth, how fast its learner learns and how often it goes over what was played.
+fn effort(experiment: &Experiment) -> String {
+    match experiment.algorithm.learner() {
+        LearnerKind::Ppo => {
+            let ppo = &experiment.ppo;
+            let rate = (ppo.lr, ppo.anneal_lr, ppo.total_updates, ppo.weight_decay, ppo.max_grad_norm);
+            let schedule = (experiment.arenas, ppo.num_steps, ppo.epochs, ppo.minibatches, ppo.clip, ppo.norm_adv);
+            format!("PPO: entropy {}, {rate:?}, {schedule:?}", ppo.ent_coef)
+        }
+        LearnerKind::Sac => {
+            let sac = &experiment.sac;
+            let rates = (sac.actor_lr, sac.critic_lr, sac.temperature_lr, sac.tau, sac.learning_starts);
+            let schedule =
+                (experiment.arenas, sac.num_steps, sac.updates_per_step, sac.batch, sac.actor_every, sac.target_every);
+            format!("SAC: {:?}, {rates:?}, {schedule:?}", sac.entropy)
+        }
+    }
+}
+
+#[test]
+fn variants_that_are_compared_have_the_same_entropy_and_schedule() {
+    let mut compared = 0;
+    for name in names() {
+        let mut first: Vec<(LearnerKind, String, String)> = Vec::new();
+        for run in study_runs(&read(&name)).expect("valid") {
+            let algorithm = run.experiment.algorithm;
+            let is_told = TOLD.iter().any(|&(file, variant)| file == name && variant == run.variant);
+            if !algorithm.is_trained() || is_told {
+                continue;
+            }
+            let found = effort(&run.experiment);
+            match first.iter().find(|(learner, ..)| *learner == algorithm.learner()) {
+                Some((_, other, expected)) => {
+                    assert_eq!(&found, expected, "{name}: {} is not comparable with {other}", run.variant);
+                    compared += usize::from(run.variant != *other);
+                }
+                None => first.push((algorithm.learner(), run.variant, found)),
+            }
+        }
+    }
+    assert!(compared >= 50, "only {compared} runs are compared with others");
+}
+
+/// How a trained variant of a maze sees and values what comes: whether observations and rewards are normalised, and the
+/// discount of a tick.
+fn senses(experiment: &Experiment) -> (bool, bool, f64) {
+    let (ppo, sac) = (&experiment.ppo, &experiment.sac);
+    let (norm_obs, norm_reward, gamma) = match experiment.algorithm.learner() {
+        LearnerKind::Ppo => (ppo.norm_obs, ppo.norm_reward, ppo.gamma),
+        LearnerKind::Sac => (sac.norm_obs, sac.norm_reward, sac.gamma),
+    };
+    (norm_obs || (experiment.algorithm.needs_skills() && experiment.skills.norm_obs), norm_reward, gamma)
+}
+
+/// Told in the paper's tables: SAC and RLPD look 100 ticks ahead there, which is enough for them to always reach the goal.
+const SHORT_SIGHTED: [&str; 2] = ["maze2d-medium-hour", "maze2d-large-hour"];
+
+#[test]
+fn every_method_of_a_maze_sees_normalised_numbers_and_looks_as_far_ahead() {
+    let mazes: Vec<String> = MAZES.iter().flat_map(|(name, _)| [(*name).to_owned(), format!("{name}-hour")]).collect();
+    for name in mazes {
+        let runs = study_runs(&read(&name)).expect("valid");
+        let trained: Vec<_> = runs.iter().filter(|run| run.experiment.algorithm.is_trained()).collect();
+        for run in &trained {
+            let is_exempt =
+                SHORT_SIGHTED.contains(&name.as_str()) && run.experiment.algorithm.learner() == LearnerKind::Sac;
+            let gamma = if is_exempt { 0.99 } else { trained[0].experiment.ppo.gamma };
+            assert_eq!(senses(&run.experiment), (true, true, gamma), "{name}, {}", run.variant);
+        }
+    }
+    let experiment = read("antmaze-medium-hour");
+    for set in [["algorithm=sac", "sac.norm_obs=false"], ["algorithm=ppo", "ppo.norm_reward=false"]] {
+        assert_ne!(senses(&experiment.with_set(&set).expect("keys")), (true, true, 0.998), "{set:?}");
+    }
+}
+
+#[test]
+fn a_variant_that_differs_is_seen() {
+    let experiment = read("coinrun-ablation");
+    let with = |set: &str| effort(&experiment.with_set(&[set]).expect("a key"));
+    assert_eq!(with("score.kl=false"), effort(&experiment));
+    for set in ["ppo.ent_coef=0.02", "ppo.lr=0.1", "ppo.epochs=9", "ppo.minibatches=16", "ppo.anneal_lr=true"] {
+        assert_ne!(with(set), effort(&experiment), "{set}");
+    }
+    for set in ["sac.entropy=Fixed(0.5)", "sac.updates_per_step=0.3"] {
+        let sac = |more: &[&str]| effort(&experiment.with_set(&[&["algorithm=sac"], more].concat()).expect("keys"));
+        assert_ne!(sac(&[set]), sac(&[]), "{set}");
+    }
+}

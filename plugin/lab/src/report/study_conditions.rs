@@ -1,0 +1,132 @@
+//! Under what conditions the variants of a study were trained and measured, in words.
+
+use playbot_learner::brief_number;
+
+use super::{
+    number::{fixed, times},
+    study::StudyReport,
+    study_table::rate_cell,
+};
+use crate::train::{Experiment, LearnerKind, study::study_runs};
+
+impl StudyReport {
+    pub(super) fn conditions(&self) -> String {
+        let experiment = &self.experiment;
+        let mut seeds: Vec<u64> = self.results.iter().map(|result| result.seed).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+        format!(
+            "{}, measured on {}, each level {}. Means ± standard deviations over the seeds {}. Training figures are those of \
+             the last 100 episodes; the steps are those until their success rate first was {}.",
+            self.trainings(),
+            experiment.test,
+            times(experiment.eval.episodes_per_level),
+            seeds.join(", "),
+            rate_cell(experiment.study.threshold),
+        )
+    }
+
+    /// On what levels and for how long the variants were trained: once if all were alike, else with the names of each kind.
+    fn trainings(&self) -> String {
+        let runs = study_runs(&self.experiment).unwrap_or_default();
+        let mut kinds: Vec<(String, Vec<&str>)> = Vec::new();
+        for variant in self.variants() {
+            let run = runs.iter().find(|run| run.variant == variant).map_or(&self.experiment, |run| &run.experiment);
+            if !run.algorithm.is_trained() {
+                continue;
+            }
+            let words = training(run);
+            match kinds.iter_mut().find(|(kind, _)| *kind == words) {
+                Some((_, variants)) => variants.push(variant),
+                None => kinds.push((words, vec![variant])),
+            }
+        }
+        match &kinds[..] {
+            [] => "Without training".to_owned(),
+            [(words, _)] => format!("Trained on {words}"),
+            _ => {
+                let each = kinds.iter().map(|(words, variants)| format!("on {words} ({})", variants.join(", ")));
+                format!("Trained {}", each.collect::<Vec<_>>().join(", "))
+            }
+        }
+    }
+}
+
+/// Levels, steps and, of learners that choose how many there are, gradient steps.
+fn training(run: &Experiment) -> String {
+    let words = format!("{} for {} environment steps", run.train, fixed(run.whole_steps() as f64, 0));
+    match run.algorithm.learner() {
+        LearnerKind::Ppo => words,
+        LearnerKind::Sac => {
+            let per = if run.algorithm.learns_prior() { "skill" } else { "step" };
+            format!("{words} with {} gradient steps per {per}", brief_number(run.sac.updates_per_step))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{
+        report::{StudyResult, TestResult},
+        train::{Algorithm, config_file::parse_experiment},
+    };
+
+    fn trainings(variants: &[(&str, &str)]) -> String {
+        let set = variants.iter().map(|(name, set)| format!("(name: \"{name}\", set: [{set}])"));
+        let text = format!(
+            r#"(game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused", steps: 32768,
+            score: (init_from_decoder: false), variants: [{}])"#,
+            set.collect::<Vec<_>>().join(", ")
+        );
+        let result = |name: &str| StudyResult {
+            variant: name.to_owned(),
+            algorithm: Algorithm::Ppo,
+            seed: 1,
+            training: None,
+            test: TestResult {
+                episodes: 1,
+                success: 1.0,
+                success_se: 0.0,
+                return_mean: 1.0,
+                return_se: 0.0,
+                length_mean: 1.0,
+                level_returns: Vec::new(),
+            },
+        };
+        let report = StudyReport {
+            command: String::new(),
+            experiment: parse_experiment(&text, Path::new("x.ron")).expect("valid"),
+            results: variants.iter().map(|(name, _)| result(name)).collect(),
+            curves: Vec::new(),
+        };
+        report.trainings()
+    }
+
+    #[test]
+    fn what_all_share_is_said_once() {
+        let same = trainings(&[("full", ""), ("plain", r#""algorithm=ppo""#), ("cloned", r#""algorithm=bc""#)]);
+        assert_eq!(same, "Trained on plain:0..7 for 32,768 environment steps");
+        assert_eq!(trainings(&[("cloned", r#""algorithm=bc""#)]), "Without training");
+    }
+
+    #[test]
+    fn variants_that_were_trained_otherwise_are_named() {
+        let different = trainings(&[
+            ("full", ""),
+            ("no-kl", r#""score.kl=false""#),
+            ("longer", r#""steps=49152""#),
+            ("elsewhere", r#""train=plain:20..29""#),
+            ("sac", r#""algorithm=sac", "sac.updates_per_step=0.05""#),
+        ]);
+        assert_eq!(
+            different,
+            "Trained on plain:0..7 for 32,768 environment steps (full, no-kl), on plain:0..7 for 49,152 environment steps \
+             (longer), on plain:20..29 for 32,768 environment steps (elsewhere), on plain:0..7 for 32,768 environment steps \
+             with 0.05 gradient steps per step (sac)"
+        );
+    }
+}
