@@ -65,7 +65,7 @@ const SETTINGS: [(&str, &str); 57] = [
     ("algorithm=sac sac.num_steps=18446744073709551615", "sac.num_steps"),
     ("algorithm=sac sac.num_steps=1000000000", "sac.num_steps"),
     ("algorithm=sac sac.updates_per_step=1e300", "sac.updates_per_step"),
-    ("algorithm=sac observation=Raster sac.buffer=1000000 steps=1000000", "sac.buffer"),
+    ("algorithm=sac sac.buffer=20000000 steps=20000000", "sac.buffer"),
     ("algorithm=rlpd rlpd.critics=18446744073709551615", "rlpd.critics"),
     ("algorithm=rlpd rlpd.critics=1000000", "rlpd.critics"),
     ("algorithm=ppo observation=Raster image.width=1024 image.height=1024 image.stack=16", "image.width"),
