@@ -189,7 +189,12 @@ fn damaged_runs_are_named() {
     assert!(listed.contains("runs/a/1") && listed.contains("damaged: runs/b/run.json"), "{listed}");
     assert!(listed.contains("bring it back from a copy"), "{listed}");
     assert!(json_lines(&ended(folder, &["runs", "ls", "--json"], 1).0)[2]["error"].is_string());
-    ended(folder, &["runs", "compare", "runs"], 3);
+    let (others, left_out) = ended(folder, &["runs", "compare", "runs", "--metric", "losses/entropy"], 0);
+    assert!(others.contains("1 2") && left_out.contains("runs/b is left out: runs/b/run.json"), "{others}{left_out}");
+    for alone in ["runs/b", "runs/b/."] {
+        let (_, damaged) = ended(folder, &["runs", "compare", alone], 3);
+        assert!(damaged.contains("run.json") && damaged.contains("bring it back"), "{damaged}");
+    }
     let forget = |run: &str| {
         for file in ["metrics.jsonl", "timing.jsonl"] {
             fs::remove_file(folder.join(run).join(file)).expect("removed");

@@ -140,10 +140,15 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     assert!(results.iter().all(|result| result.exists()), "finished runs were lost");
 
     let one = |more: &[&str]| small(&[&["--resume", "--variant", "full"], more].concat());
+    refused(&one(&[]), "holds results that this study lacks: plain with seed 1; choose another folder with --out");
+    fs::remove_file(folder.join("out/results.json")).expect("there");
     let only = String::from_utf8(ok(one(&["--json"])).stdout).expect("Unicode");
     assert!(only.lines().count() == 1 && only.contains("\"variant\":\"full\""), "{only}");
     assert!(written(folder)[0].contains("--variant full --seeds 1"), "{}", written(folder)[0]);
     refused(&one(&["--variant", "ful"]), "did you mean `full`?");
+    // What does not fit a variant matters only where that is run.
+    refused(&small(&["--force", "--set", "score.kl_coef_end=Some(0.0)"]), "variant `plain`");
+    refused(&one(&["--set", "score.kl_coef_end=Some(0.0)"]), "other settings");
 
     let foreign = folder.join("foreign/plain-seed1/notes.txt");
     fs::create_dir_all(foreign.parent().expect("a folder")).expect("writable");
@@ -217,7 +222,7 @@ fn the_table_follows_from_the_results() {
     ok(rewrite());
     assert!(fs::read(&table).expect("written again") == written);
     // What a variant sets itself stays as it is, and somebody who sets it is told.
-    let set = study(folder, "others", &["--variant", "cloned", "--set", "algorithm=ppo", "--resume"]);
+    let set = study(folder, "others", &["--variant", "cloned", "--set", "algorithm=ppo", "--force"]);
     assert!(errors(&set).contains("--set algorithm=ppo does not change cloned"), "{}", errors(&set));
     fs::write(folder.join("out/results.json"), "{").expect("writable");
     refused(&rewrite(), "results.json");

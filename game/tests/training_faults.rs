@@ -123,6 +123,10 @@ fn a_torn_checkpoint_is_passed_over_for_the_one_before() {
     let last = run.join("checkpoints").join(steps(&run).pop().expect("a checkpoint")).join("learner.safetensors");
     let bytes = std::fs::read(&last).expect("readable");
     std::fs::write(&last, &bytes[..bytes.len() / 2]).expect("writable");
+    for verb in [&["eval"][..], &["policy", "export", "--out", "torn.policy"]] {
+        let (_, words) = ended(folder.path(), &[verb, &["--run", "whole"]].concat(), 3);
+        assert!(words.contains("the file is cut off") && words.contains("--checkpoint: there are those of"), "{words}");
+    }
     let resumed = resume(folder.path(), "whole");
     assert!(resumed.status.success(), "{}", errors(&resumed));
     let words = errors(&resumed);

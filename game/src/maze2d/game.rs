@@ -10,6 +10,7 @@ use playbot_lab::{
     defect::DefectKind,
     detector::Detector,
     detectors::{FarGoal, GoalIgnored, ThroughWall},
+    experiment_text::ExperimentText,
     floor_plan::FloorPlan,
     game::{level_designs, read_level_designs},
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
@@ -180,6 +181,11 @@ impl Game for Maze2d {
 
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+
+    fn experiment(&self) -> Option<ExperimentText> {
+        let text = include_str!("../../assets/experiments/maze2d.ron");
+        Some(ExperimentText { origin: "assets/experiments/maze2d.ron".into(), text: text.into() })
     }
 
     fn benchmarks(&self) -> Vec<Benchmark> {

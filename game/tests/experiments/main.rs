@@ -12,7 +12,11 @@ use playbot_lab::{
     games::Games,
     held_out::HeldOut,
     split::LevelSplit,
-    train::{Experiment, config_file::read_experiment, study::study_runs},
+    train::{
+        Experiment,
+        config_file::{parse_experiment, read_experiment},
+        study::study_runs,
+    },
 };
 use program::done;
 use serde_json::Value;
@@ -144,6 +148,20 @@ fn what_is_measured_elsewhere_was_learned_where_the_variant_says() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn what_a_game_is_trained_with_by_itself_comes_with_the_program() {
+    let own: Vec<_> = GAMES.iter().filter_map(|game| Some((game.name(), game.experiment()?))).collect();
+    assert_eq!(own.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["coinrun", "maze2d", "antmaze"]);
+    for (name, own) in own {
+        // Whoever has added the crate has no other files to build upon.
+        let experiment =
+            parse_experiment(&own.text, Path::new("nowhere/own.ron")).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!((own.origin.to_string(), &*experiment.game), (format!("assets/experiments/{name}.ron"), name));
+        let demos = experiment.demos.unwrap_or_else(|| panic!("{name} says from which recordings"));
+        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(&demos).exists(), "{name}: {}", demos.display());
     }
 }
 

@@ -11,8 +11,8 @@ use playbot_lab::{
     games::{Artifact, Games},
     report::whole,
     train::{
-        Experiment,
-        checkpoint::{Checkpoint, CheckpointChoice},
+        Algorithm, Experiment, TrainedLearner,
+        checkpoint::{self, Checkpoint, CheckpointChoice},
         run_dir::RunDir,
     },
 };
@@ -81,6 +81,43 @@ pub fn checkpoint(run: &RunDir, choice: CheckpointChoice) -> Result<Checkpoint, 
         tell!("{}", best(run.path(), &checkpoint));
     }
     Ok(checkpoint)
+}
+
+/// What a run had learned at a checkpoint.
+///
+/// # Errors
+///
+/// It cannot be read: if it is damaged, with those that may be taken in its place.
+pub fn learner(
+    run: &RunDir,
+    algorithm: Algorithm,
+    checkpoint: &Checkpoint,
+    device: DeviceKind,
+) -> Result<TrainedLearner, CliError> {
+    TrainedLearner::load(algorithm, &checkpoint.learner_file(), device).map_err(|error| match error {
+        FileError::CutOff { .. } | FileError::Damaged { .. } | FileError::Foreign { .. } => {
+            CliError::Usage(format!("{error}; {}", in_its_place(run.path(), checkpoint.summary.step)))
+        }
+        error => error.into(),
+    })
+}
+
+/// What to do about a checkpoint that is damaged.
+fn in_its_place(run: &Path, damaged: u64) -> String {
+    let all = checkpoint::list(run).unwrap_or_default();
+    let others: Vec<String> = all
+        .iter()
+        .map(|other| other.summary.step)
+        .filter(|step| *step != damaged)
+        .map(|step| step.to_string())
+        .collect();
+    if others.is_empty() {
+        return "bring it back from a copy, or train the run anew with --force".to_owned();
+    }
+    format!(
+        "bring it back from a copy, or take another with --checkpoint: there are those of the steps {}",
+        others.join(", ")
+    )
 }
 
 fn best(run: &Path, checkpoint: &Checkpoint) -> String {

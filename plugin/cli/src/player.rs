@@ -13,7 +13,7 @@ use playbot_lab::{
     eval::Player,
     game::Game,
     train::{
-        Algorithm, Experiment, TrainedLearner,
+        Algorithm, Experiment,
         checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
@@ -106,7 +106,7 @@ impl Chosen {
         draw: ActionDraw,
         device: DeviceKind,
     ) -> Result<Self, CliError> {
-        let learner = TrainedLearner::load(algorithm, &open::checkpoint(run, checkpoint)?.learner_file(), device)?;
+        let learner = open::learner(run, algorithm, &open::checkpoint(run, checkpoint)?, device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         let player = Player::Policy { policy: learner.policy(), prior, draw };
         Ok(Self { name: algorithm.name().to_owned(), player, observation_config: experiment.observation_config() })

@@ -11,7 +11,7 @@ use playbot_lab::{
     policy_export::{Provenance, export_policy, policy_file},
     report::whole,
     train::{
-        Experiment, TrainedLearner,
+        Experiment,
         checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
@@ -118,7 +118,7 @@ fn from_run<'a>(path: &Path, choice: CheckpointChoice, games: &'a Games) -> Resu
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
     let game = games.of_file(Artifact::Run, path, &experiment.game)?;
     let checkpoint = open::checkpoint(&run, choice)?;
-    let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), DeviceKind::default())?;
+    let learner = open::learner(&run, info.algorithm, &checkpoint, DeviceKind::default())?;
     let training = format!(
         "{} of {} steps on {}, seed {}",
         whole(checkpoint.summary.step as f64),

@@ -13,6 +13,7 @@ use playbot_lab::{
     train::{
         Experiment,
         run_dir::{is_unstarted, write_atomically},
+        sealed_file::read_sealed,
         study::{StudyError, StudyRun, study_runs},
     },
 };
@@ -79,12 +80,13 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
     let mut experiment = args.from.load(games, [seeds])?;
-    let runs = chosen(study_runs(&experiment)?, &args.variant)?;
-    experiment.variants.retain(|variant| runs.iter().any(|run| run.variant == variant.name));
+    keep(&mut experiment, &args.variant)?;
+    let runs = study_runs(&experiment)?;
     check_games(&runs, &args.from, games)?;
     tell_taken_back(&experiment, &args.from.set);
     let folder = runs_folder(&args);
-    check_folder(&folder, &args)?;
+    check_folder(&folder, &runs, &args)?;
+    check_results(&runs, &args)?;
     for path in [&folder, &args.out] {
         output::make_folder(path)?;
     }
@@ -154,15 +156,19 @@ fn say(bar: &ProgressBar, line: &str) {
     bar.suspend(|| tell!("{line}"));
 }
 
-/// The runs of some variants, in the order of the experiment; of all variants if none is named.
-fn chosen(mut runs: Vec<StudyRun>, variants: &[String]) -> Result<Vec<StudyRun>, CliError> {
-    let mut names: Vec<&str> = runs.iter().map(|run| run.variant.as_str()).collect();
-    names.dedup();
-    if let Some(unknown) = variants.iter().find(|name| !names.contains(&name.as_str())) {
+/// Keeps the variants that are named, in the order of the experiment; all of them if none is named. What a `--set` makes of the
+/// others is nobody's concern.
+fn keep(experiment: &mut Experiment, named: &[String]) -> Result<(), CliError> {
+    let variants = &experiment.variants;
+    let names: Vec<&str> = match variants.is_empty() {
+        true => vec![experiment.algorithm.name()],
+        false => variants.iter().map(|variant| variant.name.as_str()).collect(),
+    };
+    if let Some(unknown) = named.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(UnknownName::new("variant", unknown, &names).into());
     }
-    runs.retain(|run| variants.is_empty() || variants.contains(&run.variant));
-    Ok(runs)
+    experiment.variants.retain(|variant| named.is_empty() || named.contains(&variant.name));
+    Ok(())
 }
 
 fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
@@ -192,16 +198,38 @@ fn runs_folder(args: &Args) -> PathBuf {
     args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
 }
 
-/// Runs that are there are neither overwritten nor mixed with new ones unless somebody says so.
-fn check_folder(folder: &Path, args: &Args) -> Result<(), CliError> {
-    let is_used =
-        std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| !is_unstarted(&entry.path())));
-    if !is_used || args.resume || args.force {
+/// Runs that are there are neither overwritten nor gone on with unless somebody says so; those of other variants and seeds may
+/// lie beside them.
+fn check_folder(folder: &Path, runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
+    let begun = runs.iter().map(|run| folder.join(run.id())).find(|run| run.exists() && !is_unstarted(run));
+    let Some(begun) = begun.filter(|_| !args.resume && !args.force) else { return Ok(()) };
+    Err(CliError::Usage(format!(
+        "{} is there already: go on with --resume, replace all runs of this study with --force, or choose another folder \
+         with --runs",
+        begun.display()
+    )))
+}
+
+/// Results of other runs that stand where those of this study are to be written are not thrown away unless somebody says so.
+fn check_results(runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
+    let path = args.out.join("results.json");
+    let Some((there, _)) = read_sealed::<StudyReport>(&path).ok().filter(|_| !args.force) else {
+        return Ok(());
+    };
+    let is_new = |variant: &str, seed| runs.iter().any(|run| run.variant == variant && run.experiment.seed == seed);
+    let lost: Vec<String> = there
+        .results
+        .iter()
+        .filter(|result| !is_new(&result.variant, result.seed))
+        .map(|result| format!("{} with seed {}", result.variant, result.seed))
+        .collect();
+    if lost.is_empty() {
         return Ok(());
     }
     Err(CliError::Usage(format!(
-        "{} holds runs already: go on with --resume, replace them with --force, or choose another folder with --runs",
-        folder.display()
+        "{} holds results that this study lacks: {}; choose another folder with --out, or remove the file first",
+        path.display(),
+        lost.join(", ")
     )))
 }
 

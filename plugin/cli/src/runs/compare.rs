@@ -92,9 +92,10 @@ fn why_not(metric: &str) -> &'static str {
     if EPISODE_MEANS.contains(&metric) { ", since no episode has ended" } else { "" }
 }
 
-/// Reads the runs at all paths, each of them once.
+/// Reads the runs at all paths, each of them once. What is damaged is left out, unless it was named itself or nothing else
+/// is there.
 fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
-    let (mut seen, mut runs) = (Vec::new(), Vec::new());
+    let (mut seen, mut runs, mut damaged) = (Vec::new(), Vec::new(), None);
     for folder in paths {
         // What is not there is spoken of as a run, as whoever compares two of them does.
         let found = if folder.is_dir() { find_runs(folder)? } else { vec![folder.clone()] };
@@ -104,12 +105,23 @@ fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
                 continue;
             }
             seen.push(same);
-            let run = RunRecord::read(&path)?;
-            run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
-            runs.push(run);
+            match RunRecord::read(&path) {
+                Ok(run) => {
+                    run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
+                    runs.push(run);
+                }
+                Err(error) if path != *folder => {
+                    tell!("warning: {} is left out: {error}", path.display());
+                    damaged.get_or_insert(error);
+                }
+                Err(error) => return Err(error.into()),
+            }
         }
     }
-    Ok(runs)
+    match damaged {
+        Some(error) if runs.is_empty() => Err(error.into()),
+        _ => Ok(runs),
+    }
 }
 
 /// The success rate whose first step the experiments of all runs look for.
