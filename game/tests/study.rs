@@ -146,9 +146,6 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     assert!(only.lines().count() == 1 && only.contains("\"variant\":\"full\""), "{only}");
     assert!(written(folder)[0].contains("--variant full --seeds 1"), "{}", written(folder)[0]);
     refused(&one(&["--variant", "ful"]), "did you mean `full`?");
-    // What does not fit a variant matters only where that is run.
-    refused(&small(&["--force", "--set", "score.kl_coef_end=Some(0.0)"]), "variant `plain`");
-    refused(&one(&["--set", "score.kl_coef_end=Some(0.0)"]), "other settings");
 
     let foreign = folder.join("foreign/plain-seed1/notes.txt");
     fs::create_dir_all(foreign.parent().expect("a folder")).expect("writable");
@@ -188,6 +185,22 @@ fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     let learn = ["learn-skills", "--experiment", "tiny.ron", "--out", "old", "--force"];
     done(folder, &learn);
     assert!(kept[0].exists() && !kept[1].exists());
+}
+
+#[test]
+fn what_does_not_fit_a_variant_matters_only_where_that_is_run() {
+    let folder = prepared();
+    let folder = folder.path();
+    let ending = |more: &[&str]| {
+        let set = ["--seeds", "1", "--set", "steps=128", "--set", "score.kl_coef_end=Some(0.0)"];
+        study(folder, "runs", &[&set, more].concat())
+    };
+    refused(&ending(&[]), "variant `no-kl`");
+    ok(ending(&["--variant", "cloned"]));
+    // Runs of other variants may lie in the same folder.
+    refused(&ending(&["--variant", "cloned"]), "cloned-seed1 is there already: go on with --resume");
+    fs::remove_dir_all(folder.join("out")).expect("there");
+    ok(ending(&["--variant", "plain"]));
 }
 
 #[test]

@@ -29,13 +29,17 @@ fn write_experiment(folder: &Path) {
 fn a_game_that_is_set_brings_its_own_experiment() {
     let temporary = tempfile::tempdir().expect("a folder");
     let shown = |set: &str| done(temporary.path(), &["config", "show", "--set", set]).0;
+    let medium = "medium+fixed-start+limit=1000";
+    let (train, test) = (format!("train: \"{medium}:0..9999\""), format!("test: \"{medium}:10000..10099\""));
     for set in ["game=maze2d", "game=\"maze2d\""] {
         let shown = shown(set);
-        for part in
-            ["train: \"umaze:0..63\"", "test: \"umaze:64..127\"", "demos: \"demos/maze2d\"", "action_noise: 0.0"]
-        {
+        for part in [&*train, &*test, "demos: \"demos/maze2d/medium.demo\"", "action_noise: 0.0"] {
             assert!(shown.contains(part), "{part}: {shown}");
         }
+    }
+    let plainest = shown("game=maze2d-sighted");
+    for part in ["train: \"umaze:0..63\"", "test: \"umaze:64..127\"", "demos: \"demos/maze2d-sighted\""] {
+        assert!(plainest.contains(part), "{part}: {plainest}");
     }
     assert_eq!(shown("game=coinrun"), shown("seed=1"), "the program's first game");
 }
@@ -280,7 +284,7 @@ fn what_happens_inside_is_told_to_those_who_ask() {
         let output = command.env_remove("RUST_LOG").output().expect("the program starts");
         assert_eq!(code(&output), 0, "{}", errors(&output));
         let report = lines(&output).remove(0);
-        assert_eq!((&report["ticks"], &report["seed"], &report["mode"]), (&json!(2), &json!(6), &json!("umaze")));
+        assert_eq!((&report["ticks"], &report["seed"], &report["mode"]), (&json!(2), &json!(6), &json!("medium")));
         errors(&output)
     };
     assert!(!told(&[]).contains("DEBUG"));
