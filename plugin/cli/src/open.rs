@@ -13,7 +13,7 @@ use playbot_lab::{
     train::{
         Algorithm, Experiment, TrainedLearner,
         checkpoint::{self, Checkpoint, CheckpointChoice},
-        run_dir::RunDir,
+        run_dir::{MEND, RunDir},
     },
 };
 use playbot_learner::{DeviceKind, FileError, PolicyFile, SkillModel};
@@ -112,7 +112,7 @@ fn in_its_place(run: &Path, damaged: u64) -> String {
         .map(|step| step.to_string())
         .collect();
     if others.is_empty() {
-        return "bring it back from a copy, or train the run anew with --force".to_owned();
+        return MEND.to_owned();
     }
     format!(
         "bring it back from a copy, or take another with --checkpoint: there are those of the steps {}",

@@ -14,7 +14,7 @@ use playbot_lab::{
         Experiment,
         run_dir::{is_unstarted, write_atomically},
         sealed_file::read_sealed,
-        study::{StudyError, StudyRun, study_runs},
+        study::{StudyError, StudyRun, study_runs, study_variants},
     },
 };
 use playbot_learner::DeviceKind;
@@ -159,11 +159,8 @@ fn say(bar: &ProgressBar, line: &str) {
 /// Keeps the variants that are named, in the order of the experiment; all of them if none is named. What a `--set` makes of the
 /// others is nobody's concern.
 fn keep(experiment: &mut Experiment, named: &[String]) -> Result<(), CliError> {
-    let variants = &experiment.variants;
-    let names: Vec<&str> = match variants.is_empty() {
-        true => vec![experiment.algorithm.name()],
-        false => variants.iter().map(|variant| variant.name.as_str()).collect(),
-    };
+    let known = study_variants(experiment)?;
+    let names: Vec<&str> = known.iter().map(|variant| variant.name.as_str()).collect();
     if let Some(unknown) = named.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(UnknownName::new("variant", unknown, &names).into());
     }

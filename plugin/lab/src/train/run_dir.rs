@@ -39,7 +39,7 @@ use crate::game::Game;
 pub(super) use super::run_error::{damaged, io_error};
 pub use super::{
     replaced_run::{check_replaceable, end_replacement, is_unstarted},
-    run_error::RunError,
+    run_error::{MEND, RunError},
 };
 
 /// What a run trains.

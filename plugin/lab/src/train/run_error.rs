@@ -70,7 +70,7 @@ pub enum RunError {
 }
 
 /// What to do about a run that says no longer what it is.
-const MEND: &str = "bring it back from a copy, or train the run anew with --force";
+pub const MEND: &str = "bring it back from a copy, or train the run anew with --force";
 
 /// What is wrong with the experiment that a run has saved.
 fn of_run(error: &ConfigError) -> String {

@@ -107,7 +107,7 @@ pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> 
         return Err(StudyError::SameSeed(*twice));
     }
     let mut runs = Vec::new();
-    for variant in variants(experiment)? {
+    for variant in study_variants(experiment)? {
         check_keys(&variant)?;
         let changed = experiment
             .without_study()
@@ -131,7 +131,12 @@ fn check_keys(variant: &Variant) -> Result<(), StudyError> {
     }
 }
 
-fn variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyError> {
+/// The variants of a study; one under the name of the algorithm for an experiment that has none.
+///
+/// # Errors
+///
+/// [`StudyError::BadName`] and [`StudyError::SameName`].
+pub fn study_variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyError> {
     if experiment.variants.is_empty() {
         return Ok(vec![Variant { name: experiment.algorithm.name().to_owned(), set: Vec::new() }]);
     }
