@@ -58,3 +58,25 @@ fn a_policy_with_a_name_is_compared_whatever_its_file_is_called() {
     let (_, words) = ended(folder, &[&plan[..], &["--out", "none", "--policy", "ppo=none.policy"]].concat(), 3);
     assert!(words.contains("`playbot policy export --run RUN --out none.policy`"), "{words}");
 }
+
+#[test]
+fn what_played_is_played_once_more_by_the_command_of_the_summary() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    write_policy(folder, "a.policy");
+    fs::create_dir(folder.join("new")).expect("writable");
+    fs::rename(folder.join("a.policy"), folder.join("new/a.policy")).expect("writable");
+    for (out, tester) in [("of-run", ["--run", "run"]), ("of-policy", ["--policy", "new/a.policy"])] {
+        let test = ["test", "coinrun", "--levels", "hard:4..5", "--episodes", "2", "--out", out];
+        ended(folder, &[&test[..], &tester].concat(), 1);
+        let summary = fs::read_to_string(folder.join(out).join("summary.md")).expect("a summary");
+        let again = summary.lines().find_map(|line| line.strip_prefix("playbot test ")).expect("a level that was lost");
+        let words: Vec<&str> = again.split_whitespace().collect();
+        ended(folder, &[&["test"], &words[..], &["--force"]].concat(), 1);
+        let played = |out: &str| -> Value {
+            let text = fs::read_to_string(folder.join(out).join("results.json")).expect("results");
+            serde_json::from_str::<Value>(&text).expect("JSON")["testers"].clone()
+        };
+        assert_eq!(played("again"), played(out), "{again}");
+    }
+}

@@ -10,7 +10,7 @@ use playbot_lab::{
         checksum::file_checksum,
         run_dir::{OpenedRun, RunDir},
     },
-    verdict::{Tester, TesterRecord},
+    verdict::{TestedRun, Tester, TesterRecord},
 };
 use playbot_learner::DeviceKind;
 
@@ -61,10 +61,10 @@ impl TesterArgs {
             let chosen = Chosen::policy_file(game, path, draw, device)?;
             chosen.check_fit(game)?;
             let mut tester = self.of_policy(chosen, path, file_checksum(path)?);
-            if let Some(Named { name, path }) = named {
-                tester.record.file = Some(path.display().to_string());
-                tester.record.name = name;
+            if let Some(Named { name, .. }) = &named {
+                tester.record.name.clone_from(name);
             }
+            tester.record.file = (path != Path::new(&tester.record.name)).then(|| path.display().to_string());
             testers.push(tester);
         }
         for path in &self.run {
@@ -77,10 +77,13 @@ impl TesterArgs {
                     game.name()
                 )));
             }
-            let checksum = file_checksum(&run.checkpoint(self.checkpoint)?.learner_file())?;
+            let checkpoint = run.checkpoint(self.checkpoint)?;
+            let checksum = file_checksum(&checkpoint.learner_file())?;
             let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, device)?;
             chosen.check_fit(game)?;
-            testers.push(self.of_policy(chosen, path, checksum));
+            let mut tester = self.of_policy(chosen, path, checksum);
+            tester.record.run = Some(TestedRun { folder: path.display().to_string(), step: checkpoint.summary.step });
+            testers.push(tester);
         }
         if testers.is_empty() {
             testers.push(of_bot(Chosen::usual(game)?));
@@ -91,7 +94,7 @@ impl TesterArgs {
 
     fn of_policy(&self, chosen: Chosen, path: &Path, checksum: String) -> Tester {
         let name = path.file_name().map_or(chosen.name, |name| name.to_string_lossy().into_owned());
-        let record = TesterRecord { name, checksum: Some(checksum), greedy: self.greedy, file: None };
+        let record = TesterRecord { checksum: Some(checksum), greedy: self.greedy, ..TesterRecord::bot(name) };
         Tester { record, player: chosen.player, observation_config: chosen.observation_config }
     }
 }

@@ -80,7 +80,7 @@ fn policy(game: &dyn Game, path: &Path, draw: ActionDraw) -> Result<Tester, Leve
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let (checksum, greedy) = (Some(file_checksum(path)?), matches!(draw, ActionDraw::Greedy));
     Ok(Tester {
-        record: TesterRecord { name, checksum, greedy, file: None },
+        record: TesterRecord { checksum, greedy, ..TesterRecord::bot(name) },
         player: Player::of_file(&file, draw),
         observation_config,
     })

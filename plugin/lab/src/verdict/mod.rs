@@ -76,4 +76,4 @@ pub use rerun::rerun_commands;
 pub use results::{RESULTS, ResultLines, results_folder};
 pub use run::{TestEnd, TestWatch, run_tests, run_tests_keeping};
 pub use shard::{Shard, ShardError};
-pub use tester::{Tester, TesterRecord};
+pub use tester::{TestedRun, Tester, TesterRecord};

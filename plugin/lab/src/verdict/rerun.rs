@@ -50,16 +50,24 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
 
 /// Testers as `playbot test` takes them. What a policy draws there depends on its name, so that comes along.
 fn testers(testers: &[TesterRecord]) -> String {
-    let policies = testers.iter().filter(|tester| tester.checksum.is_some());
+    let bots: Vec<&str> =
+        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
+    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
+    let policies = testers.iter().filter(|tester| tester.checksum.is_some() && tester.run.is_none());
     let policies = policies.map(|TesterRecord { name, file, .. }| {
         let given = file.as_ref().map_or_else(|| name.clone(), |file| format!("{name}={file}"));
         format!("--policy {}", shell_word(&given))
     });
-    let bots: Vec<&str> =
-        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
-    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
     let greedy = testers.iter().any(|tester| tester.greedy).then(|| "--greedy".to_owned());
-    bots.into_iter().chain(policies).chain(greedy).collect::<Vec<_>>().join(" ")
+    bots.into_iter().chain(policies).chain(runs(testers)).chain(greedy).collect::<Vec<_>>().join(" ")
+}
+
+/// The runs among testers. One checkpoint is named for all of them, so that none is where they differ.
+fn runs(testers: &[TesterRecord]) -> Vec<String> {
+    let runs: Vec<_> = testers.iter().filter_map(|tester| tester.run.as_ref()).collect();
+    let folders = runs.iter().map(|run| format!("--run {}", shell_word(&run.folder)));
+    let step = runs.first().map(|run| run.step).filter(|step| runs.iter().all(|run| run.step == *step));
+    folders.chain(step.map(|step| format!("--checkpoint {step}"))).collect()
 }
 
 /// A tester as `playbot view` takes it, which knows files of policies alone.
@@ -73,9 +81,23 @@ fn seen(tester: &TesterRecord) -> String {
 mod tests {
     use super::*;
     use crate::verdict::{
-        Finding, MapScope, TesterRecord,
+        Finding, MapScope, TestedRun, TesterRecord,
         testing::{tester, verdict},
     };
+
+    #[test]
+    fn runs_are_named_by_their_folders_with_the_checkpoint_that_they_share() {
+        let run = |folder: &str, step| TesterRecord {
+            checksum: Some("0f".to_owned()),
+            run: Some(TestedRun { folder: folder.to_owned(), step }),
+            ..TesterRecord::bot(folder.rsplit('/').next().expect("a name"))
+        };
+        let [first, second] = [run("my runs/a", 4096), run("runs/b", 8192)];
+        assert_eq!(testers(std::slice::from_ref(&first)), "--run 'my runs/a' --checkpoint 4096");
+        assert_eq!(seen(&first), "--run 'my runs/a' --checkpoint 4096");
+        let all = [TesterRecord::bot("random"), TesterRecord { greedy: true, ..first }, second];
+        assert_eq!(testers(&all), "--bot random --run 'my runs/a' --run runs/b --greedy", "no checkpoint is theirs");
+    }
 
     #[test]
     fn the_tester_that_failed_plays_again() {

@@ -27,9 +27,21 @@ pub struct TesterRecord {
     /// Whether a policy takes its most probable action instead of drawing one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub greedy: bool,
-    /// The policy's file, where the tester has another name.
+    /// The policy's file, where it is not the tester's name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
+    /// The run that the policy is of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<TestedRun>,
+}
+
+/// The checkpoint of a run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TestedRun {
+    /// The run's folder.
+    pub folder: String,
+    /// The checkpoint's number of environment steps.
+    pub step: u64,
 }
 
 /// Where a policy's file lies does not make it another one.
@@ -44,7 +56,7 @@ impl Eq for TesterRecord {}
 impl TesterRecord {
     /// A bot of the game.
     pub fn bot(name: impl Into<String>) -> Self {
-        Self { name: name.into(), checksum: None, greedy: false, file: None }
+        Self { name: name.into(), checksum: None, greedy: false, file: None, run: None }
     }
 
     /// As people read it.
