@@ -148,7 +148,7 @@ fn does_not_fit(path: &Path, misfit: &PolicyMisfit) -> CliError {
 
 /// What to do about something that is of one game where another one was named.
 fn way_out(what: &str, found: &str, named: &str) -> String {
-    format!("name a {what} of `{named}`, or call the program that has `{found}` and name that game")
+    format!("name a {what} of `{named}`, or name the game `{found}`, in a program that has it")
 }
 
 impl PlayerArgs {

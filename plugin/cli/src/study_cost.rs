@@ -15,7 +15,7 @@ use playbot_lab::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::error::CliError;
+use super::{error::CliError, number::counted};
 
 /// The file in the folder of a run.
 const COST: &str = "cost.json";
@@ -93,9 +93,10 @@ pub fn cost_table(runs: &[StudyRun], folder: &Path, command: &str, threads: usiz
     let cpu = if total.2 { hours(Some(total.0)) } else { format!("at least {}", hours(Some(total.0))) };
     format!(
         "# What the study has cost\n\n```sh\n{command} --threads {threads}\n```\n\n{}\n{cpu} CPU hours in all, {} by the clock, with \
-         {threads} threads. A skill model is learned within the first run that needs it.\n",
+         {}. A skill model is learned within the first run that needs it.\n",
         markdown_table(&["variant", "runs", "environment steps", "CPU hours", "hours"], rows.into_iter()),
         hours(Some(total.1)),
+        counted(threads as u64, "thread"),
     )
 }
 
