@@ -7,17 +7,19 @@ use crate::{
     antmaze::AntMaze,
     coinrun::CoinRun,
     maze2d::Maze2d,
-    senses::{Mapped, Sighted, WithSenses},
+    senses::{Mapped, Placed, Sighted, WithSenses},
 };
 
 /// All games, CoinRun first.
-pub const GAMES: [&dyn Game; 8] = [
+pub const GAMES: [&dyn Game; 10] = [
     &CoinRun { physics: false },
     &Maze2d { physics: false },
     &WithSenses(Maze2d { physics: false }, Sighted),
     &WithSenses(Maze2d { physics: false }, Mapped),
+    &WithSenses(Maze2d { physics: false }, Placed),
     &Ant,
     &AntMaze,
     &WithSenses(AntMaze, Sighted),
     &WithSenses(AntMaze, Mapped),
+    &WithSenses(AntMaze, Placed),
 ];

@@ -136,6 +136,7 @@ pub mod tick;
 pub mod unknown_name;
 pub mod virtual_input;
 pub mod vision;
+mod waves;
 
 pub use plugin::PlaybotPlugin;
 pub use plugins::PlaybotPlugins;

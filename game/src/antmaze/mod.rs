@@ -3,7 +3,7 @@
 //! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`]) and a
 //! seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at the time
 //! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal,
-//! [`AntMazeWithMap`] for those that know the map.
+//! [`AntMazeWithMap`] for those that know the map, and [`AntMazeWithWaves`] for those that tell places better apart.
 
 mod against_rules;
 mod arena;
@@ -30,6 +30,6 @@ pub use game::AntMaze;
 pub use level::{AntMazeLevel, generate};
 pub use mode::{AntMazeMode, GoalNoise, Goals, Pay};
 pub use plugin::{AntMazePlugin, AntMazeSystems};
-pub use senses::{AntMazeWithMap, AntMazeWithRays};
+pub use senses::{AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves};
 pub use walls::wall_boxes;
 pub use waypoints::Waypoints;

@@ -1,4 +1,4 @@
-//! AntMaze for ants that are told where the goal and the walls are, and which cells around are walls.
+//! AntMaze for ants that are told where the goal and the walls are, which cells around are walls, or better where they are.
 
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
@@ -8,12 +8,12 @@ use playbot_lab::prelude::*;
 use super::{
     components::{InMaze, MazeAnt},
     game::AntMaze,
-    geometry::cell_at,
+    geometry::{CELL, cell_at},
     play,
 };
 use crate::{
     ant::walls::Walls,
-    senses::{Mapped, Senses, Sighted, WithSenses, mapped::push_map, sighted::push_rays},
+    senses::{Mapped, Placed, Senses, Sighted, WithSenses, mapped::push_map, placed::push_waves, sighted::push_rays},
 };
 
 /// How far a ray reaches, in metres: two cells.
@@ -26,6 +26,9 @@ pub type AntMazeWithRays = WithSenses<AntMaze, Sighted>;
 
 /// AntMaze with rays and a map, under its name `antmaze-mapped`.
 pub type AntMazeWithMap = WithSenses<AntMaze, Mapped>;
+
+/// AntMaze with waves of the ant's place, under its name `antmaze-placed`.
+pub type AntMazeWithWaves = WithSenses<AntMaze, Placed>;
 
 impl Senses<AntMaze> for Sighted {
     const NAME: &'static str = "antmaze-sighted";
@@ -41,6 +44,14 @@ impl Senses<AntMaze> for Mapped {
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();
         app.add_systems(ObserveSchedule, systems.after(play::observe).before(VisionSystems::Sync));
+    }
+}
+
+impl Senses<AntMaze> for Placed {
+    const NAME: &'static str = "antmaze-placed";
+
+    fn build(self, app: &mut App) {
+        app.add_systems(ObserveSchedule, sense_place.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -64,6 +75,15 @@ fn sense_map(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), Wi
             push_map(&mut observation, |[east, north]| {
                 here.and_then(|cell| cell.moved(north, east)).is_none_or(|cell| !maze.is_free(cell))
             });
+        }
+    }
+}
+
+fn sense_place(mut ants: Query<(&Episode, &MazeAnt, &mut Observation), With<VectorSensor>>) {
+    for (episode, ant, mut observation) in &mut ants {
+        if episode.is_running() {
+            let place = ant.0.torso().0.truncate().as_dvec2() / f64::from(CELL);
+            push_waves(&mut observation, place.to_array());
         }
     }
 }
@@ -121,6 +141,30 @@ mod tests {
         assert_eq!(rows[..7], wanted[..]);
         assert!(rows[7..].iter().all(|row| row == "###########"));
     }
+
+    #[test]
+    fn waves_are_of_the_place_that_is_told_in_metres() {
+        let game = AntMazeWithWaves::default();
+        for level in 0..4 {
+            let (mut world, agents) = build_world(&game, "xl+random-start", 0, 0, 1);
+            world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(level)));
+            for _ in 0..5 {
+                world.tick().expect("sound");
+            }
+            let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector;
+            // The shortest waves of x and y are as long as a cell, the longest of x as eight.
+            let turn = |metres: f32, length: f32| (metres / length * std::f32::consts::TAU).sin_cos();
+            let told = [(seen[35], seen[36]), (seen[43], seen[44]), (seen[29], seen[30])];
+            let wanted = [turn(seen[0], 4.0), turn(seen[1], 4.0), turn(seen[0], 32.0)];
+            for ((sine, cosine), (by, beside)) in told.into_iter().zip(wanted) {
+                assert!(
+                    (sine - by).abs() < 1e-4 && (cosine - beside).abs() < 1e-4,
+                    "level {level}: {told:?}, {wanted:?}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn the_map_goes_with_the_ant() {
         let game = AntMazeWithMap::default();

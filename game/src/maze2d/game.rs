@@ -41,7 +41,7 @@ use crate::{
         read_mode,
         show_level::{self, MazeSource, ShownMaze, unfit},
     },
-    senses::{Mapped, Sighted, WithSenses},
+    senses::{Mapped, Placed, Sighted, WithSenses},
 };
 
 /// Maze2D under its name `maze2d`.
@@ -196,6 +196,7 @@ impl Game for Maze2d {
             Benchmark::simulate("random", "random"),
             Benchmark::simulate("sighted", "random"),
             Benchmark::simulate("mapped", "random"),
+            Benchmark::simulate("placed", "medium"),
             Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster),
             Benchmark::train("vector", "medium"),
         ]
@@ -206,6 +207,7 @@ impl Game for Maze2d {
             "physics" => Some(&Maze2d { physics: true }),
             "sighted" => Some(&WithSenses(Maze2d { physics: false }, Sighted)),
             "mapped" => Some(&WithSenses(Maze2d { physics: false }, Mapped)),
+            "placed" => Some(&WithSenses(Maze2d { physics: false }, Placed)),
             _ => None,
         }
     }

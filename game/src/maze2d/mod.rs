@@ -4,7 +4,7 @@
 //! (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] says which map and which of the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is what it
 //! makes of a seed. [`Maze2dWithRays`] is the same game for agents that see walls and goal, [`Maze2dWithMap`] for those
-//! that know the map.
+//! that know the map, and [`Maze2dWithWaves`] for those that tell places better apart.
 
 mod against_rules;
 pub mod arena;
@@ -39,4 +39,4 @@ pub use game::Maze2d;
 pub use level::Maze2dLevel;
 pub use mode::{Contact, Maze2dMode};
 pub use plugin::{Maze2dPlugin, Maze2dSystems};
-pub use senses::{Maze2dWithMap, Maze2dWithRays};
+pub use senses::{Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves};

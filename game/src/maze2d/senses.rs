@@ -1,4 +1,4 @@
-//! Maze2D for balls that are told where the goal and the walls are, and which cells around are walls.
+//! Maze2D for balls that are told where the goal and the walls are, which cells around are walls, or better where they are.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
@@ -10,7 +10,9 @@ use super::{
     game::Maze2d,
     play,
 };
-use crate::senses::{Mapped, Senses, Sighted, WithSenses, mapped::push_map, sighted::push_rays};
+use crate::senses::{
+    Mapped, Placed, Senses, Sighted, WithSenses, mapped::push_map, placed::push_waves, sighted::push_rays,
+};
 
 /// How far a ray reaches from the centre of a ball, in metres: four cells.
 pub const RAY_LENGTH: f64 = 4.0;
@@ -21,6 +23,9 @@ pub type Maze2dWithRays = WithSenses<Maze2d, Sighted>;
 
 /// Maze2D with rays and a map, under its name `maze2d-mapped`.
 pub type Maze2dWithMap = WithSenses<Maze2d, Mapped>;
+
+/// Maze2D with waves of the ball's place, under its name `maze2d-placed`.
+pub type Maze2dWithWaves = WithSenses<Maze2d, Placed>;
 
 impl Senses<Maze2d> for Sighted {
     const NAME: &'static str = "maze2d-sighted";
@@ -36,6 +41,14 @@ impl Senses<Maze2d> for Mapped {
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();
         app.add_systems(ObserveSchedule, systems.after(play::observe).before(VisionSystems::Sync));
+    }
+}
+
+impl Senses<Maze2d> for Placed {
+    const NAME: &'static str = "maze2d-placed";
+
+    fn build(self, app: &mut App) {
+        app.add_systems(ObserveSchedule, sense_place.after(play::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -66,6 +79,15 @@ fn sense_map(
             let walls = &arena.level.walls;
             let (row, column) = walls.cell_at(ball.0.position);
             push_map(&mut observation, |[east, north]| walls.is_solid(row - north, column + east));
+        }
+    }
+}
+
+/// Cells are 1 m wide.
+fn sense_place(mut balls: Query<(&Episode, &MazeBall, &mut Observation), With<VectorSensor>>) {
+    for (episode, ball, mut observation) in &mut balls {
+        if episode.is_running() {
+            push_waves(&mut observation, ball.0.position);
         }
     }
 }
@@ -157,5 +179,15 @@ mod tests {
         assert_eq!(rows("medium", [2.1, 2.05]), wanted);
         assert_eq!(rows("medium", [2.35, 2.05])[..10], wanted[1..]);
         assert_eq!(rows("medium+no-offset", [2.35, 2.05]), wanted);
+    }
+
+    #[test]
+    fn waves_are_of_the_place_in_cells() {
+        // A whole wave of a cell along x and a quarter of one along y.
+        let seen = seen(&Maze2dWithWaves::default(), "medium+no-offset", [2.0, 2.25]);
+        assert_near(&seen[..4], &[2.0, 2.25, 0.0, 0.0]);
+        assert_near(&[seen[10], seen[11], seen[18], seen[19]], &[0.0, 1.0, 1.0, 0.0]);
+        // A quarter of eight cells along x.
+        assert_near(&seen[4..6], &[1.0, 0.0]);
     }
 }

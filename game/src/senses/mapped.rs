@@ -34,11 +34,6 @@ pub fn push_map(observation: &mut Observation, is_wall: impl Fn([i32; 2]) -> boo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        antmaze::{AntMazeWithMap, AntMazeWithRays},
-        maze2d::{Maze2dWithMap, Maze2dWithRays},
-    };
-    use playbot_lab::game::Game;
 
     #[test]
     fn a_map_is_read_from_the_north_west_on() {
@@ -47,24 +42,5 @@ mod tests {
         let walls: Vec<usize> = (0..121).filter(|&at| observation.vector[at] > 0.5).collect();
         assert_eq!((observation.vector.len(), walls.as_slice()), (121, &[0, 61][..]));
         assert_eq!((&*Mapped.names()[10], &*Mapped.names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
-    }
-
-    #[test]
-    fn names_are_told_apart_and_go_on_from_those_of_the_game_that_tells_less() {
-        let games: [(&dyn Game, usize, usize); 4] = [
-            (&AntMazeWithRays::default(), 29, 10),
-            (&Maze2dWithRays::default(), 4, 10),
-            (&AntMazeWithMap::default(), 29, 131),
-            (&Maze2dWithMap::default(), 4, 131),
-        ];
-        for (game, own, more) in games {
-            let names = game.observation().names;
-            let found = (names.len(), names[own].as_str(), names[own + 2].as_str());
-            assert_eq!(found, (own + more, "goal x", "wall east"), "{}", game.name());
-            let mut different = names.clone();
-            different.sort();
-            different.dedup();
-            assert_eq!(names.len(), different.len(), "{}", game.name());
-        }
     }
 }

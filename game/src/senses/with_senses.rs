@@ -101,3 +101,33 @@ impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
         Vec::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{
+        antmaze::{AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
+        maze2d::{Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
+    };
+    use playbot_lab::game::Game;
+
+    #[test]
+    fn names_are_told_apart_and_go_on_from_those_of_the_game_that_tells_less() {
+        let games: [(&dyn Game, [&str; 3], usize); 6] = [
+            (&AntMazeWithRays::default(), ["ankle 4 velocity", "goal x", "wall east"], 39),
+            (&Maze2dWithRays::default(), ["vy", "goal x", "wall east"], 14),
+            (&AntMazeWithMap::default(), ["ankle 4 velocity", "goal x", "wall east"], 160),
+            (&Maze2dWithMap::default(), ["vy", "goal x", "wall east"], 135),
+            (&AntMazeWithWaves::default(), ["ankle 4 velocity", "x sine of 8", "x sine of 4"], 45),
+            (&Maze2dWithWaves::default(), ["vy", "x sine of 8", "x sine of 4"], 20),
+        ];
+        for (game, [last, first, third], all) in games {
+            let names = game.observation().names;
+            let at = names.iter().position(|name| name == first).expect("a sense");
+            assert_eq!([&*names[at - 1], &*names[at + 2]], [last, third], "{}", game.name());
+            let mut different = names.clone();
+            different.sort();
+            different.dedup();
+            assert_eq!((names.len(), different.len()), (all, all), "{}", game.name());
+        }
+    }
+}

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use playbot_games::{
-    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays},
+    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
     coinrun::CoinRun,
-    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays},
+    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
 };
 use playbot_lab::{
     inspect::{LevelRequest, LevelView},
@@ -60,8 +60,8 @@ fn assert_reads_back(game: &dyn Game, mode: &str, request: &LevelRequest, folder
     );
 }
 
-/// As [`assert_reads_back`] for a game of mazes, and for agents that see rays, each with so many ticks.
-fn assert_mazes_read_back(games: [(&dyn Game, usize); 3], mode: &str, level: u64, seed: u64) {
+/// As [`assert_reads_back`] for a game of mazes and for agents that are told more, each with so many ticks.
+fn assert_mazes_read_back(games: [(&dyn Game, usize); 4], mode: &str, level: u64, seed: u64) {
     let folder = tempfile::tempdir().expect("a folder");
     let request = LevelRequest { map: Some(mode), seed: Some(level), ..LevelRequest::default() };
     for (game, ticks) in games {
@@ -93,7 +93,7 @@ proptest! {
         ]),
         seed in 0u64..1000,
     ) {
-        assert_mazes_read_back([(&MAZE2D, 80), (&Maze2dWithRays::default(), 20), (&Maze2dWithMap::default(), 20)], mode, level, seed);
+        assert_mazes_read_back([(&MAZE2D, 80), (&Maze2dWithRays::default(), 20), (&Maze2dWithMap::default(), 20), (&Maze2dWithWaves::default(), 20)], mode, level, seed);
     }
 
     #[test]
@@ -107,7 +107,7 @@ proptest! {
         ]),
         seed in 0u64..1000,
     ) {
-        assert_mazes_read_back([(&AntMaze, 20), (&AntMazeWithRays::default(), 5), (&AntMazeWithMap::default(), 5)], mode, level, seed);
+        assert_mazes_read_back([(&AntMaze, 20), (&AntMazeWithRays::default(), 5), (&AntMazeWithMap::default(), 5), (&AntMazeWithWaves::default(), 5)], mode, level, seed);
     }
 }
 

@@ -20,14 +20,10 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
     assert_eq!(level(&["antmaze", "--map", "xl"])["shortest_path_length"], 29);
     let (ball, ant) = (level(&["maze2d", "--map", "umaze"]), level(&["antmaze", "--map", "umaze"]));
     assert_eq!((&ball["goal"], &ant["goal"]), (&json!([1, 1]), &json!([3, 1])));
-    assert_eq!(
-        (level(&["maze2d-sighted", "--map", "umaze"]), level(&["antmaze-sighted", "--map", "umaze"])),
-        (ball.clone(), ant.clone())
-    );
-    assert_eq!(
-        (level(&["maze2d-mapped", "--map", "umaze"]), level(&["antmaze-mapped", "--map", "umaze"])),
-        (ball, ant)
-    );
+    for senses in ["sighted", "mapped", "placed"] {
+        assert_eq!(level(&[&format!("maze2d-{senses}"), "--map", "umaze"]), ball);
+        assert_eq!(level(&[&format!("antmaze-{senses}"), "--map", "umaze"]), ant);
+    }
 }
 
 #[test]
@@ -75,7 +71,7 @@ fn a_whole_mode_names_the_level_that_is_played() {
     let mode: antmaze::AntMazeMode = text.parse().expect("a mode");
     let played = antmaze::generate(&mode, 3).expect("a level");
     assert_ne!(played.goal, played.maze.goal(), "the mode draws another goal than the map's");
-    for game in ["antmaze", "antmaze-sighted", "antmaze-mapped"] {
+    for game in ["antmaze", "antmaze-sighted", "antmaze-mapped", "antmaze-placed"] {
         let shown = level(&[game, "--map", text, "--seed", "3"]);
         assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start), &json!(played.goal)));
     }
