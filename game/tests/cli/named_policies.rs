@@ -15,13 +15,23 @@ fn write_policy(folder: &Path, name: &str) {
     done(folder, &["policy", "export", "--run", "run", "--out", name]);
 }
 
-/// Names and files of the testers, as results have them.
-fn testers(folder: &Path, out: &str) -> Vec<(String, Option<String>)> {
+/// The testers, as results have them.
+fn tested(folder: &Path, out: &str) -> Value {
     let text = fs::read_to_string(folder.join(out).join("results.json")).expect("results");
     let results: Value = serde_json::from_str(&text).expect("JSON");
+    results["testers"].clone()
+}
+
+/// Their names and files.
+fn testers(folder: &Path, out: &str) -> Vec<(String, Option<String>)> {
     let text = |value: &Value| value.as_str().map(str::to_owned);
-    let testers = results["testers"].as_array().expect("testers").iter();
-    testers.map(|tester| (text(&tester["name"]).expect("a name"), text(&tester["file"]))).collect()
+    let testers = tested(folder, out);
+    testers
+        .as_array()
+        .expect("testers")
+        .iter()
+        .map(|tester| (text(&tester["name"]).expect("a name"), text(&tester["file"])))
+        .collect()
 }
 
 #[test]
@@ -73,10 +83,6 @@ fn what_played_is_played_once_more_by_the_command_of_the_summary() {
         let again = summary.lines().find_map(|line| line.strip_prefix("playbot test ")).expect("a level that was lost");
         let words: Vec<&str> = again.split_whitespace().collect();
         ended(folder, &[&["test"], &words[..], &["--force"]].concat(), 1);
-        let played = |out: &str| -> Value {
-            let text = fs::read_to_string(folder.join(out).join("results.json")).expect("results");
-            serde_json::from_str::<Value>(&text).expect("JSON")["testers"].clone()
-        };
-        assert_eq!(played("again"), played(out), "{again}");
+        assert_eq!(tested(folder, "again"), tested(folder, out), "{again}");
     }
 }

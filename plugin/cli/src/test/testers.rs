@@ -1,6 +1,6 @@
 //! Who tests, as the command line names them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::{
@@ -14,7 +14,7 @@ use playbot_lab::{
 };
 use playbot_learner::DeviceKind;
 
-use crate::{error::CliError, named::Named, player::Chosen};
+use crate::{error::CliError, named::Named, open, player::Chosen};
 
 /// Bots, policies and runs.
 #[derive(clap::Args, Clone, Debug)]
@@ -60,12 +60,9 @@ impl TesterArgs {
             let path = named.as_ref().map_or(given.as_path(), |named| named.path.as_path());
             let chosen = Chosen::policy_file(game, path, draw, device)?;
             chosen.check_fit(game)?;
-            let mut tester = self.of_policy(chosen, path, file_checksum(path)?);
-            if let Some(Named { name, .. }) = &named {
-                tester.record.name.clone_from(name);
-            }
-            tester.record.file = (path != Path::new(&tester.record.name)).then(|| path.display().to_string());
-            testers.push(tester);
+            let name = named.as_ref().map(|named| named.name.clone());
+            let record = TesterRecord::policy(name, path, file_checksum(path)?);
+            testers.push(self.of_policy(chosen, record));
         }
         for path in &self.run {
             let OpenedRun { run, experiment, info } = RunDir::open(path)?;
@@ -77,13 +74,15 @@ impl TesterArgs {
                     game.name()
                 )));
             }
-            let checkpoint = run.checkpoint(self.checkpoint)?;
-            let checksum = file_checksum(&checkpoint.learner_file())?;
-            let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, device)?;
+            let checkpoint = open::checkpoint(&run, self.checkpoint)?;
+            let checksum = Some(file_checksum(&checkpoint.learner_file())?);
+            // The last one may be another by now, while the run is trained.
+            let step = checkpoint.summary.step;
+            let chosen = Chosen::run(&run, &experiment, info.algorithm, CheckpointChoice::Step(step), draw, device)?;
             chosen.check_fit(game)?;
-            let mut tester = self.of_policy(chosen, path, checksum);
-            tester.record.run = Some(TestedRun { folder: path.display().to_string(), step: checkpoint.summary.step });
-            testers.push(tester);
+            let name = path.file_name().map_or(chosen.name.clone(), |name| name.to_string_lossy().into_owned());
+            let tested = Some(TestedRun { folder: path.display().to_string(), step });
+            testers.push(self.of_policy(chosen, TesterRecord { checksum, run: tested, ..TesterRecord::bot(name) }));
         }
         if testers.is_empty() {
             testers.push(of_bot(Chosen::usual(game)?));
@@ -92,9 +91,8 @@ impl TesterArgs {
         Ok(testers)
     }
 
-    fn of_policy(&self, chosen: Chosen, path: &Path, checksum: String) -> Tester {
-        let name = path.file_name().map_or(chosen.name, |name| name.to_string_lossy().into_owned());
-        let record = TesterRecord { checksum: Some(checksum), greedy: self.greedy, ..TesterRecord::bot(name) };
+    fn of_policy(&self, chosen: Chosen, record: TesterRecord) -> Tester {
+        let record = TesterRecord { greedy: self.greedy, ..record };
         Tester { record, player: chosen.player, observation_config: chosen.observation_config }
     }
 }

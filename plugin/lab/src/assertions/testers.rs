@@ -77,10 +77,9 @@ fn policy(game: &dyn Game, path: &Path, draw: ActionDraw) -> Result<Tester, Leve
         .map_err(|misfit| LevelTestError::Misfit { path: path.into(), misfit: Box::new(misfit) })?;
     let observation_config = policy_observation(&file)?;
     observation_config.check(game)?;
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    let (checksum, greedy) = (Some(file_checksum(path)?), matches!(draw, ActionDraw::Greedy));
+    let greedy = matches!(draw, ActionDraw::Greedy);
     Ok(Tester {
-        record: TesterRecord { checksum, greedy, ..TesterRecord::bot(name) },
+        record: TesterRecord { greedy, ..TesterRecord::policy(None, path, file_checksum(path)?) },
         player: Player::of_file(&file, draw),
         observation_config,
     })

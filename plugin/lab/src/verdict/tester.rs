@@ -1,5 +1,7 @@
 //! Who tests.
 
+use std::path::Path;
+
 use bevy_playbot::vision::ObservationConfig;
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +61,14 @@ impl TesterRecord {
         Self { name: name.into(), checksum: None, greedy: false, file: None, run: None }
     }
 
+    /// A policy's file, under a name of its own or else the file's.
+    pub fn policy(name: Option<String>, path: &Path, checksum: String) -> Self {
+        let of_file = || path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let name = name.unwrap_or_else(of_file);
+        let file = (path != Path::new(&name)).then(|| path.display().to_string());
+        Self { checksum: Some(checksum), file, ..Self::bot(name) }
+    }
+
     /// As people read it.
     pub fn describe(&self) -> String {
         let checksum = self.checksum.as_ref().map_or_else(String::new, |sum| format!(" (file {sum})"));
@@ -69,6 +79,18 @@ impl TesterRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_is_told_where_it_is_not_the_name() {
+        let told = |name: Option<&str>, path: &str| {
+            let record = TesterRecord::policy(name.map(str::to_owned), Path::new(path), "0f".to_owned());
+            (record.name, record.file)
+        };
+        let wanted = |name: &str, file: Option<&str>| (name.to_owned(), file.map(str::to_owned));
+        assert_eq!(told(None, "a.policy"), wanted("a.policy", None));
+        assert_eq!(told(None, "new/a.policy"), wanted("a.policy", Some("new/a.policy")));
+        assert_eq!(told(Some("ppo"), "a.policy"), wanted("ppo", Some("a.policy")));
+    }
 
     #[test]
     fn a_policy_is_known_by_name_and_checksum_and_not_by_its_place() {
