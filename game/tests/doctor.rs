@@ -38,6 +38,7 @@ fn wrong_names_and_numbers_are_usage_errors() {
         (&["coinrunn"][..], "did you mean `coinrun`?"),
         (&["coinrun", "--mode", "hrad"], "did you mean `hard`?"),
         (&["coinrun", "--ticks", "0"], "it must be at least 1"),
+        (&["coinrun", "--seed", "4294967296"], "does not exist: choose one up to 4294967295"),
     ] {
         let (_, errors) = doctor(args, 3);
         assert!(errors.contains(words), "{errors}");

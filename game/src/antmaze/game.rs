@@ -187,7 +187,10 @@ impl Game for AntMaze {
     }
 
     fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        show_level::show(self, request, &MazeSource { map: Map::antmaze, level: shown_level, drawn: shown_drawn })
+        let axes =
+            "x goes along the columns and y down the rows; plots and windows have y up, so that row 0 is at the bottom";
+        let source = MazeSource { map: Map::antmaze, level: shown_level, drawn: shown_drawn, axes };
+        show_level::show(self, request, &source)
     }
 
     fn has_space_view(&self) -> bool {

@@ -75,6 +75,10 @@ impl Game for CoinRun {
         &["easy", "hard"]
     }
 
+    fn last_level(&self) -> Option<u64> {
+        Some(u32::MAX.into())
+    }
+
     fn tick_hz(&self) -> f64 {
         15.0
     }

@@ -28,6 +28,8 @@ pub struct MazeSource {
     pub level: fn(&dyn Game, &str, u64) -> Result<ShownMaze, InspectError>,
     /// The first of these drawn levels, as it is played.
     pub drawn: fn(&LevelDesigns) -> Result<ShownMaze, InspectError>,
+    /// Where x and y go in the rows, and how plots lie beside them.
+    pub axes: &'static str,
 }
 
 /// A maze, and what programs are told of it.
@@ -67,7 +69,7 @@ pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Res
         None => "there is no way from the start to the goal".to_owned(),
     };
     // The empty line ends the rows for whoever reads this as a file.
-    let legend = format!("S start  G goal  # wall  {way}");
+    let legend = format!("S start  G goal  # wall  {way}\n{}", source.axes);
     Ok(LevelView {
         text: format!("{}\n\n{legend}", picture(&maze).join("\n")),
         json: json.to_string(),
@@ -81,14 +83,8 @@ fn shown(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result
         let designs = LevelDesigns::of_file(&path.to_string_lossy(), &|text| game.parse_level(text));
         return (source.drawn)(&designs.map_err(|error| InspectError::Usage(error.to_string()))?);
     }
-    match request.mode {
-        Some(mode) if is_level_files(mode) => return (source.level)(game, mode, seed),
-        Some(_) => {
-            return Err(InspectError::Usage(
-                "mazes are named by --map, which takes whole modes too, and --seed".to_owned(),
-            ));
-        }
-        None => {}
+    if let Some(mode) = request.mode {
+        return (source.level)(game, mode, seed);
     }
     let text = request.map.unwrap_or("random");
     if is_level_files(text) {
@@ -109,7 +105,9 @@ fn shown(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result
 }
 
 fn no_seed(map: &str) -> InspectError {
-    InspectError::Usage(format!("`{map}` has no seed: leave --seed out, or take --map random"))
+    InspectError::Usage(format!(
+        "`{map}` has no seed: leave --seed out for the map itself, or take --mode {map} for a level as it is played"
+    ))
 }
 
 /// Why what was named is no file either.

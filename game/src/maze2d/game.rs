@@ -213,7 +213,9 @@ impl Game for Maze2d {
     }
 
     fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        show_level::show(self, request, &MazeSource { map: Map::maze2d, level: shown_level, drawn: shown_drawn })
+        let axes = "x goes down the rows and y along the columns; plots have x to the right and y up, a quarter turn from here";
+        let source = MazeSource { map: Map::maze2d, level: shown_level, drawn: shown_drawn, axes };
+        show_level::show(self, request, &source)
     }
 
     fn trace(&self, request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>> {

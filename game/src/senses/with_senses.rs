@@ -48,6 +48,7 @@ impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
         fn modes() -> &'static [&'static str];
         fn check_mode(mode: &str) -> Result<(), ModeError>;
         fn family(mode: &str) -> String;
+        fn last_level() -> Option<u64>;
         fn fingerprint(mode: &str, level: u64) -> Option<u64>;
         fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
         fn tick_hz() -> f64;

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use serde_json::Value;
+
 use crate::program::{code, done, ended, errors, json_lines, playbot};
 
 const MAZE: [&str; 6] = ["explore", "maze2d", "--level", "random+size=7x7:3", "--steps", "1000000"];
@@ -44,8 +46,14 @@ fn a_goal_that_is_not_found_is_a_finding() {
     assert!(told.contains("nothing is recorded: no solution was found"), "{told}");
     assert!(!folder.join("none.demo").exists());
     // The outer wall.
-    let (_, told) = ended(folder, &[&MAZE[..], &["--until", "solved", "--cell", "0,0"]].concat(), 1);
-    assert!(told.contains("cell 0,0 was not reached"), "{told}");
+    let cell = |cell: &str, json: &[&str], code: i32| {
+        ended(folder, &[&MAZE[..], &["--until", "solved", "--cell", cell], json].concat(), code).0
+    };
+    assert!(cell("0,0", &[], 1).contains("cell 0,0 was not reached"));
+    assert_eq!(json_lines(&cell("0,0", &["--json"], 1))[0]["cell"]["ticks"], Value::Null);
+    let reached = json_lines(&cell("1,1", &["--json"], 0))[0]["cell"]["ticks"].as_u64().expect("it is free");
+    let told = cell("1,1", &[], 0);
+    assert!(told.contains(&format!("cell 1,1 is reached in {reached} tick")), "{told}");
 }
 
 #[test]

@@ -32,11 +32,14 @@ fn a_failure_is_a_file_that_replays_in_another_process_and_gets_shorter() {
         let plan = ["test", "coinrun", "--levels", "hard:0..9", "--bot", "right-jump", "--keep-failures"];
         let output = playbot(folder, &[&plan[..], &["--out", out, "--threads", threads]].concat());
         assert_eq!(code(&output), 1, "{}", errors(&output));
+        errors(&output)
     };
-    test("one", "1");
+    let told = test("one", "1");
     test("two", "2");
     let found = findings(folder, "one");
     assert!(!found.is_empty() && found == findings(folder, "two"), "threads change no byte");
+    let kept = format!(" kept in one/findings; see it: playbot replay one/findings/{}", found[0].0);
+    assert!(told.contains(&kept), "{kept} is missing in {told}");
     for (name, _) in &found {
         let file = format!("one/findings/{name}");
         let (again, _) = done(folder, &["replay", &file, "--json"]);
@@ -79,7 +82,12 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     let file = format!("out/findings/{name}");
     let told = done(folder, &["replay", &file]).0;
     assert!(told.contains("maze2d sealed.json: unreachable-goal: "), "{told}");
-    assert!(done(folder, &["replay", &file, "--png", "a.png"]).1.contains("nothing is drawn"));
+    assert!(
+        done(folder, &["replay", &file, "--png", "a.png"]).1.contains("a.png shows the level: it was found before")
+    );
+    done(folder, &["level", "maze2d", "--file", "sealed.json", "--png", "b.png"]);
+    let [seen, level] = ["a.png", "b.png"].map(|name| fs::read(folder.join(name)).expect("drawn"));
+    assert!(seen == level, "both are the level");
     // As reports name it, from the folder of the results: the level file is in a folder above.
     let (results, below) = (folder.join("out"), format!("findings/{name}"));
     let shorter = ["replay", &below, "--minimise", "--out", "short.finding"];

@@ -255,7 +255,8 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
     assert!(
         told(&["level", "coinrun", "--seed", "3"]).contains("no --mode is named: hard, which is trained in, level 3")
     );
-    assert!(told(&["level", "maze2d", "--seed", "3"]).contains("no --map is named"));
+    assert!(told(&["level", "maze2d", "--seed", "3"]).contains("no --mode is named: medium, which is trained in"));
+    assert_eq!(level(&["--levels", "hard:3..9"]), plain);
     let recorded = told(&["record", "coinrun", "--steps", "20", "--out", "usual.demo"]);
     assert!(recorded.contains("recording hard:0..499, but for the held-out levels hard:64..1087"), "{recorded}");
     let seen = told(&["record", "coinrun", "--levels", "hard:60..70", "--steps", "20", "--out", "seen.demo"]);

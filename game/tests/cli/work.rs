@@ -44,6 +44,8 @@ fn recording_verifying_and_repairing_from_the_shell() {
     assert!(said(&torn).contains("playbot demo repair"), "{}", said(&torn));
     let mended = run(&["demo", "repair", "torn.demo", "--out", "mended.demo", "--json"]);
     assert_eq!(lines(&mended)[0]["kept_episodes"], 3);
+    let taken = run(&["demo", "repair", "torn.demo", "--out", "a.demo"]);
+    assert!(code(&taken) == 3 && errors(&taken).contains("name another --out"), "{}", errors(&taken));
     assert_eq!(code(&run(&["demo", "verify", "mended.demo"])), 0);
 
     let mut flipped = bytes;

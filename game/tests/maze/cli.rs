@@ -29,7 +29,7 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
 #[test]
 fn a_seed_makes_a_maze_and_options_shape_it() {
     let usual = generate(&MazeSpec::default(), 7).expect("a maze");
-    assert_eq!(level(&["maze2d", "--seed", "7"])["rows"], json!(usual.to_rows()));
+    assert_eq!(level(&["maze2d", "--map", "random", "--seed", "7"])["rows"], json!(usual.to_rows()));
     let wide = MazeSpec { rows: 9, columns: 13, corridor: 2, ..MazeSpec::default() };
     let map = "random+size=9x13+corridor=2";
     let rows = json!(generate(&wide, 64).expect("a maze").to_rows());
@@ -105,12 +105,13 @@ fn what_is_wrong_with_a_map_is_said() {
         (&["--map", "open"], &["(1, 3)", "border"]),
         (&["--map", "empty"], &["empty"]),
         (&["--map", "medum"], &["did you mean `medium`?", "no file"]),
-        (&["--map", "medium", "--seed", "1"], &["no seed"]),
+        (&["--map", "medium", "--seed", "1"], &["no seed", "take --mode medium"]),
         (&["--map", "random+size=5000x5000"], &["too large"]),
         (&["--map", "random+size=0x0"], &["`size=0x0`"]),
         (&["--map", "medium+sprse"], &["did you mean `sparse`?", "valid: sparse, fixed-start"]),
         (&["--map", "random+lops=1"], &["did you mean `loops"]),
-        (&["--mode", "medium"], &["--map"]),
+        (&["--mode", "medum"], &["did you mean `medium`?"]),
+        (&["--levels", "medium:3..4", "--seed", "5"], &["--seed 5 is none of the levels medium:3..4"]),
         (&["--map", "medium", "--png", "a.gif"], &[".png or .svg"]),
     ] {
         let (_, errors) = ended(folder.path(), &[&["level", "maze2d"], args].concat(), 3);

@@ -143,7 +143,7 @@ fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
 fn success(summary: &DemoSummary) -> String {
     let share = match summary.success_share {
         None => "no episode ended".to_owned(),
-        Some(_) if summary.successes == 0 => "no wins reported".to_owned(),
+        Some(_) if summary.successes == 0 => "no episode ended in a win".to_owned(),
         Some(share) => format!("{:.1} % success", 100.0 * share),
     };
     let notes: Vec<String> = [(summary.truncated, "until time was up"), (summary.aborted, "cut off")]
@@ -220,7 +220,7 @@ fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<
 
 /// Repairs a file. One in which no episode is whole is a finding.
 fn mend(file: &Path, out: &Path, header_from: Option<&Path>, as_json: bool) -> Result<Outcome, CliError> {
-    let report = repair(file, out, header_from).map_err(open::missing_recording)?;
+    let report = repair(file, out, header_from).map_err(open::missing_or_taken)?;
     if as_json {
         print_line(json!(report))?;
     } else {

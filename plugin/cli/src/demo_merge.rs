@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_playbot::demo::file::{DemoFault, DemoFileError, merge_demos};
+use bevy_playbot::demo::file::merge_demos;
 use serde_json::json;
 
 use super::{
@@ -20,7 +20,7 @@ use super::{
 /// They are of different games or rules, one is damaged, or there is a file at `out` already. Nothing is left at `out` then.
 pub fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, CliError> {
     prepare(out)?;
-    let report = merge_demos(files, out).map_err(explain)?;
+    let report = merge_demos(files, out).map_err(open::missing_or_taken)?;
     if as_json {
         let parts: Vec<_> =
             report.files.iter().map(|(file, episodes)| json!({ "file": file, "episodes": episodes })).collect();
@@ -43,12 +43,4 @@ pub fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, Cl
         ))?;
     }
     Ok(if report.episodes() == 0 { Outcome::Findings } else { Outcome::Pass })
-}
-
-/// The error of a merge, with what to do about a file that is in the way.
-fn explain(error: DemoFileError) -> CliError {
-    match error.fault {
-        DemoFault::Exists => CliError::Usage(format!("{error}: name another --out, or remove that file first")),
-        _ => open::missing_recording(error),
-    }
 }

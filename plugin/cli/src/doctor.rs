@@ -7,6 +7,7 @@ use playbot_lab::prelude::*;
 use playbot_lab::{
     doctor::{DoctorOptions, examine},
     game::Game,
+    split::check_level,
     worlds::build_world,
 };
 
@@ -56,6 +57,7 @@ const SPEED_SECONDS: f64 = 0.5;
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let mode = args.mode.unwrap_or_else(|| usual_mode(game).to_owned());
+    check_level(game, &mode, args.seed)?;
     let options = DoctorOptions {
         ticks: u32::try_from(args.ticks).map_err(|_| CliError::Usage("--ticks has too many digits".to_owned()))?,
         seed: args.seed,

@@ -42,7 +42,7 @@ use super::{
 #[command(after_help = "Examples:
   playbot eval --run runs/first
   playbot eval --bot BOT --bot random --levels MODE:0..63 --json
-  playbot eval --bot BOT --levels files:levels/**/*.json
+  playbot eval --bot BOT --levels 'files:levels/**/*.json'
   playbot eval --set game=GAME --bot BOT --levels MODE:0..63
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
@@ -61,8 +61,9 @@ pub struct Args {
     /// Policy file, as written by `playbot policy export`, which says what game is played; may be given several times.
     #[arg(long)]
     policy: Vec<PathBuf>,
-    /// Bot of the game, such as random; a name that it does not have lists all. May be given several times.
-    #[arg(long)]
+    /// Bot of the game, such as random; a name that it does not have lists all. May be given several times, or several,
+    /// separated by commas.
+    #[arg(long, value_delimiter = ',')]
     bot: Vec<String>,
     /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
     #[arg(long)]
@@ -72,7 +73,7 @@ pub struct Args {
     #[arg(long)]
     levels: Vec<LevelSplit>,
     /// Episodes on each level, instead of the experiment's.
-    #[arg(long)]
+    #[arg(long, visible_alias = "episodes")]
     episodes_per_level: Option<u32>,
     /// Take the most probable action instead of drawing one.
     #[arg(long)]

@@ -152,6 +152,8 @@ mod tests {
             if let Some(example) = line.strip_prefix("  jump") {
                 assert_eq!(strange, None, "{line}");
                 let words = example.split("   ").next().unwrap_or_default().split_whitespace();
+                // As a shell takes them.
+                let words = words.map(|word| word.trim_matches('\''));
                 check_usage(std::iter::once("jump").chain(words)).unwrap_or_else(|error| panic!("{line}\n{error}"));
                 examples += 1;
             }

@@ -26,6 +26,7 @@ mod help;
 mod interrupt;
 mod learn_skills;
 mod level;
+mod level_picture;
 mod log;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;

@@ -34,8 +34,8 @@ fn advice(game: &dyn Game, experiment: &Experiment, path: &Path) -> String {
         quoted(&file.display().to_string())
     };
     let rule = format!(
-        "; those are the training levels, and any others will do as well, but never the held-out ones, {}. An experiment \
-         file may say in its first lines how its own recordings are made",
+        "; those are the training levels, and any others will do as well, but never the held-out ones, {}. The \
+         first lines of an experiment file, or of one that it is built on, may say how its own recordings are made",
         experiment.test
     );
     if game.demonstrator().is_some() {

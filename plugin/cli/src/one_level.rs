@@ -1,8 +1,11 @@
 //! One level of a game, as the command line names it.
 
-use playbot_lab::{game::Game, split::LevelSplit};
+use playbot_lab::{
+    game::Game,
+    split::{LevelSplit, check_level},
+};
 
-use crate::error::CliError;
+use crate::{defaults::usual_mode, error::CliError};
 
 /// The level of verbs that play a single one.
 #[derive(clap::Args, Clone, Debug)]
@@ -31,7 +34,11 @@ impl LevelsArg {
         mode: Option<&'a str>,
         seed: Option<u64>,
     ) -> Result<(Option<&'a str>, u64), CliError> {
-        let Some(levels) = &self.levels else { return Ok((mode, seed.unwrap_or(0))) };
+        let Some(levels) = &self.levels else {
+            let level = seed.unwrap_or(0);
+            check_level(game, mode.unwrap_or_else(|| usual_mode(game)), level)?;
+            return Ok((mode, level));
+        };
         levels.check(game)?;
         let level = seed.unwrap_or(levels.first);
         if levels.contains(&levels.mode, level) {

@@ -138,6 +138,14 @@ pub fn missing_recording(error: DemoFileError) -> CliError {
     missing(error, "record GAME --out")
 }
 
+/// The same where another recording is made of it: a file in the place of that is told with what to do.
+pub fn missing_or_taken(error: DemoFileError) -> CliError {
+    match error.fault {
+        DemoFault::Exists => CliError::Usage(format!("{error}: name another --out, or remove that file first")),
+        _ => missing_recording(error),
+    }
+}
+
 /// The same for recordings of people, which nobody else makes.
 pub fn missing_recording_of_people(error: DemoFileError) -> CliError {
     missing(error, "play GAME --record")

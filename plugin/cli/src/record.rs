@@ -29,7 +29,7 @@ use super::{
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot record GAME --levels MODE:0..9 --out my.demo
-  playbot record GAME --levels MODE:128..499 --noise 0.2 --steps 100000 --out demos/GAME/noisy.demo
+  playbot record GAME --levels MODE:2000..2999 --noise 0.2 --steps 100000 --out demos/GAME/noisy.demo
   playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
   playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo
   playbot record GAME --run runs/first --checkpoint best --levels MODE:1000..1999 --noise 0.1 --out learned.demo")]
@@ -109,15 +109,18 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
         None => plan.build_world(game, writer),
     };
-    let finished = play(&mut world, agent, count, args.steps)?;
+    let finished = play(&mut world, agent, count, args.steps);
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
+    let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
+    let finished = finished.inspect_err(|_| {
+        tell!("{}: what was recorded before the error is kept: {counts}", args.out.display());
+    })?;
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let wins = match ended.successes {
         // Not every game has a goal.
         0 => String::new(),
         n => format!(", {:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
     };
-    let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
     tell!("{}: {counts}{wins}", args.out.display());
     if finished {
         return Ok(Outcome::Pass);

@@ -67,6 +67,11 @@ pub trait Game: Send + Sync {
         mode.to_owned()
     }
 
+    /// The largest number that a level which the game draws itself can have, in any mode; `None` where every number is one.
+    fn last_level(&self) -> Option<u64> {
+        None
+    }
+
     /// A hash of the places of a level, where different seeds may happen to draw the same ones. `None` where they cannot, or
     /// where the places are the mode's own. Of a level file it is the hash of the level in it.
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {

@@ -15,6 +15,16 @@ pub enum ModeError {
     /// The levels are files that cannot be read, or that are no levels of the game.
     #[error(transparent)]
     Files(#[from] LevelFileError),
+    /// The mode has levels, but not this one.
+    #[error("level {level} of `{mode}` does not exist: choose one up to {last}")]
+    NoLevel {
+        /// The mode.
+        mode: String,
+        /// The number that was named.
+        level: u64,
+        /// The largest number.
+        last: u64,
+    },
     /// An option has a value that cannot be.
     #[error("mode `{mode}`: {why}")]
     Option {

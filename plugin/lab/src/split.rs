@@ -57,14 +57,7 @@ impl LevelSplit {
     /// [`ModeError`] with what is valid.
     pub fn check(&self, game: &dyn Game) -> Result<(), ModeError> {
         game.check_mode(&self.mode)?;
-        if !is_level_files(&self.mode) {
-            return Ok(());
-        }
-        let count = level_designs(game, &self.mode)?.count();
-        if self.last < count {
-            return Ok(());
-        }
-        Err(LevelFileError::NoLevel { mode: self.mode.clone(), level: self.last, count }.into())
+        check_level(game, &self.mode, self.last)
     }
 
     /// Whether some level belongs to both.
@@ -76,6 +69,23 @@ impl LevelSplit {
 impl fmt::Display for LevelSplit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}..{}", self.mode, self.first, self.last)
+    }
+}
+
+/// Checks that a mode which [is one](Game::check_mode) has a level, and reads levels that are files.
+///
+/// # Errors
+///
+/// [`ModeError`] with the last level that there is.
+pub fn check_level(game: &dyn Game, mode: &str, level: u64) -> Result<(), ModeError> {
+    let mode = mode.to_owned();
+    if is_level_files(&mode) {
+        let count = level_designs(game, &mode)?.count();
+        return if level < count { Ok(()) } else { Err(LevelFileError::NoLevel { mode, level, count }.into()) };
+    }
+    match game.last_level() {
+        Some(last) if level > last => Err(ModeError::NoLevel { mode, level, last }),
+        _ => Ok(()),
     }
 }
 

@@ -6,6 +6,7 @@ use playbot_lab::{
     bugs::{BugError, BugSet, MakePlan, NoPlace, PlantedPart, Source, make_bugs},
     game::Game,
     games::Games,
+    shell_word::shell_word,
     split::LevelSplit,
 };
 use serde_json::json;
@@ -14,7 +15,7 @@ use crate::{
     compute::Threads,
     defaults::{usual_experiment, usual_mode},
     error::{CliError, Outcome, print_line},
-    output, progress,
+    output, program, progress,
 };
 
 /// Where levels are taken from that nobody has named: far from those that bots are trained on.
@@ -97,7 +98,12 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         tell!("warning: {}", missing.describe());
     }
     print(&made.set, &made.without_place, args.json)?;
-    tell!("planted: {}", args.out.display());
+    let folder = shell_word(&args.out.display().to_string());
+    tell!(
+        "planted: {}; see who finds them: {} bugs score {folder} --out score.json",
+        args.out.display(),
+        program::name()
+    );
     Ok(Outcome::Pass)
 }
 

@@ -4,18 +4,21 @@ use std::{ops::ControlFlow, path::PathBuf};
 
 use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{
-    explore::{Cell, Exploration, ExplorePlan, Explorer, Route, Stop, Until, check_cell, explore},
+    explore::{Cell, Exploration, ExplorationSummary, ExplorePlan, Explorer, Route, Stop, Until, check_cell, explore},
     game::Game,
     games::Games,
     split::LevelSplit,
 };
+use serde_json::json;
 
 use super::{chart::chart, one_level::one_level, recorded::RecordingFile, talents::Talents};
 use crate::{
     compute::Compute,
     defaults::first_levels,
     error::{CliError, Outcome, print_line},
-    interrupt, output,
+    interrupt,
+    number::counted,
+    output,
     plot::PlotFile,
     progress,
 };
@@ -120,14 +123,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     };
     let exploration = search(game, &plan)?;
-    let summary = exploration.summary(game);
-    if args.json {
-        let line = serde_json::to_string(&summary)
-            .map_err(|error| CliError::Io(format!("the summary cannot be written as JSON: {error}")))?;
-        print_line(line)?;
-    } else {
-        print_line(&summary)?;
-    }
+    print(&exploration.summary(game), &exploration, &args)?;
     let way = wanted(&exploration, args.cell.as_ref());
     // Last: what was found is not lost because it cannot be written.
     if let Some(recording) = recording {
@@ -144,15 +140,33 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         tell!("drawn: {}", file.path().display());
     }
     let is_missed = args.cell.as_ref().is_some_and(|cell| !exploration.cells().contains_key(cell));
-    if let Some(cell) = args.cell.as_ref().filter(|_| is_missed) {
-        tell!("cell {cell} was not reached: a larger --steps or --until spent looks for it longer");
-    }
     Ok(match (exploration.stop, exploration.solution_ticks()) {
         (Stop::Asked, _) => Outcome::Stopped,
         (_, None) if exploration.has_goal => Outcome::Findings,
         _ if is_missed => Outcome::Findings,
         _ => Outcome::Pass,
     })
+}
+
+/// Prints what was found, and of a cell that was asked for how soon it is reached.
+fn print(summary: &ExplorationSummary, exploration: &Exploration, args: &Args) -> Result<(), CliError> {
+    let ticks = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell).map(|route| route.len())));
+    if args.json {
+        let mut line = serde_json::to_value(summary)
+            .map_err(|error| CliError::Io(format!("the summary cannot be written as JSON: {error}")))?;
+        if let Some((cell, ticks)) = ticks {
+            line["cell"] = json!({ "cell": cell.to_string(), "ticks": ticks });
+        }
+        return print_line(line);
+    }
+    print_line(summary)?;
+    match ticks {
+        None => Ok(()),
+        Some((cell, Some(ticks))) => print_line(format!("cell {cell} is reached in {}", counted(ticks as u64, "tick"))),
+        Some((cell, None)) => {
+            print_line(format!("cell {cell} was not reached: a larger --steps or --until spent looks for it longer"))
+        }
+    }
 }
 
 /// The level that is named, or the first one.

@@ -20,7 +20,7 @@ A won level is followed by the next one, a lost one is played again. Every finis
 Examples:
   playbot play GAME --seed 7
   playbot play GAME --levels 0..63 --record my.demo
-  playbot play GAME --levels files:levels/*.json
+  playbot play GAME --levels 'files:levels/*.json'
   playbot play GAME --run runs/first --record mixed.demo
   playbot play GAME --mode MODE --bot BOT")]
 #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window only"))]

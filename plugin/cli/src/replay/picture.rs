@@ -3,11 +3,18 @@
 use std::{collections::VecDeque, path::Path};
 
 use bevy_playbot::vision::{ObservationConfig, ObservationKind};
-use playbot_lab::{findings::StoredFinding, game::Game, sensors::GameSensors};
+use playbot_lab::{
+    findings::StoredFinding,
+    game::Game,
+    inspect::{LevelPicture, LevelRequest},
+    sensors::GameSensors,
+};
 
 use crate::{
     error::CliError,
-    output, progress,
+    level_picture, output,
+    plot::PlotFile,
+    progress,
     view::{
         episode_world::{EpisodeStep, EpisodeWorld},
         film::Film,
@@ -49,10 +56,7 @@ impl Pictures<'_> {
         }
         let seen_as = seen_as(game);
         let (steps, reach) = play(game, finding, &seen_as)?;
-        let Some(last) = steps.last() else {
-            tell!("nothing is drawn: it was found before the first tick was over");
-            return Ok(());
-        };
+        let Some(last) = steps.last() else { return self.write_level(game, finding) };
         let film = if seen_as.is_image() {
             Film::new(seen_as.image, self.scale, game.tick_hz())?
         } else {
@@ -71,6 +75,26 @@ impl Pictures<'_> {
         }
         Ok(())
     }
+
+    /// Writes the level, of a finding that comes before the first tick is over, such as that nobody can solve it.
+    fn write_level(&self, game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
+        let why = "it was found before the first tick was over";
+        let Some(level) = picture_of(game, &finding.header.mode, finding.episode.level_seed) else {
+            tell!("nothing is drawn: {why}");
+            return Ok(());
+        };
+        for path in self.still.into_iter().chain(self.animated) {
+            level_picture::write(&PlotFile::new(path)?, &level, game.tick_hz())?;
+            tell!("{} shows the level: {why}", path.display());
+        }
+        Ok(())
+    }
+}
+
+/// A level as the game draws it; `None` if it draws none.
+fn picture_of(game: &dyn Game, mode: &str, level: u64) -> Option<LevelPicture> {
+    let request = LevelRequest { mode: Some(mode), seed: Some(level), picture: true, ..LevelRequest::default() };
+    game.show_level(&request).ok()?.picture
 }
 
 /// The pictures that a game has, or else its numbers.

@@ -159,7 +159,7 @@ fn print_curves(curves: &[TaggedCurve]) -> Result<(), CliError> {
     if curves.is_empty() { print_line("no episode has ended yet\n") } else { print_line("") }
 }
 
-/// The first, the lowest, the highest and the last point that is a number.
+/// The first, the lowest, the highest and the last point that is a number; means over episodes begin at the 100th episode.
 fn extremes(curve: &[(u64, f64)]) -> Option<[(u64, f64); 4]> {
     let known = || curve.iter().copied().filter(|(_, value)| !value.is_nan());
     // Of equal values the first one is shown.
@@ -170,8 +170,8 @@ fn extremes(curve: &[(u64, f64)]) -> Option<[(u64, f64); 4]> {
 
 fn metrics(run: &RunRecord) -> PlainTable {
     let columns = ["metric", "first", "lowest", "at step", "highest", "at step", "last"];
-    let rows = run.curves.iter().map(|(tag, curve)| {
-        let Some([first, lowest, highest, last]) = extremes(curve) else {
+    let rows = run.curves.iter().map(|(tag, _)| {
+        let Some([first, lowest, highest, last]) = extremes(run.curves.settled_or_all(tag)) else {
             return vec![tag.to_owned(), UNKNOWN.to_owned()];
         };
         let (low_step, high_step) = (whole(lowest.0 as f64), whole(highest.0 as f64));
@@ -193,8 +193,8 @@ fn full_json(run: &RunRecord) -> Value {
     let metrics: serde_json::Map<String, Value> = run
         .curves
         .iter()
-        .filter_map(|(tag, curve)| {
-            let [first, lowest, highest, last] = extremes(curve)?.map(point);
+        .filter_map(|(tag, _)| {
+            let [first, lowest, highest, last] = extremes(run.curves.settled_or_all(tag))?.map(point);
             Some((tag.to_owned(), json!({ "first": first, "lowest": lowest, "highest": highest, "last": last })))
         })
         .collect();

@@ -3,8 +3,9 @@
 use std::{fs, path::Path};
 
 use playbot_lab::{
+    findings::{FINDINGS, list_findings},
     game::Game,
-    report::{PlainTable, readable, whole},
+    report::{PlainTable, ticks, whole},
     shell_word::shell_word,
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal,
@@ -80,7 +81,7 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
         }
     }
     tell!("{}", counts(&overview));
-    replays(results.folder, &overview).iter().for_each(|command| tell!("{command}"));
+    replays(results.folder, &overview).iter().for_each(|line| tell!("{line}"));
     if let Some(comparison) = &comparison {
         tell_comparison(comparison);
     }
@@ -90,17 +91,32 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// How findings of the worst levels are seen.
+/// How findings of the worst levels are seen, and what else was kept.
 fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
     let findings = overview.worst.iter().flat_map(|level| &level.findings);
-    let files = findings.filter_map(|finding| finding.file.as_ref()).take(MOST_REPLAYS);
-    let word = |file: &String| shell_word(&folder.join(file).display().to_string());
-    files.map(|file| format!("see it: {} replay {}", program::name(), word(file))).collect()
+    let files: Vec<_> = findings.filter_map(|finding| finding.file.as_ref()).map(|file| folder.join(file)).collect();
+    let mut lines: Vec<_> = files.iter().take(MOST_REPLAYS).map(|file| seen_with(file)).collect();
+    let kept: Vec<_> = list_findings(folder).unwrap_or_default();
+    let more = kept.len().saturating_sub(lines.len());
+    match kept.first() {
+        Some((_, first)) if lines.is_empty() => {
+            let failures = counted(kept.len() as u64, "failed episode");
+            lines.push(format!("{failures} kept in {}; {}", folder.join(FINDINGS).display(), seen_with(first)));
+        }
+        _ if more > 0 => lines.push(format!("and {more} more in {}", folder.join(FINDINGS).display())),
+        _ => {}
+    }
+    lines
+}
+
+/// The command that shows a finding.
+fn seen_with(file: &Path) -> String {
+    format!("see it: {} replay {}", program::name(), shell_word(&file.display().to_string()))
 }
 
 fn counts(overview: &Overview) -> String {
     format!(
-        "{}: {} solved, {} not solved by any tester, {} proved unsolvable; {}",
+        "{}: {} solved, {} unsolved with nothing proved, {} proved unsolvable; {}",
         counted(overview.levels, "level"),
         overview.solved,
         overview.bot_failed,
@@ -133,7 +149,7 @@ fn worst(overview: &Overview) -> PlainTable {
             level.level.clone(),
             level.outcome.name().to_owned(),
             format!("{} of {}", score.solved, score.episodes),
-            readable(median),
+            ticks(median),
             whole(score.lost as f64),
             whole(score.timed_out as f64),
             level.places.unwrap_or_default().describe(),

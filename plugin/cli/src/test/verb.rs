@@ -61,7 +61,7 @@ pub struct Args {
     #[command(flatten)]
     testers: TesterArgs,
     /// Episodes of each tester on each level.
-    #[arg(long, default_value = "1", value_parser = at_least_one)]
+    #[arg(long, visible_alias = "episodes-per-level", default_value = "1", value_parser = at_least_one)]
     episodes: usize,
     /// Seed of the testers' draws.
     #[arg(long, default_value_t = 0)]

@@ -1,5 +1,7 @@
 //! What stands under a picture: tick, action, value, and the skill as bars.
 
+use playbot_lab::report::readable;
+
 use super::{
     colours::{DOWN, FAINT, UP, WORDS},
     episode_world::EpisodeStep,
@@ -55,7 +57,8 @@ impl Caption {
             font::write(screen, &format!("value {value:.2}"), letter, (MARGIN, second), WORDS);
         }
         if step.reward != 0.0 {
-            font::write(screen, &format!("reward {}", step.reward), letter, (column, second), UP);
+            let reward = readable(f64::from(step.reward));
+            font::write(screen, &format!("reward {reward}"), letter, (column, second), UP);
         }
         self.bars(screen, second + self.line(), &step.skill);
     }

@@ -97,6 +97,7 @@ impl<G: Deref<Target: Game> + Send + Sync> Game for Mutant<G> {
         fn modes() -> &'static [&'static str];
         fn check_mode(mode: &str) -> Result<(), ModeError>;
         fn family(mode: &str) -> String;
+        fn last_level() -> Option<u64>;
         fn fingerprint(mode: &str, level: u64) -> Option<u64>;
         fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
         fn tick_hz() -> f64;

@@ -42,7 +42,7 @@ mod trails;
 pub use chart::{Chart, Curve};
 pub use document::{Report, ReportError, Section};
 pub(crate) use markdown::{markdown_cell, markdown_row};
-pub use number::{percent, readable, readable_with_spread, times, whole};
+pub use number::{percent, readable, readable_with_spread, ticks, times, whole};
 pub use paired::PairedDifference;
 pub use result::{ResultRow, ResultTable};
 pub use scatter::draw_scatters;

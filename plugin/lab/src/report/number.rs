@@ -35,6 +35,11 @@ pub fn whole(value: f64) -> String {
     fixed(value, 0)
 }
 
+/// Ticks, of which medians and quartiles may lie between two: without decimals where they are whole; NaN is unknown.
+pub fn ticks(value: f64) -> String {
+    if value.fract() == 0.0 { whole(value) } else { fixed(value, 1) }
+}
+
 /// How often something is done, in words.
 pub fn times(count: u32) -> String {
     if count == 1 { "once".to_owned() } else { format!("{count} times") }

@@ -85,6 +85,12 @@ impl RunCurves {
         &curve[curve.partition_point(|(step, _)| *step < from)..]
     }
 
+    /// The [settled](Self::settled) points of a curve, or all of them where none are.
+    pub fn settled_or_all(&self, tag: &str) -> &[(u64, f64)] {
+        let settled = self.settled(tag);
+        if settled.is_empty() { self.curve(tag) } else { settled }
+    }
+
     /// The last value of a metric that is a number.
     pub fn last(&self, tag: &str) -> Option<f64> {
         self.curve(tag).iter().rev().map(|(_, value)| *value).find(|value| !value.is_nan())

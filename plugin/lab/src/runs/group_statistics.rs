@@ -21,9 +21,9 @@ pub struct GroupStatistics {
     pub last_mean: f64,
     /// Sample standard deviation of the last values; 0 for a single run.
     pub last_sd: f64,
-    /// Lowest value of any run at any step.
+    /// Lowest value of any run at any step; of means over episodes, where as many ended, from the 100th episode on.
     pub lowest: f64,
-    /// Highest value of any run at any step.
+    /// Highest value of the same.
     pub highest: f64,
     /// For each run the first step at which it reached the threshold; none if no threshold was given.
     pub steps_to_threshold: Vec<Option<u64>>,
@@ -40,7 +40,7 @@ impl GroupStatistics {
         let last: Vec<f64> = group.runs.iter().map(|run| run.curves.last(metric).unwrap_or(f64::NAN)).collect();
         let (last_mean, last_sd) = mean_and_sd(&last);
         let speeds: Vec<f64> = group.runs.iter().filter_map(|run| run.curves.steps_per_s()).collect();
-        let values = || group.runs.iter().flat_map(|run| run.curves.curve(metric)).map(|(_, value)| *value);
+        let values = || group.runs.iter().flat_map(|run| run.curves.settled_or_all(metric)).map(|(_, value)| *value);
         let is_early = |run: &RunRecord| run.curves.settled(metric).is_empty() && !run.curves.curve(metric).is_empty();
         let reached =
             |threshold| group.runs.iter().map(move |run| steps_to_reach(run.curves.settled(metric), threshold));
@@ -109,6 +109,25 @@ mod tests {
         fs::write(folder.path().join("metrics.jsonl"), text).expect("writable");
         let curves = RunCurves::read(folder.path()).expect("readable");
         RunRecord { curves, ..run(Algorithm::Ppo, seed, "") }
+    }
+
+    #[test]
+    fn the_mean_of_a_few_episodes_is_neither_lowest_nor_highest() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let updates = [(16, 3, 1.0), (32, 120, 0.25), (48, 240, 0.5)];
+        let line = |(step, episodes, share)| {
+            format!("{{\"step\":{step},\"charts/episodes\":{episodes},\"charts/success_rate\":{share}}}\n")
+        };
+        fs::write(folder.path().join("metrics.jsonl"), updates.map(line).concat()).expect("writable");
+        let of = |folder: &std::path::Path| {
+            let curves = RunCurves::read(folder).expect("readable");
+            let runs = [RunRecord { curves, ..run(Algorithm::Ppo, 1, "") }];
+            let statistics = GroupStatistics::new(&group_runs(&runs)[0], "charts/success_rate", None);
+            (statistics.lowest, statistics.highest)
+        };
+        assert_eq!(of(folder.path()), (0.25, 0.5));
+        fs::write(folder.path().join("metrics.jsonl"), line(updates[0])).expect("writable");
+        assert_eq!(of(folder.path()), (1.0, 1.0), "better than nothing");
     }
 
     #[test]

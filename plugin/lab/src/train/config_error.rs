@@ -111,7 +111,10 @@ fn neighbour(section: &str, name: &str) -> Option<String> {
     if let Some(elsewhere) = elsewhere().find(of_near_section).or_else(|| elsewhere().next()) {
         return Some(elsewhere.to_owned());
     }
-    if let Some(near) = nearest(name, &names(section)) {
+    let mut here = names(section);
+    // Read before the keys are, and so none of them.
+    here.extend(section.is_empty().then_some("base"));
+    if let Some(near) = nearest(name, &here) {
         return Some(join(section, near));
     }
     let near = near_section?;

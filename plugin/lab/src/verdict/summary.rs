@@ -16,7 +16,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     let mut lines = vec![format!("# {} {}", record.game, markdown_cell(&record.range.to_string())), String::new()];
     let solved = Trials { successes: overview.solved, trials: overview.levels };
     lines.push(format!(
-        "**{} level{}**: {} solved{}, {} not solved by any tester, {} proved unsolvable; {} finding{}.",
+        "**{} level{}**: {} solved{}, {} unsolved with nothing proved, {} proved unsolvable; {} finding{}.",
         overview.levels,
         if overview.levels == 1 { "" } else { "s" },
         overview.solved,

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     escape::escape,
-    report::readable,
+    report,
     verdict::{Finding, LevelVerdict, TestRecord, TesterVerdict, rerun_commands},
 };
 
@@ -62,7 +62,8 @@ fn testers(testers: &[TesterVerdict]) -> String {
         let ticks = score.ticks.map_or_else(
             || "–".to_owned(),
             |ticks| {
-                let [lower, median, upper] = [ticks.lower_quartile, ticks.median, ticks.upper_quartile].map(readable);
+                let [lower, median, upper] =
+                    [ticks.lower_quartile, ticks.median, ticks.upper_quartile].map(report::ticks);
                 format!("{median} ({lower} to {upper})")
             },
         );

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     escape::escape,
-    report::readable,
+    report::ticks,
     verdict::{LevelVerdict, TestRecord},
 };
 
@@ -39,7 +39,7 @@ pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn
         score.interval[0],
         interval(score.interval),
         median.unwrap_or(NEVER),
-        median.map_or_else(|| "–".to_owned(), readable),
+        median.map_or_else(|| "–".to_owned(), ticks),
         places.percent().unwrap_or(UNKNOWN),
         places.describe(),
         findings.len(),

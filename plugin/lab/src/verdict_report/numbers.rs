@@ -19,7 +19,7 @@ pub fn numbers(overview: &Overview) -> String {
     number("levels-all", "levels", levels, "");
     for (class, what, count) in [
         ("solved", "solved", overview.solved),
-        ("bot-failed", "no tester solved", overview.bot_failed),
+        ("bot-failed", "unsolved, nothing proved", overview.bot_failed),
         ("proved-unsolvable", "proved unsolvable", overview.proved_unsolvable),
     ] {
         number(class, what, count, &interval_of(Trials { successes: count, trials: levels }));

@@ -113,3 +113,78 @@ impl SacLearner {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::SacConfig;
+    use super::*;
+    use crate::{ActionSpace, Actions, DeviceKind, EndStates, ObsKind, PolicySpec, Rollout};
+
+    const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(1), latent: 0, action_space: ActionSpace::Discrete(2) };
+
+    /// One episode that sees 1, 2, 3, 4 and at last 5, and earns 1 with its last action.
+    fn episode() -> Rollout {
+        Rollout {
+            steps: 4,
+            obs: vec![1.0, 2.0, 3.0, 4.0].into(),
+            actions: Actions::Discrete(vec![0; 4]),
+            log_probs: vec![0.0; 4],
+            values: vec![0.0; 4],
+            final_values: vec![0.0; 4],
+            rewards: vec![0.0, 0.0, 0.0, 1.0],
+            terminated: vec![false, false, false, true],
+            truncated: vec![false; 4],
+            next_values: vec![0.0],
+            ends: EndStates { next_obs: vec![5.0].into(), ..EndStates::new(&SPEC.obs) },
+            ..Rollout::new(1, SPEC.obs, 0, &SPEC.action_space)
+        }
+    }
+
+    /// Observations, next observations that count, and rewards of a batch of the whole episode.
+    fn seen(norm_obs: bool, norm_reward: bool) -> [Vec<f32>; 3] {
+        let config = SacConfig {
+            norm_obs,
+            norm_reward,
+            gamma: 0.5,
+            hidden: vec![4],
+            learning_starts: 9,
+            ..SacConfig::default()
+        };
+        let mut learner = SacLearner::new(config, SPEC, 1, DeviceKind::Flex).expect("good settings");
+        learner.update(&episode()).expect("finite");
+        let drawn = learner.buffer.picked(&[0, 1, 2, 3], None).expect("one space");
+        let batch = learner.batch(&drawn, Vec::new(), false).expect("finite");
+        let mut next = numbers(batch.next_inputs);
+        next.truncate(3);
+        [numbers(batch.inputs), next, numbers(batch.rewards)]
+    }
+
+    fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+        tensor.into_data().try_to_vec().expect("floats")
+    }
+
+    fn close(seen: &[f32], expected: [f32; 4]) {
+        let equal = seen.iter().zip(&expected).all(|(seen, expected)| (seen - expected).abs() < 1e-2);
+        assert!(equal, "{seen:?}, expected {expected:?}");
+    }
+
+    #[test]
+    fn observations_are_normalised_where_that_is_wanted_and_nowhere_else() {
+        let [raw, raw_next, _] = seen(false, true);
+        assert_eq!((raw, raw_next), (vec![1.0, 2.0, 3.0, 4.0], vec![2.0, 3.0, 4.0]));
+        let [inputs, next, _] = seen(true, false);
+        // Their mean is 2.5, and their variance 1.25.
+        let of = |seen: f32| (seen - 2.5) / 1.25_f32.sqrt();
+        close(&inputs, [1.0, 2.0, 3.0, 4.0].map(of));
+        close(&next, [2.0, 3.0, 4.0, 5.0].map(of));
+    }
+
+    #[test]
+    fn rewards_are_scaled_where_that_is_wanted_and_nowhere_else() {
+        let [.., raw] = seen(true, false);
+        assert_eq!(raw, [0.0, 0.0, 0.0, 1.0]);
+        let [.., scaled] = seen(false, true);
+        // Of four returns one is 1: a variance of 3/16.
+        close(&scaled, [0.0, 0.0, 0.0, (16.0_f32 / 3.0).sqrt()]);
+    }
+}

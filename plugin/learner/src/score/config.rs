@@ -101,7 +101,8 @@ pub struct ScoreConfig {
     /// Where skills come from.
     pub prior: PriorKind,
     /// Whether critics count the ticks that are left of a skill: what (s, z) is worth depends on them. Needs `condition`.
-    /// Off by default: on levels of CoinRun that were never seen its policies were no better.
+    /// Off by default, as in the paper: neither on levels of CoinRun that were never seen nor on AntMaze Medium were its policies
+    /// clearly better.
     pub critic_clock: bool,
 }
 

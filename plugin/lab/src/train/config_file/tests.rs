@@ -33,6 +33,7 @@ fn an_unknown_key_is_named_with_its_line_and_its_neighbour() {
     for (good, bad, line, words) in [
         ("gamma", "gama", "x.ron:4:11:", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
         ("steps:", "step:", "x.ron:3:5:", "unknown key `step`; did you mean `steps`?"),
+        ("steps:", "bases:", "x.ron:3:5:", "unknown key `bases`; did you mean `base`?"),
         ("ppo: (", "pppo: (", "x.ron:4:5:", "did you mean `ppo`?"),
         ("gamma", "horizon", "x.ron:4:11:", "did you mean `score.horizon`?"),
         ("gamma", "qqq", "x.ron:4:11:", "valid keys in `ppo`: activation, adam_eps, anneal_lr,"),
