@@ -164,6 +164,12 @@ fn the_program_exports_shows_and_measures() {
     refused(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
     let ignored = refused(&["policy", "export", "--run", "run", "--set", "seed=2", "--out", "other.policy"]);
     assert!(ignored.contains("cannot be used with"), "{ignored}");
+    let other = refused(&["policy", "export", "maze2d", "--run", "run", "--out", "other.policy"]);
+    assert!(other.contains("run is a run of `coinrun`, not of `maze2d`"), "{other}");
+    let other = refused(&["eval", "maze2d", "--run", "run"]);
+    assert!(other.contains("run is a run of `coinrun`, but `maze2d` is measured"), "{other}");
+    let there = refused(&["train", "coinrun", "--run", "run"]);
+    assert!(there.contains("run exists already"), "{there}");
     let (shown, _) = done(&["policy", "show", "bot.policy", "--json"]);
     let card: Value = serde_json::from_str(&shown).expect("JSON");
     assert_eq!(card["card"]["actions"][8], "right+jump");
@@ -192,7 +198,7 @@ fn the_program_exports_shows_and_measures() {
         &["eval", "--skills", "sk.safetensors"],
     ] {
         let errors = refused(args);
-        for words in ["those of maze2d, not of `coinrun`", "--experiment", "--set game=maze2d"] {
+        for words in ["those of maze2d, not of `coinrun`", "--experiment", "`maze2d`, behind the verb"] {
             assert!(errors.contains(words), "{errors}");
         }
     }

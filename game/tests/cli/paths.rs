@@ -40,8 +40,10 @@ fn recordings_of_the_experiment_that_comes_with_the_program_are_beside_it() {
     assert!(!words.contains(".."), "{words}");
     let (_, words) = ended(folder, &[&learn[..], &["--force", "--demos", "demos/coinrun"]].concat(), 3);
     assert!(words.contains("`playbot record coinrun "), "{words}");
-    let (_, told) = done(folder, &["config", "show"]);
-    assert!(!told.contains("there are no recordings"), "{told}");
+    for game in ["coinrun", "maze2d", "antmaze"] {
+        let (_, told) = done(folder, &["config", "show", game]);
+        assert!(!told.contains("there are no recordings"), "{told}");
+    }
     let (_, told) = done(folder, &["config", "show", "--set", "demos=demos/coinrun"]);
     assert!(told.contains("there are no recordings at demos/coinrun"), "{told}");
 }

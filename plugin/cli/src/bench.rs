@@ -238,7 +238,7 @@ fn training(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> 
         "ppo.epochs=3".to_owned(),
         "ppo.minibatches=8".to_owned(),
     ];
-    ExperimentArgs { experiment: None, set: args.set.clone() }.over(known)
+    ExperimentArgs { set: args.set.clone(), ..Default::default() }.over(known)
 }
 
 /// Microseconds per step that the Worlds' threads spent in each part of their ticks.

@@ -33,7 +33,7 @@ pub fn check_skills(
     let advice = match others.first() {
         None => "use the program that has the game they were learned for".to_owned(),
         Some(_) if from.names_game() => "name another one".to_owned(),
-        Some(game) => format!("name its experiment with --experiment, or its game and levels with --set game={game}"),
+        Some(game) => format!("name its experiment with --experiment, or its game, `{game}`, behind the verb"),
     };
     Err(CliError::Usage(format!(
         "{} holds skills for {} and {}, which are those of {whose}, not of `{}`: {advice}",

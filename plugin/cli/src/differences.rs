@@ -38,6 +38,9 @@ impl Options<'_> {
         if let Some(option) = own {
             return format!("`{option}`");
         }
+        if let Some(game) = self.from.game.as_ref().filter(|_| key == "game") {
+            return format!("`{game}`");
+        }
         match (self.from.set.iter().rev().find(|set| reaches(set, key)), &self.from.experiment) {
             (Some(set), _) => format!("`--set {set}`"),
             (None, Some(path)) => format!("`--experiment {}`", path.display()),
@@ -76,7 +79,7 @@ mod tests {
         let kept = parse_experiment(text, Path::new("x.ron")).expect("valid");
         let sets = ["seed=7", "skills=(epochs: 3)", "steps=20", "arenas=32"].map(str::to_owned);
         let wanted = kept.with_set(&sets).expect("valid");
-        let from = ExperimentArgs { experiment: None, set: sets[1..3].to_vec() };
+        let from = ExperimentArgs { set: sets[1..3].to_vec(), ..Default::default() };
         let own = [("seed", Some("--seed 7".to_owned())), ("algorithm", None)];
         let found = Options { from: &from, own: &own }.differences(&wanted, &kept, "the run", &["steps"]);
         let [arenas, seed, epochs] = &found[..] else { panic!("{found:?}") };

@@ -43,7 +43,7 @@ use super::{
   playbot eval --run runs/first
   playbot eval --bot BOT --bot random --levels MODE:0..63 --json
   playbot eval --bot BOT --levels 'files:levels/**/*.json'
-  playbot eval --set game=GAME --bot BOT --levels MODE:0..63
+  playbot eval GAME --bot BOT --levels MODE:0..63
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
@@ -158,7 +158,7 @@ fn misfit(error: &ModeError, split: &LevelSplit, games: &Games) -> CliError {
     CliError::Usage(match others.first() {
         Some(first) => {
             let others = others.join(", ");
-            format!("{error}; it is one of {others}: name the game, as in --set game={first}")
+            format!("{error}; it is one of {others}: name the game, as in `playbot eval {first}`")
         }
         None => error.to_string(),
     })
@@ -175,7 +175,11 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
     match (&args.from.experiment, args.run.first()) {
         (None, Some(run)) => {
-            let experiment = RunDir::open(run)?.experiment.with_set(&args.from.sets(options))?;
+            let own = RunDir::open(run)?.experiment;
+            if let Some(game) = args.from.game.as_deref().filter(|game| *game != own.game) {
+                return Err(of_other_game(run, &own.game, game));
+            }
+            let experiment = own.with_set(&args.from.sets(options))?;
             experiment.check()?;
             Ok(experiment)
         }
@@ -253,13 +257,10 @@ fn check_run(
     measured: &Experiment,
     args: &Args,
 ) -> Result<(), CliError> {
-    let path = path.display();
     if own.game != measured.game {
-        return Err(CliError::Usage(format!(
-            "{path} is a run of `{}`, but `{}` is measured: measure it by itself with `playbot eval --run {path}`",
-            own.game, measured.game
-        )));
+        return Err(of_other_game(path, &own.game, &measured.game));
     }
+    let path = path.display();
     if args.levels.is_empty() && HeldOut::new(game, &measured.test).first_of(&own.train).is_some() {
         return Err(CliError::Usage(format!(
             "{path} was trained on {}, which shares levels with the held-out levels {}: choose levels that none of the \
@@ -268,6 +269,13 @@ fn check_run(
         )));
     }
     Ok(())
+}
+
+fn of_other_game(run: &Path, own: &str, measured: &str) -> CliError {
+    let run = run.display();
+    CliError::Usage(format!(
+        "{run} is a run of `{own}`, but `{measured}` is measured: measure it by itself with `playbot eval --run {run}`"
+    ))
 }
 
 /// A player, with its path in its name where there are several of its kind.

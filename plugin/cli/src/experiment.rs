@@ -13,7 +13,8 @@ use playbot_lab::{
         Experiment,
         config::ExperimentError,
         config_file::{
-            ConfigError, locate, parse_experiment, parse_experiment_with, read_experiment_text, read_experiment_with,
+            ConfigError, locate, parse_experiment, parse_experiment_with, read_experiment, read_experiment_text,
+            read_experiment_with,
         },
         default_experiment::{default_experiment, experiment_of},
     },
@@ -22,8 +23,9 @@ use playbot_lab::{
 /// Which experiment, and what to change in it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct ExperimentArgs {
-    /// Experiment file; if none is named, that of the game that `--set game=` names, or else of the program's first game (for
-    /// `eval --run` the run's own).
+    /// Name of the game, whose own experiment is taken if no file is named; the program's first game if none is.
+    pub game: Option<String>,
+    /// Experiment file; if none is named, that of the game (for `eval --run` the run's own).
     #[arg(long, value_name = "FILE")]
     pub experiment: Option<PathBuf>,
     /// Change a value of the experiment, such as ppo.lr=0.0003; may be given several times.
@@ -32,16 +34,22 @@ pub struct ExperimentArgs {
 }
 
 impl ExperimentArgs {
+    /// The experiment of a game where nothing else is said.
+    pub fn of_game(game: &str) -> Self {
+        Self { game: Some(game.to_owned()), ..Self::default() }
+    }
+
     /// Reads the experiment, changes what `--set` and then what the options with names of their own say, and checks it.
     ///
     /// # Errors
     ///
-    /// [`ConfigError`] with file, line and column, or with the `key=value` that does not fit.
+    /// [`ConfigError`] with file, line and column, or with the `key=value` that does not fit; or two games are named.
     pub fn load(
         &self,
         games: &Games,
         options: impl IntoIterator<Item = Option<String>>,
     ) -> Result<Experiment, ConfigError> {
+        self.check_game()?;
         let sets = self.sets(options);
         match &self.experiment {
             Some(path) => read_experiment_with(path, &sets),
@@ -70,9 +78,33 @@ impl ExperimentArgs {
         }
     }
 
-    /// Whether somebody said which game: in an experiment file, or with `--set`.
+    /// The game that is named by its name behind the verb is not another one than a file or `--set` names: that would be taken
+    /// for a slip, while `--set` changes the game of a file on purpose.
+    fn check_game(&self) -> Result<(), ConfigError> {
+        let Some(game) = &self.game else { return Ok(()) };
+        let refused = |message| Err(ConfigError::Set { set: format!("game={game}"), message });
+        if let Some(other) = game_of(&self.set).filter(|other| other != game) {
+            return refused(format!("`--set` names the game `{other}`: leave one of them out"));
+        }
+        let Some(path) = &self.experiment else { return Ok(()) };
+        match read_experiment(path) {
+            Ok(own) if own.game != *game => refused(format!(
+                "{} is an experiment of `{}`: leave the game out, or change it with --set game={game}",
+                path.display(),
+                own.game
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether somebody said which game: by its name, in an experiment file, or with `--set`.
     pub fn names_game(&self) -> bool {
-        self.experiment.is_some() || self.set.iter().any(|set| sets_key(set, "game"))
+        self.experiment.is_some() || self.names_game_itself()
+    }
+
+    /// The same without a file.
+    pub fn names_game_itself(&self) -> bool {
+        self.game.is_some() || game_of(&self.set).is_some()
     }
 
     /// Where the recordings of an experiment are, see [`find_recordings`](Self::find_recordings). Says so if it is not where
@@ -90,47 +122,55 @@ impl ExperimentArgs {
         Ok(found)
     }
 
-    /// Where recordings are that an experiment names: as it says, below this folder. Only those of the experiment that
-    /// comes with the program are looked for beside it, too, if they are not here, so that `cargo run` works from any folder.
+    /// Where recordings are that an experiment names: as it says, below this folder. Only those of experiments that
+    /// come with the program are looked for beside it, too, if they are not here, so that `cargo run` works from any folder.
     pub fn find_recordings(&self, path: &Path, games: &Games) -> PathBuf {
         let beside = sources().join(path);
         let is_usual = self.experiment.is_none() && !self.set.iter().any(|set| sets_key(set, "demos"));
-        if is_usual && !path.exists() && beside.exists() && is_shipped(path, games) { beside } else { path.into() }
+        let is_beside = is_usual && !path.exists() && beside.exists();
+        if is_beside && is_shipped(path, &unnamed(games, &self.sets([]))) { beside } else { path.into() }
     }
 
     /// These as they are written behind a verb, with a blank in front of each.
     pub fn words(&self) -> String {
+        let game = self.game.iter().map(|game| format!(" {}", quoted(game)));
         let experiment =
             self.experiment.iter().map(|path| format!(" --experiment {}", quoted(&path.to_string_lossy())));
         let set = self.set.iter().map(|set| format!(" --set {}", quoted(set)));
-        experiment.chain(set).collect()
+        game.chain(experiment).chain(set).collect()
     }
 
     /// These, under what is already known of the experiment, as `key=value`.
     pub fn over(&self, known: impl IntoIterator<Item = String>) -> Self {
-        Self { experiment: self.experiment.clone(), set: known.into_iter().chain(self.set.iter().cloned()).collect() }
+        let set = known.into_iter().chain(self.set.iter().cloned()).collect();
+        Self { game: self.game.clone(), experiment: self.experiment.clone(), set }
     }
 
-    /// What `--set` and then what the options with names of their own say.
+    /// What the name of the game, then `--set`, and then the options with names of their own say.
     pub fn sets(&self, options: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
-        self.set.iter().cloned().chain(options.into_iter().flatten()).collect()
+        let game = self.game.iter().map(|game| format!("game={game}"));
+        game.chain(self.set.iter().cloned()).chain(options.into_iter().flatten()).collect()
     }
 }
 
 /// The experiment where no file is named: that of the game that `sets` name, since levels and settings of another one would not
 /// fit it. A game that does not exist is refused when it is looked for.
 fn unnamed(games: &Games, sets: &[String]) -> ExperimentText {
-    let named = sets.iter().rev().find(|set| sets_key(set, "game")).and_then(|set| set.split_once('='));
-    let game = named.and_then(|(_, name)| games.get(name.trim().trim_matches('"')).ok());
+    let game = game_of(sets).and_then(|name| games.get(name).ok());
     game.map_or_else(|| default_experiment(games), experiment_of)
 }
 
+/// The game that `key=value`s name; the last of them counts.
+fn game_of(sets: &[String]) -> Option<&str> {
+    let (_, name) = sets.iter().rev().find(|set| sets_key(set, "game"))?.split_once('=')?;
+    Some(name.trim().trim_matches('"'))
+}
+
 /// Whether these are the recordings of an experiment that lies in the sources, as nobody has changed it.
-fn is_shipped(recordings: &Path, games: &Games) -> bool {
-    let ExperimentText { origin, text } = default_experiment(games);
-    let is_there = std::fs::read_to_string(sources().join(&*origin)).is_ok_and(|found| found == *text);
+fn is_shipped(recordings: &Path, ExperimentText { origin, text }: &ExperimentText) -> bool {
+    let is_there = std::fs::read_to_string(sources().join(&**origin)).is_ok_and(|found| found == **text);
     is_there
-        && parse_experiment(&text, Path::new(&*origin)).is_ok_and(|usual| usual.demos.as_deref() == Some(recordings))
+        && parse_experiment(text, Path::new(&**origin)).is_ok_and(|usual| usual.demos.as_deref() == Some(recordings))
 }
 
 /// Whether a `key=value` sets exactly this key.
@@ -154,4 +194,50 @@ pub fn option<T: Display>(key: &str, value: &Option<T>) -> Option<String> {
 fn sources() -> &'static Path {
     let this = Path::new(env!("CARGO_MANIFEST_DIR"));
     this.ancestors().nth(2).unwrap_or(this)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Verb {
+        #[command(flatten)]
+        from: ExperimentArgs,
+    }
+
+    fn parsed(words: &[&str]) -> ExperimentArgs {
+        Verb::try_parse_from([&["verb"], words].concat()).expect("an experiment").from
+    }
+
+    #[test]
+    fn a_game_by_its_name_is_the_first_thing_that_is_set() {
+        let from = parsed(&["maze2d", "--set", "steps=1"]);
+        assert_eq!((from.sets([]).join(" "), from.names_game()), ("game=maze2d steps=1".to_owned(), true));
+        let from = parsed(&["--set", "steps=1", "--experiment", "my.ron", "maze2d"]);
+        assert_eq!(from.words(), " maze2d --experiment my.ron --set steps=1");
+        assert!(!parsed(&["--set", "steps=1"]).names_game());
+        assert!(Verb::try_parse_from(["verb", "maze2d", "antmaze"]).is_err(), "one game");
+    }
+
+    #[test]
+    fn two_games_are_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("my.ron");
+        let text = r#"(game: "maze2d", train: "a:0..3", test: "a:4..7", demos: "d", steps: 10)"#;
+        std::fs::write(&path, text).expect("written");
+        let file = path.to_str().expect("a path");
+        let refused = |words: &[&str]| parsed(words).check_game().expect_err("two games").to_string();
+        let words = refused(&["coinrun", "--set", "game=\"maze2d\""]);
+        assert_eq!(words, "`game=coinrun`: `--set` names the game `maze2d`: leave one of them out");
+        let words = refused(&["coinrun", "--experiment", file]);
+        assert!(words.ends_with("of `maze2d`: leave the game out, or change it with --set game=coinrun"), "{words}");
+        for words in
+            [&["maze2d", "--experiment", file][..], &["maze2d", "--set", "game=maze2d"], &["--experiment", file]]
+        {
+            parsed(words).check_game().expect("one game");
+        }
+    }
 }

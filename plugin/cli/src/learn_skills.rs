@@ -27,7 +27,7 @@ use super::{
 #[derive(clap::Args)]
 #[command(mut_arg("threads", |threads| threads.help("Threads that replay recordings; the result does not depend on it")))]
 #[command(after_help = "Examples:
-  playbot learn-skills --out skills.safetensors
+  playbot learn-skills GAME --out skills.safetensors
   playbot learn-skills --set observation=Raster --max-steps 30000 --out eyes.safetensors
   playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors
   playbot learn-skills --out skills.safetensors --resume")]

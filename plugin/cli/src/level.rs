@@ -73,16 +73,15 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 /// The level that is asked for. Where neither a mode nor a map is named it is one of the usual mode.
 fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, CliError> {
     let (map, file) = (args.map.as_deref(), args.file.as_deref());
-    let is_of_mode = map.is_none() && file.is_none();
-    let (mode, seed) = match is_of_mode {
-        true => args.levels.choose(game, args.mode.as_deref(), args.seed).map(|(mode, level)| (mode, Some(level)))?,
-        false => (None, args.seed),
-    };
-    let usual = (is_of_mode && mode.is_none()).then(|| usual_mode(game));
-    let request = LevelRequest { mode: mode.or(usual), map, file, seed, picture };
-    let level = game.show_level(&request).map_err(|error| explain(game, error))?;
-    if let Some(mode) = usual {
-        tell!("no --mode is named: {mode}, which is trained in, level {}", seed.unwrap_or(0));
+    let show = |request: &LevelRequest| game.show_level(request).map_err(|error| explain(game, error));
+    if map.is_some() || file.is_some() {
+        return show(&LevelRequest { mode: None, map, file, seed: args.seed, picture });
+    }
+    let (named, seed) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let mode = named.unwrap_or_else(|| usual_mode(game));
+    let level = show(&LevelRequest { mode: Some(mode), map, file, seed: Some(seed), picture })?;
+    if named.is_none() {
+        tell!("no --mode is named: {mode}, which is trained in, level {seed}");
     }
     Ok(level)
 }

@@ -40,7 +40,9 @@ fn advice(game: &dyn Game, experiment: &Experiment, path: &Path) -> String {
     );
     if game.demonstrator().is_some() {
         let file = file("bot.demo");
-        format!("record the game's demonstrator with `playbot record {name} --levels {levels} --out {file}`{rule}")
+        format!(
+            "record the game's demonstrator with `playbot record {name} --levels {levels} --steps 200000 --out {file}`{rule}"
+        )
     } else if game.key_bindings().is_some() {
         let file = file("mine.demo");
         format!("play and record it yourself with `playbot play {name} --levels {levels} --record {file}`{rule}")
@@ -75,7 +77,7 @@ mod tests {
         let shown = played.clone().demonstrator("walker", || 0_u32);
 
         let words = said(&shown, empty);
-        let command = "`playbot record runner --levels default:0..63 --out ";
+        let command = "`playbot record runner --levels default:0..63 --steps 200000 --out ";
         assert!(words.contains(command) && words.contains("bot.demo`"), "{words}");
         assert!(words.contains("training levels") && words.contains("held-out ones, default:64..127"), "{words}");
         let words = said(&shown, &file);

@@ -63,9 +63,8 @@ fn is_missing(error: &FileError) -> bool {
 ///
 /// This program does not have it: with the file that names it, or the nearest name if the command line does.
 pub fn game<'a>(games: &Games<'a>, from: &ExperimentArgs, experiment: &Experiment) -> Result<&'a dyn Game, CliError> {
-    let is_set = ExperimentArgs { experiment: None, set: from.set.clone() }.names_game();
     match &from.experiment {
-        Some(path) if !is_set => Ok(games.of_file(Artifact::Experiment, path, &experiment.game)?),
+        Some(path) if !from.names_game_itself() => Ok(games.of_file(Artifact::Experiment, path, &experiment.game)?),
         _ => Ok(games.get(&experiment.game)?),
     }
 }
@@ -200,9 +199,9 @@ mod tests {
             &path,
             "`playbot policy export --run ",
         );
-        let from = ExperimentArgs { experiment: None, set: vec!["game=runner".to_owned()] };
+        let from = ExperimentArgs::of_game("runner");
         let error = skills(&path, DeviceKind::default(), &from).map(|_| ()).expect_err("none");
-        names(&error, &path, "`playbot learn-skills --set game=runner --out ");
+        names(&error, &path, "`playbot learn-skills runner --out ");
         let file = folder.path().join("none.demo");
         let error = missing_recording(DemoReader::open(&file).map(|_| ()).expect_err("none"));
         names(&error, &file, "none.demo`");

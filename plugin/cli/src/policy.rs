@@ -92,7 +92,7 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
     }
     prepare(&args.out)?;
     let PolicySource { game, experiment, file } = match (&args.run, &args.skills) {
-        (Some(run), _) => from_run(run, args.checkpoint, games)?,
+        (Some(run), _) => from_run(run, args.checkpoint, args.from.game.as_deref(), games)?,
         (None, Some(skills)) => from_skills(skills, &args.from, games)?,
         (None, None) => return Err(CliError::Usage("nothing to export: name a --run or a --skills file".to_owned())),
     };
@@ -114,8 +114,17 @@ struct PolicySource<'a> {
     file: PolicyFile,
 }
 
-fn from_run<'a>(path: &Path, choice: CheckpointChoice, games: &'a Games) -> Result<PolicySource<'a>, CliError> {
+fn from_run<'a>(
+    path: &Path,
+    choice: CheckpointChoice,
+    named: Option<&str>,
+    games: &'a Games,
+) -> Result<PolicySource<'a>, CliError> {
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
+    if let Some(named) = named.filter(|named| *named != experiment.game) {
+        let (run, own) = (path.display(), &experiment.game);
+        return Err(CliError::Usage(format!("{run} is a run of `{own}`, not of `{named}`: leave the game out")));
+    }
     let game = games.of_file(Artifact::Run, path, &experiment.game)?;
     let checkpoint = open::checkpoint(&run, choice)?;
     let learner = open::learner(&run, info.algorithm, &checkpoint, DeviceKind::default())?;

@@ -9,7 +9,7 @@ use bevy_playbot::unknown_name::UnknownName;
 use indicatif::ProgressBar;
 use playbot_lab::games::Games;
 use playbot_lab::{
-    report::StudyReport,
+    report::{StudyReport, to_svg},
     train::{
         Experiment,
         run_dir::{is_unstarted, write_atomically},
@@ -37,6 +37,7 @@ use super::{
 /// plot say nothing of the machine: the same study gives the same files. Only cost.md says what it took.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
+  playbot study GAME --seeds 1,2,3 --out study
   playbot study --experiment my.ron --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
   playbot study --experiment my.ron --variant full --variant no-kl --out study
@@ -54,7 +55,7 @@ pub struct Args {
     /// Folder for table.md, curves.svg, results.json and cost.md, which are replaced.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// Folder of the runs; `runs/` and the name of the experiment file if none is named.
+    /// Folder of the runs; `runs/` and the name of the experiment file, or else of the game, if none is named.
     #[arg(long, value_name = "FOLDER")]
     runs: Option<PathBuf>,
     /// Go on with the runs that are there: finished ones are not repeated.
@@ -64,7 +65,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     force: bool,
     /// Run nothing: write table.md anew from the results.json that is in the folder.
-    #[arg(long, conflicts_with_all = ["experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
+    #[arg(long, conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
     rewrite: bool,
     #[command(flatten)]
     compute: Compute,
@@ -84,7 +85,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let runs = study_runs(&experiment)?;
     check_games(&runs, &args.from, games)?;
     tell_taken_back(&experiment, &args.from.set);
-    let folder = runs_folder(&args);
+    let folder = runs_folder(&args, &experiment);
     check_folder(&folder, &runs, &args)?;
     check_results(&runs, &args)?;
     for path in [&folder, &args.out] {
@@ -139,14 +140,14 @@ fn all(
         let id = run.id();
         whole.set_message(format!("run {} of {}", index + 1, runs.len()));
         let ended = runner.run(run, &id, |step| whole.set_position(done + step.min(steps(run))))?;
-        let Some((result, curve)) = ended.filter(|_| !interrupt::asked() || index + 1 == runs.len()) else {
+        let Some((result, curves)) = ended.filter(|_| !interrupt::asked() || index + 1 == runs.len()) else {
             return Ok(None);
         };
         done += steps(run);
         whole.set_position(done);
         say(&whole, &format!("{id}: held-out return {:.2} ± {:.2}", result.test.return_mean, result.test.return_se));
         report.results.push(result);
-        report.curves.push(curve);
+        report.curves.push(curves);
     }
     whole.finish_and_clear();
     Ok(Some(report))
@@ -190,8 +191,10 @@ fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
     }
 }
 
-fn runs_folder(args: &Args) -> PathBuf {
-    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or("study".as_ref());
+/// Where the runs are: those of different games lie apart.
+fn runs_folder(args: &Args, experiment: &Experiment) -> PathBuf {
+    let usual = if args.from.names_game() { &experiment.game } else { "study" };
+    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or(usual.as_ref());
     args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
 }
 
@@ -235,13 +238,14 @@ fn write(out: &Path, report: &StudyReport) -> Result<(), CliError> {
     let table = report.to_markdown().map_err(|error| unreadable(&error))?;
     let json = report.to_json().map_err(|error| unreadable(&error))?;
     write_atomically(&out.join("table.md"), table.as_bytes())?;
-    write_atomically(&out.join("curves.svg"), report.chart().to_svg().as_bytes())?;
+    write_atomically(&out.join("curves.svg"), to_svg(&report.charts()).as_bytes())?;
     Ok(write_atomically(&out.join("results.json"), json.as_bytes())?)
 }
 
 /// The command that gives the same files: without what does not change them.
 fn command(args: &Args) -> String {
-    let mut words = vec![format!("{} study", program::name())];
+    let game = args.from.game.iter().map(|game| quoted(game));
+    let mut words: Vec<String> = [format!("{} study", program::name())].into_iter().chain(game).collect();
     let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
     if let Some(path) = &args.from.experiment {
         push("experiment", path.display().to_string());

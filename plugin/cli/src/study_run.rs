@@ -10,7 +10,7 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
-    report::{StudyResult, SuccessCurve, TestResult, TrainingResult, statistics::steps_to_reach},
+    report::{LearningCurves, StudyResult, TestResult, TrainingResult, statistics::steps_to_reach},
     runs::RunCurves,
     train::{
         Experiment, Trainer,
@@ -71,11 +71,11 @@ struct TrainedRun {
     dir: RunDir,
     player: Player,
     training: Option<TrainingResult>,
-    curve: SuccessCurve,
+    curves: LearningCurves,
 }
 
 /// What came of a run; `None` after Ctrl-C.
-pub type Ended = Option<(StudyResult, SuccessCurve)>;
+pub type Ended = Option<(StudyResult, LearningCurves)>;
 
 impl<'a> Runner<'a> {
     pub fn new(
@@ -101,7 +101,7 @@ impl<'a> Runner<'a> {
         end_replacement(&folder)?;
         let is_saved = self.is_saved(run, &folder)?;
         if is_saved && let Some(result) = known_result(&folder.join(RESULT)) {
-            return Ok(Some((result, success_curve(&folder)?)));
+            return Ok(Some((result, learning_curves(&folder)?)));
         }
         disk::create_dir_all(&folder)
             .map_err(|error| CliError::Io(format!("cannot create {}: {error}", folder.display())))?;
@@ -111,7 +111,7 @@ impl<'a> Runner<'a> {
         // Nobody else writes there until the result is written.
         let trained = self.player(game, run, dir, title, on_step)?;
         clock.note(&folder)?;
-        let Some(TrainedRun { dir: _dir, player, training, curve }) = trained else { return Ok(None) };
+        let Some(TrainedRun { dir: _dir, player, training, curves }) = trained else { return Ok(None) };
         let experiment = &run.experiment;
         let plan = EvalPlan::of(experiment, &experiment.test, self.threads);
         let measured = methods::measure(game, &run.id(), &player, &plan)?;
@@ -123,7 +123,7 @@ impl<'a> Runner<'a> {
             test: TestResult::from(&measured.summary),
         };
         write_sealed(&folder.join(RESULT), &result)?;
-        Ok(Some((result, curve)))
+        Ok(Some((result, curves)))
     }
 
     /// Opens the demonstrations of all runs that have yet to learn from some, so that nothing is begun if those of another cannot
@@ -233,7 +233,7 @@ impl<'a> Runner<'a> {
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
             let player = cloning(skills, experiment, draw);
-            return Ok(Some(TrainedRun { dir, player, training: None, curve: Vec::new() }));
+            return Ok(Some(TrainedRun { dir, player, training: None, curves: LearningCurves::default() }));
         }
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
@@ -245,8 +245,8 @@ impl<'a> Runner<'a> {
         }
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
         let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
-        let curve = success_curve(dir.path())?;
-        Ok(Some(TrainedRun { dir, player, training, curve }))
+        let curves = learning_curves(dir.path())?;
+        Ok(Some(TrainedRun { dir, player, training, curves }))
     }
 
     /// The skill model of a run, learned once for all runs that share it; `None` after Ctrl-C.
@@ -286,9 +286,11 @@ fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<Tr
     })
 }
 
-/// The success rate of the last 100 training episodes, from the metrics of a run; empty if it was not trained.
-fn success_curve(run: &Path) -> Result<SuccessCurve, CliError> {
-    Ok(RunCurves::read(run)?.curve(SUCCESS_RATE).to_vec())
+/// What was learned, from the metrics of a run.
+fn learning_curves(run: &Path) -> Result<LearningCurves, CliError> {
+    let curves = RunCurves::read(run)?;
+    let of = |tag| curves.curve(tag).to_vec();
+    Ok(LearningCurves { success: of(SUCCESS_RATE), returns: of(EPISODIC_RETURN) })
 }
 
 /// The result of a run that was measured. A damaged one is measured again.

@@ -12,7 +12,7 @@ use playbot_lab::{
     train::{
         Algorithm, Experiment, LearnerKind, TrainError, Trainer, UpdateReport,
         checkpoint::CheckpointChoice,
-        run_dir::{OpenedRun, RunDir},
+        run_dir::{OpenedRun, RunDir, check_new},
     },
 };
 
@@ -32,7 +32,7 @@ pub use new_run::{create_run, run_info};
 /// Train a policy, headless, over the experiment's training levels.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot train --skills skills.safetensors --run runs/first
+  playbot train GAME --skills skills.safetensors --run runs/first
   playbot train --algorithm ppo --run runs/baseline --steps 200000
   playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.hidden=[64,64]
   playbot train --run runs/first --resume
@@ -125,11 +125,18 @@ pub fn tell_length(experiment: &Experiment) {
 
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = args.from.load(games, args.settings())?;
+    check_new(&args.run, args.force)?;
     let game = open::game(games, &args.from, &experiment)?;
     // Levels are checked by the trainer, which takes longer.
     experiment.check_memory(game).map_err(|error| args.from.locate(games, args.settings(), error))?;
     let skills = match &args.skills {
-        Some(path) => Some(open::skills(path, args.compute.device(), &args.from)?),
+        Some(path) if experiment.algorithm.needs_skills() => {
+            Some(open::skills(path, args.compute.device(), &args.from)?)
+        }
+        Some(path) => {
+            tell!("{} learns without skills, so that {} is not used", experiment.algorithm, path.display());
+            None
+        }
         None => None,
     };
     let (device, threads) = (args.compute.device(), args.compute.threads());

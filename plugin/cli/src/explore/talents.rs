@@ -30,7 +30,7 @@ impl Talents {
     pub fn skills(path: &Path, game: &dyn Game, games: &Games, device: DeviceKind) -> Result<Self, CliError> {
         let model = SkillModel::load(path, device)?;
         // The game is named, so that nobody is told to name an experiment.
-        let named = ExperimentArgs { experiment: None, set: vec![format!("game={}", game.name())] };
+        let named = ExperimentArgs::of_game(game.name());
         let observation_config = check_skills(path, &model, game, &named, games)?;
         let horizon = usual_experiment(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
         let source = SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw: SkillDraw::Sample };

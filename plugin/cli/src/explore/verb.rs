@@ -123,8 +123,14 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     };
     let exploration = search(game, &plan)?;
-    print(&exploration.summary(game), &exploration, &args)?;
-    let way = wanted(&exploration, args.cell.as_ref());
+    let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
+    print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
+    let is_missed = matches!(to_cell, Some((_, None)));
+    let way = match to_cell {
+        Some((_, way)) => way,
+        None => exploration.solution(),
+    };
+    let way = way.filter(|route| !route.is_empty());
     // Last: what was found is not lost because it cannot be written.
     if let Some(recording) = recording {
         match &way {
@@ -132,14 +138,13 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
                 recording.write(game, &exploration, route)?;
                 tell!("recorded: {}, {} ticks", recording.path().display(), route.len());
             }
-            None => tell!("nothing is recorded: {}", why_nothing(args.cell.as_ref())),
+            None => tell!("nothing is recorded: {}", why_nothing(args.cell.as_ref(), is_missed)),
         }
     }
     if let Some((file, floor_plan)) = floor {
         file.write(&chart(game, floor_plan, &exploration, way.as_ref())?.draw())?;
         tell!("drawn: {}", file.path().display());
     }
-    let is_missed = args.cell.as_ref().is_some_and(|cell| !exploration.cells().contains_key(cell));
     Ok(match (exploration.stop, exploration.solution_ticks()) {
         (Stop::Asked, _) => Outcome::Stopped,
         (_, None) if exploration.has_goal => Outcome::Findings,
@@ -149,9 +154,13 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 }
 
 /// Prints what was found, and of a cell that was asked for how soon it is reached.
-fn print(summary: &ExplorationSummary, exploration: &Exploration, args: &Args) -> Result<(), CliError> {
-    let ticks = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell).map(|route| route.len())));
-    if args.json {
+fn print(
+    summary: &ExplorationSummary,
+    to_cell: Option<&(&Cell, Option<Route>)>,
+    as_json: bool,
+) -> Result<(), CliError> {
+    let ticks = to_cell.map(|(cell, way)| (cell, way.as_ref().map(|route| route.len())));
+    if as_json {
         let mut line = serde_json::to_value(summary)
             .map_err(|error| CliError::Io(format!("the summary cannot be written as JSON: {error}")))?;
         if let Some((cell, ticks)) = ticks {
@@ -225,18 +234,10 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
     Ok(explored?)
 }
 
-/// The way to a cell, or the solution.
-fn wanted(exploration: &Exploration, cell: Option<&Cell>) -> Option<Route> {
-    let way = match cell {
-        Some(cell) => exploration.route_to(cell),
-        None => exploration.solution(),
-    };
-    way.filter(|route| !route.is_empty())
-}
-
-fn why_nothing(cell: Option<&Cell>) -> String {
+fn why_nothing(cell: Option<&Cell>, is_missed: bool) -> String {
     match cell {
-        Some(cell) => format!("cell {cell} was not reached, or the level starts in it"),
+        Some(cell) if is_missed => format!("cell {cell} was not reached"),
+        Some(cell) => format!("the level starts in cell {cell}"),
         None => "no solution was found; with --cell the way to a cell is recorded".to_owned(),
     }
 }

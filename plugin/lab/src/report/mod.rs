@@ -47,7 +47,7 @@ pub use paired::PairedDifference;
 pub use result::{ResultRow, ResultTable};
 pub use scatter::draw_scatters;
 pub use sparkline::sparkline;
-pub use study::{StudyReport, StudyResult, SuccessCurve, TestResult, TrainingResult};
+pub use study::{LearningCurves, StudyReport, StudyResult, TestResult, TrainingResult};
 pub use study_table::markdown_table;
 pub use svg::to_svg;
 pub use table::{PlainTable, Table};

@@ -15,8 +15,14 @@ use crate::{
     },
 };
 
-/// A learning curve: steps and success rates over the last 100 training episodes.
-pub type SuccessCurve = Vec<(u64, f64)>;
+/// What a run learned, over its environment steps: means over the last 100 training episodes. Empty without training.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LearningCurves {
+    /// Steps and success rates.
+    pub success: Vec<(u64, f64)>,
+    /// Steps and returns.
+    pub returns: Vec<(u64, f64)>,
+}
 
 /// What one run of a study came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -89,9 +95,9 @@ pub struct StudyReport {
     pub experiment: Experiment,
     /// The runs, variant by variant.
     pub results: Vec<StudyResult>,
-    /// The learning curve of each run, in the same order; empty without training.
+    /// The learning curves of each run, in the same order.
     #[serde(skip)]
-    pub curves: Vec<SuccessCurve>,
+    pub curves: Vec<LearningCurves>,
 }
 
 impl StudyReport {
@@ -121,11 +127,24 @@ impl StudyReport {
         PairedDifference::of(&self.level_returns(variant), &self.level_returns(other))
     }
 
-    /// Success over steps: the mean of each variant that was trained, with its interval over the seeds.
-    pub fn chart(&self) -> Chart {
+    /// Success and return over steps: the mean of each variant that was trained, with its interval over the seeds.
+    pub fn charts(&self) -> [Chart; 2] {
+        [
+            self.chart("success", "success rate", range_of(SUCCESS_RATE), |curves| &curves.success),
+            self.chart("return", "mean return", None, |curves| &curves.returns),
+        ]
+    }
+
+    fn chart(
+        &self,
+        what: &str,
+        mean_of: &str,
+        y_range: Option<(f64, f64)>,
+        curve: impl Fn(&LearningCurves) -> &Vec<(u64, f64)>,
+    ) -> Chart {
         let curves = self.variants().into_iter().filter_map(|variant| {
             let runs = self.results.iter().zip(&self.curves).filter(|(result, _)| result.variant == variant);
-            let seeds: Vec<SuccessCurve> = runs.map(|(_, curve)| curve.clone()).filter(|c| !c.is_empty()).collect();
+            let seeds: Vec<_> = runs.map(|(_, curves)| curve(curves).clone()).filter(|c| !c.is_empty()).collect();
             if seeds.is_empty() {
                 return None;
             }
@@ -135,11 +154,11 @@ impl StudyReport {
             Some(if seeds.len() > 1 { line.with_band(band) } else { line })
         });
         Chart {
-            title: format!("{}: success in training on {}", self.experiment.game, self.experiment.train),
+            title: format!("{}: {what} in training on {}", self.experiment.game, self.experiment.train),
             x_label: "environment steps".to_owned(),
-            y_label: "success rate of the last 100 training episodes, mean and 95 % interval over the seeds".to_owned(),
+            y_label: format!("{mean_of} of the last 100 training episodes, mean and 95 % interval over the seeds"),
             curves: curves.collect(),
-            y_range: range_of(SUCCESS_RATE),
+            y_range,
             marks: Vec::new(),
         }
     }

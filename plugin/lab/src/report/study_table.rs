@@ -20,7 +20,7 @@ impl StudyReport {
         let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
         page += &self.differences();
         page += &self.intervals();
-        page += "![Success over environment steps](curves.svg)\n\n## Each seed\n\n";
+        page += "![Learning curves](curves.svg)\n\n## Each seed\n\n";
         let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
         page += "## The experiment\n\n";
         for variant in &experiment.variants {
@@ -146,9 +146,15 @@ mod tests {
 
     use super::*;
     use crate::{
-        report::study::TestResult,
+        report::study::{LearningCurves, TestResult},
         train::{Algorithm, config_file::parse_experiment},
     };
+
+    /// What a run learned after 512 and 1,024 steps.
+    fn learned(success: [f64; 2], returns: [f64; 2]) -> LearningCurves {
+        let over = |values: [f64; 2]| [512, 1024].into_iter().zip(values).collect();
+        LearningCurves { success: over(success), returns: over(returns) }
+    }
 
     fn report() -> StudyReport {
         let text = r#"(game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused", steps: 2048,
@@ -182,7 +188,12 @@ mod tests {
                 run("cloned", 1, None, 0.5, 5.0),
                 run("cloned", 2, None, 0.5, 5.0),
             ],
-            curves: vec![vec![(512, 0.2), (1024, 0.8)], vec![(512, 0.4), (1024, 0.6)], vec![], vec![]],
+            curves: vec![
+                learned([0.2, 0.8], [2.0, 8.0]),
+                learned([0.4, 0.6], [4.0, 6.0]),
+                LearningCurves::default(),
+                LearningCurves::default(),
+            ],
         }
     }
 
@@ -229,12 +240,15 @@ mod tests {
     }
 
     #[test]
-    fn the_chart_has_the_trained_variants_with_their_spread() {
-        let chart = report().chart();
-        let [full] = &chart.curves[..] else { panic!("one curve, not {}", chart.curves.len()) };
-        assert_eq!(full.label, "full");
+    fn the_charts_have_the_trained_variants_with_their_spread() {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        assert!(full.points.iter().zip([(512.0, 0.3), (1024.0, 0.7)]).all(|(a, b)| near(a.0, b.0) && near(a.1, b.1)));
-        assert_eq!(full.band.as_ref().map(|band| band[1]), Some((0.6, 0.8)));
+        for (chart, scale) in report().charts().iter().zip([1.0, 10.0]) {
+            let [full] = &chart.curves[..] else { panic!("one curve, not {}", chart.curves.len()) };
+            assert_eq!(full.label, "full");
+            let means = [(512.0, 0.3 * scale), (1024.0, 0.7 * scale)];
+            assert!(full.points.iter().zip(means).all(|(a, b)| near(a.0, b.0) && near(a.1, b.1)), "{:?}", full.points);
+            let (low, high) = full.band.as_ref().expect("two seeds")[1];
+            assert!(near(low, 0.6 * scale) && near(high, 0.8 * scale), "{low} to {high}");
+        }
     }
 }

@@ -140,6 +140,25 @@ pub fn check_replaceable(path: &Path) -> Result<(), RunError> {
     Err(RunError::NotARun(path.into()))
 }
 
+/// Whether a run may be made in a folder, asked before it has taken long to get ready for it.
+///
+/// # Errors
+///
+/// [`RunError::Exists`] for a run unless `force`, [`RunError::NotARun`] for what is none, [`RunError::Io`] if an unfinished
+/// replacement cannot be ended.
+pub fn check_new(path: &Path, force: bool) -> Result<(), RunError> {
+    end_replacement(path)?;
+    if !path.exists() {
+        return Ok(());
+    }
+    check_replaceable(path)?;
+    match (force || is_free(path), is_unstarted(path)) {
+        (true, _) => Ok(()),
+        (false, true) => Err(RunError::NotARun(path.into())),
+        (false, false) => Err(RunError::Exists(path.into())),
+    }
+}
+
 /// Whether a folder holds at most what is written before `run.json`.
 pub fn is_unstarted(path: &Path) -> bool {
     let first = |name: &str| {

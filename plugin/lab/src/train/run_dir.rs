@@ -25,7 +25,7 @@ use super::{
     missing_run::check_is_run,
     passed_over::passed_over,
     progress::Progress,
-    replaced_run::{ReplacedRun, is_free},
+    replaced_run::ReplacedRun,
     run_error::{FOLDER, unreadable},
     run_lock::RunLock,
     sealed_file::{check_text_seal, read_sealed, warn_of_no_seal, write_sealed},
@@ -38,7 +38,7 @@ use crate::game::Game;
 
 pub(super) use super::run_error::{damaged, io_error};
 pub use super::{
-    replaced_run::{check_replaceable, end_replacement, is_unstarted},
+    replaced_run::{check_new, check_replaceable, end_replacement, is_unstarted},
     run_error::{MEND, RunError},
 };
 
@@ -108,14 +108,7 @@ impl RunDir {
     /// [`RunError::Exists`] for a run unless `force`, which replaces it; what is no run is left alone with
     /// [`RunError::NotARun`], and what is in use with [`RunError::Busy`]. [`RunError::Io`] if it cannot be written.
     pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
-        end_replacement(path)?;
-        if path.exists() {
-            check_replaceable(path)?;
-            if !force && !is_free(path) {
-                let is_run = !is_unstarted(path);
-                return Err(if is_run { RunError::Exists(path.into()) } else { RunError::NotARun(path.into()) });
-            }
-        }
+        check_new(path, force)?;
         disk::create_dir_all(path).map_err(io_error(FOLDER, path))?;
         Self::begin(RunLock::take(path)?, experiment, info)
     }

@@ -62,7 +62,8 @@ pub struct PpoConfig {
     /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
     pub weight_decay: f64,
     /// Updates in which only the critic learns: a critic that knows nothing yet would drive a policy that starts as a copy of
-    /// the decoder away from it.
+    /// the decoder away from it. Adam begins anew when the policy does. A weight of the penalty that falls does so from the first
+    /// update on.
     pub critic_warmup: u64,
     /// Changes of images that actor and critic shall not mind (Raileanu et al. 2021, "Automatic data augmentation for
     /// generalization in reinforcement learning", DrAC); all of them at once, and none if empty.

@@ -6,8 +6,9 @@ use super::metrics::Has;
 use super::objective::gae;
 use super::on_device::{Reports, SentRollout};
 use super::step::{Moment, step_in_parts};
-use super::{PpoLearner, StepMetrics, UpdateMetrics, explained_variance};
+use super::{PpoConfig, PpoLearner, StepMetrics, UpdateMetrics, explained_variance};
 use crate::device::{is_host, update_on};
+use crate::nn::{Adam, AdamConfig};
 use crate::policy::StateBatch;
 use crate::rng::ChaCha8Rng;
 use crate::score::TeacherOutput;
@@ -54,6 +55,7 @@ impl PpoLearner {
         let lr = config.lr_at(self.base.updates);
         let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
         let is_warming_up = self.base.updates < config.critic_warmup;
+        self.prepare_adam();
         let moment = Moment { lr, score: score.as_ref(), is_warming_up };
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
         let sum = if is_host(&self.base.device.plain()) {
@@ -69,6 +71,19 @@ impl PpoLearner {
         let steps = self.config.epochs * self.config.minibatches.min(rollout.rows());
         let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
+    }
+
+    /// While the critic warms up the policy's gradients are zero: its moments stay nothing while their bias correction wears
+    /// off, so that its first steps would be several times as long as they should be. So Adam begins anew with the policy,
+    /// and nothing decays before.
+    fn prepare_adam(&mut self) {
+        let PpoConfig { critic_warmup, weight_decay, .. } = self.config;
+        let is_warming_up = self.base.updates < critic_warmup;
+        let config = AdamConfig { weight_decay: if is_warming_up { 0.0 } else { weight_decay }, ..self.adam.config };
+        if critic_warmup > 0 && self.base.updates == critic_warmup {
+            self.adam = Adam::new(config);
+        }
+        self.adam.config = config;
     }
 
     fn steps(

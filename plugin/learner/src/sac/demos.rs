@@ -64,15 +64,16 @@ impl Demos {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::{RlpdConfig, SacLearner};
     use super::*;
     use crate::{DeviceKind, EndStates, ObsKind};
 
-    const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(1), latent: 0, action_space: ActionSpace::Discrete(2) };
+    pub const SPEC: PolicySpec =
+        PolicySpec { obs: ObsKind::Vector(1), latent: 0, action_space: ActionSpace::Discrete(2) };
 
     /// Episodes of so many environments, which see `sign` times 1, 2, 3, ... and end together.
-    fn episodes(envs: usize, sign: f32, action: u32, rewards: &[f32]) -> Rollout {
+    pub fn episodes(envs: usize, sign: f32, action: u32, rewards: &[f32]) -> Rollout {
         let rows = rewards.len();
         let zeros = || vec![0.0; rows];
         Rollout {

@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn by_default_a_gaussian_tells_states_apart() {
+    fn by_default_a_gaussian_tells_actions_apart() {
         let decoder = HostDist { dim: 1, head: vec![0.0, 0.0], log_std: Some(vec![0.0, 0.0]) };
         let actions = Actions::Continuous { dim: 1, values: vec![0.0, 2.0] };
         let mut rng = Streams::new(1).stream("own", 0);

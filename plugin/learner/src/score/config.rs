@@ -18,13 +18,14 @@ pub enum KlDirection {
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfidenceKind {
     /// [`Self::OwnSample`] for discrete actions, as in the paper, and [`Self::BoundedDensity`] for continuous ones, where
-    /// that would tell nothing.
+    /// that would tell nothing. Where a policy of d dimensions still is the decoder the latter is 2^(-d/2) on average, so that
+    /// the penalty weighs less than with the former.
     Auto,
     /// Always 1.
     Off,
     /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous. The latter
     /// scatters around (1 + 1/d)^(-d/2) for d dimensions in every state, since a Gaussian is equally sure of its own draws
-    /// everywhere: only the other kinds tell states apart there.
+    /// everywhere: the other kinds tell there how far an action that was taken is from what the decoder would do.
     OwnSample,
     /// The same for the action of the rollout.
     PolicyAction,

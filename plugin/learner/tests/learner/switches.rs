@@ -225,7 +225,7 @@ fn heads(learner: &PpoLearner, rollout: &Rollout) -> (Vec<f32>, Vec<f32>) {
 fn while_the_critic_warms_up_the_policy_stays_where_it_is() {
     let model = model(1);
     let rollout = rollout(&model);
-    let config = PpoConfig { critic_warmup: 2, ..corridor::config() };
+    let config = PpoConfig { critic_warmup: 2, weight_decay: 10.0, ..corridor::config() };
     let mut learner =
         PpoLearner::with_skill(config, ScoreConfig::default(), &model, 1, DeviceKind::Flex).expect("good");
     let (start, opinion) = heads(&learner, &rollout);
@@ -237,6 +237,29 @@ fn while_the_critic_warms_up_the_policy_stays_where_it_is() {
     assert!(head == start && values != opinion, "only the critic learns");
     learner.update(&rollout).expect("finite");
     assert_ne!(heads(&learner, &rollout).0, start, "and then both do");
+}
+
+#[test]
+fn a_policy_that_has_waited_for_the_critic_takes_no_longer_steps_for_it() {
+    let model = model(1);
+    let rollout = rollout(&model);
+    // How far the policy goes in the first update in which it learns. Nothing is clipped, since a critic that knows more has
+    // smaller gradients, and rewards are as they are, since their scale changes: that is another matter.
+    let plain = PpoConfig { max_grad_norm: 1e9, adam_eps: 1e-12, norm_reward: false, ..corridor::config() };
+    let moved = |critic_warmup| {
+        let config = PpoConfig { critic_warmup, minibatches: 1, ..plain.clone() };
+        let mut learner =
+            PpoLearner::with_skill(config, ScoreConfig::default(), &model, 1, DeviceKind::Flex).expect("good");
+        for _ in 0..critic_warmup {
+            learner.update(&rollout).expect("finite");
+        }
+        let (start, _) = heads(&learner, &rollout);
+        learner.update(&rollout).expect("finite");
+        let (head, _) = heads(&learner, &rollout);
+        start.iter().zip(&head).map(|(from, to)| (to - from).abs()).sum::<f32>()
+    };
+    let (at_once, later) = (moved(0), moved(100));
+    assert!(later < 1.3 * at_once, "{later} after a warm-up, {at_once} without");
 }
 
 #[test]
