@@ -14,7 +14,7 @@ const TOLD: [(&str, &str, Aspect); 4] = [
 ];
 
 /// What is compared of a variant.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Aspect {
     /// How much entropy is worth.
     Entropy,
@@ -117,12 +117,12 @@ fn every_method_of_a_maze_sees_normalised_numbers_and_looks_as_far_ahead() {
 fn a_variant_that_differs_is_seen() {
     let experiment = read("coinrun-ablation");
     let with = |set: &str| effort(&experiment.with_set(&[set]).expect("a key"));
-    assert!(with("score.kl=false") == effort(&experiment));
+    assert_eq!(with("score.kl=false"), effort(&experiment));
     for set in ["ppo.ent_coef=0.02", "ppo.lr=0.1", "ppo.epochs=9", "ppo.minibatches=16", "ppo.anneal_lr=true"] {
-        assert!(with(set) != effort(&experiment), "{set}");
+        assert_ne!(with(set), effort(&experiment), "{set}");
     }
     for set in ["sac.entropy=Fixed(0.5)", "sac.updates_per_step=0.3"] {
         let sac = |more: &[&str]| effort(&experiment.with_set(&[&["algorithm=sac"], more].concat()).expect("keys"));
-        assert!(sac(&[set]) != sac(&[]), "{set}");
+        assert_ne!(sac(&[set]), sac(&[]), "{set}");
     }
 }

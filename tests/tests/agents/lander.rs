@@ -34,6 +34,7 @@ fn the_lander_goes_the_whole_road() {
     let path = folder.path().join("lander.policy");
     let [learned, random] = lander_example::road(TINY, "moon:128..133", &path).expect("every step works");
     assert_eq!((learned.episodes, random.episodes), (8, 8));
+    assert!(learned.return_mean.is_finite() && learned.length_mean > 1.0, "{learned:?}");
 
     let file = PolicyFile::load(&path, DeviceKind::default()).expect("written");
     check_policy(&lander_example::Lander.card(), &file).expect("made for this game");

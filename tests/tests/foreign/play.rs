@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_playbot::{tick::Tick, vision::ObservationConfig};
 use playbot_lab::{
     demo::{dataset::Demonstrations, verify::verify_file},
-    eval::{EvalPlan, Player, evaluate},
+    eval::{EvalPlan, Player, evaluate, summarize},
     foreign::ForeignGame,
     prelude::*,
     train::{
@@ -32,6 +32,8 @@ fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32,
     let plan = EvalPlan { threads, ..plan("default:0..7") };
     let results = evaluate(game, &player, &plan, |_| {}).expect("can be played");
     assert_eq!(results.len(), 8);
+    let summary = summarize("player", &plan.split, &results);
+    assert!(summary.return_mean.is_finite());
     results.iter().map(|result| (result.level, result.ticks, result.total_reward)).collect()
 }
 

@@ -55,7 +55,7 @@ impl PpoLearner {
         let lr = config.lr_at(self.base.updates);
         let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
         let is_warming_up = self.base.updates < config.critic_warmup;
-        self.prepare_adam();
+        self.prepare_adam(is_warming_up);
         let moment = Moment { lr, score: score.as_ref(), is_warming_up };
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
         let sum = if is_host(&self.base.device.plain()) {
@@ -76,9 +76,8 @@ impl PpoLearner {
     /// While the critic warms up the policy's gradients are zero: its moments stay nothing while their bias correction wears
     /// off, so that its first steps would be several times as long as they should be. So Adam begins anew with the policy,
     /// and nothing decays before.
-    fn prepare_adam(&mut self) {
+    fn prepare_adam(&mut self, is_warming_up: bool) {
         let PpoConfig { critic_warmup, weight_decay, .. } = self.config;
-        let is_warming_up = self.base.updates < critic_warmup;
         let config = AdamConfig { weight_decay: if is_warming_up { 0.0 } else { weight_decay }, ..self.adam.config };
         if critic_warmup > 0 && self.base.updates == critic_warmup {
             self.adam = Adam::new(config);
