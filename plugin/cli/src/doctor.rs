@@ -14,6 +14,7 @@ use playbot_lab::{
 use super::{
     defaults::usual_mode,
     error::{CliError, Outcome, print_line},
+    interrupt::{self, NothingToSave},
     number::at_least_one,
 };
 
@@ -64,11 +65,14 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         ignored: args.ignore,
         ..DoctorOptions::new(mode)
     };
+    interrupt::leave("nothing is kept of what was compared: call it again, or with fewer --ticks".to_owned());
+    let examining = NothingToSave::listen();
     let mut report = examine(game, &options, |comparison| tell!("comparing: {}", comparison.describe()))?;
     let has_fault = report.comparisons.iter().any(|report| report.fault.is_some());
     if !has_fault {
         report.ticks_per_second = Some(speed(game, &options)?);
     }
+    drop(examining);
     if args.json {
         let line = serde_json::to_string(&report)
             .map_err(|error| CliError::Io(format!("the report cannot be written as JSON: {error}")))?;

@@ -30,7 +30,7 @@ use super::{
     footprints::Footprints,
     interrupt::{self, NothingToSave},
     methods, open,
-    player::Chosen,
+    player::{Chosen, check_run_of},
 };
 
 /// Measure policies and baselines, every level equally often.
@@ -176,8 +176,8 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     match (&args.from.experiment, args.run.first()) {
         (None, Some(run)) => {
             let own = RunDir::open(run)?.experiment;
-            if let Some(game) = args.from.game.as_deref().filter(|game| *game != own.game) {
-                return Err(of_other_game(run, &own.game, game));
+            if let Some(game) = &args.from.game {
+                check_run_of(run, &own.game, game)?;
             }
             let experiment = own.with_set(&args.from.sets(options))?;
             experiment.check()?;
@@ -257,9 +257,7 @@ fn check_run(
     measured: &Experiment,
     args: &Args,
 ) -> Result<(), CliError> {
-    if own.game != measured.game {
-        return Err(of_other_game(path, &own.game, &measured.game));
-    }
+    check_run_of(path, &own.game, &measured.game)?;
     let path = path.display();
     if args.levels.is_empty() && HeldOut::new(game, &measured.test).first_of(&own.train).is_some() {
         return Err(CliError::Usage(format!(
@@ -269,13 +267,6 @@ fn check_run(
         )));
     }
     Ok(())
-}
-
-fn of_other_game(run: &Path, own: &str, measured: &str) -> CliError {
-    let run = run.display();
-    CliError::Usage(format!(
-        "{run} is a run of `{own}`, but `{measured}` is measured: measure it by itself with `playbot eval --run {run}`"
-    ))
 }
 
 /// A player, with its path in its name where there are several of its kind.

@@ -55,6 +55,7 @@ impl Measured {
             episodes: summary.episodes as usize,
             return_mean: summary.return_mean,
             return_se: summary.return_se,
+            level_returns: summary.level_returns,
             success: summary.success,
             length_mean: summary.length_mean,
             steps_per_s: Some(self.steps_per_s),

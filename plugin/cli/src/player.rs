@@ -146,6 +146,19 @@ fn does_not_fit(path: &Path, misfit: &PolicyMisfit) -> CliError {
     })
 }
 
+/// Checks that a run is one of the game that is named.
+///
+/// # Errors
+///
+/// It is of another game.
+pub fn check_run_of(path: &Path, own: &str, named: &str) -> Result<(), CliError> {
+    if own == named {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(CliError::Usage(format!("{path}: a run of the game `{own}`, not of `{named}`: {}", way_out("run", own, named))))
+}
+
 /// What to do about something that is of one game where another one was named.
 fn way_out(what: &str, found: &str, named: &str) -> String {
     format!("name a {what} of `{named}`, or name the game `{found}`, in a program that has it")
@@ -167,15 +180,7 @@ impl PlayerArgs {
         }
         let Some(path) = &self.run else { return Ok(None) };
         let OpenedRun { run, experiment, info } = RunDir::open(path)?;
-        if experiment.game != game.name() {
-            return Err(CliError::Usage(format!(
-                "{}: a run of the game `{}`, not of `{}`: {}",
-                path.display(),
-                experiment.game,
-                game.name(),
-                way_out("run", &experiment.game, game.name())
-            )));
-        }
+        check_run_of(path, &experiment.game, game.name())?;
         let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, self.device.device)?;
         chosen.check_fit(game)?;
         Ok(Some(chosen))

@@ -26,6 +26,7 @@ use super::{
     experiment::{ExperimentArgs, quoted},
     open,
     output::prepare,
+    player::check_run_of,
     program, words,
 };
 
@@ -121,9 +122,8 @@ fn from_run<'a>(
     games: &'a Games,
 ) -> Result<PolicySource<'a>, CliError> {
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
-    if let Some(named) = named.filter(|named| *named != experiment.game) {
-        let (run, own) = (path.display(), &experiment.game);
-        return Err(CliError::Usage(format!("{run} is a run of `{own}`, not of `{named}`: leave the game out")));
+    if let Some(named) = named {
+        check_run_of(path, &experiment.game, named)?;
     }
     let game = games.of_file(Artifact::Run, path, &experiment.game)?;
     let checkpoint = open::checkpoint(&run, choice)?;

@@ -96,6 +96,7 @@ fn paper_rows(game: &str) -> Vec<ResultRow> {
         episodes: 0,
         return_mean,
         return_se,
+        level_returns: Vec::new(),
         success: f64::NAN,
         length_mean: f64::NAN,
         steps_per_s: None,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use playbot_lab::{
     detectors::Detectors,
-    findings::{Budget, Checks, FindingFiles},
+    findings::{Budget, Checks, FindingFiles, list_findings},
 };
 
 /// Findings as files.
@@ -27,6 +27,16 @@ impl FindingArgs {
             minimise: self.minimise.then(Budget::default),
             keep_failures: self.keep_failures,
             checks: Checks::default().with_detectors(detectors),
+        }
+    }
+
+    /// Says why no failed episode was written, where that was asked for.
+    pub fn tell_missing(&self, folder: &Path) {
+        if self.keep_failures && list_findings(folder).is_err() {
+            tell!(
+                "no failed episode is kept: it takes a level that no tester solved, and a tester that failed there and leaves \
+                 nothing to chance, such as a policy with --greedy"
+            );
         }
     }
 }

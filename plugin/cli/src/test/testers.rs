@@ -14,7 +14,12 @@ use playbot_lab::{
 };
 use playbot_learner::DeviceKind;
 
-use crate::{error::CliError, named::Named, open, player::Chosen};
+use crate::{
+    error::CliError,
+    named::Named,
+    open,
+    player::{Chosen, check_run_of},
+};
 
 /// Bots, policies and runs.
 #[derive(clap::Args, Clone, Debug)]
@@ -66,14 +71,7 @@ impl TesterArgs {
         }
         for path in &self.run {
             let OpenedRun { run, experiment, info } = RunDir::open(path)?;
-            if experiment.game != game.name() {
-                return Err(CliError::Usage(format!(
-                    "{}: a run of the game `{}`, not of `{}`: name a run of that one",
-                    path.display(),
-                    experiment.game,
-                    game.name()
-                )));
-            }
+            check_run_of(path, &experiment.game, game.name())?;
             let checkpoint = open::checkpoint(&run, self.checkpoint)?;
             let checksum = Some(file_checksum(&checkpoint.learner_file())?);
             // The last one may be another by now, while the run is trained.

@@ -145,7 +145,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         }
         TestEnd::Done => {
             folder.finish()?;
-            tell_results(&results)
+            let outcome = tell_results(&results)?;
+            args.findings.tell_missing(out);
+            Ok(outcome)
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::paired::PairedDifference;
+
 /// What one method reached on one set of levels. NaN stands for a value that is not known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResultRow {
@@ -17,6 +19,9 @@ pub struct ResultRow {
     /// Standard error of that mean, over levels.
     #[serde(deserialize_with = "null_is_nan")]
     pub return_se: f64,
+    /// Mean return on each level, in ascending order of levels; empty where it is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub level_returns: Vec<f64>,
     /// Share of the episodes that succeeded, 0 to 1.
     #[serde(deserialize_with = "null_is_nan")]
     pub success: f64,
@@ -48,7 +53,7 @@ pub struct ResultTable {
 pub(super) enum Rank {
     /// The highest mean return.
     Best,
-    /// Below the best, by less than two standard errors of the difference.
+    /// Below the best, by less than two [standard errors of the difference](error_of_difference).
     CloseToBest,
     /// Clearly below the best, or there is nothing to compare with.
     Other,
@@ -63,16 +68,24 @@ pub(super) fn ranks(rows: &[ResultRow]) -> Vec<Rank> {
             return None;
         }
         let behind = best.return_mean - row.return_mean;
-        let noise = 2.0 * best.return_se.hypot(row.return_se);
-        if row.return_mean >= best.return_mean {
+        if behind <= 0.0 {
             Some(Rank::Best)
-        } else if behind < noise {
+        } else if behind < 2.0 * error_of_difference(best, row) {
             Some(Rank::CloseToBest)
         } else {
             None
         }
     };
     rows.iter().map(|row| rank(row).unwrap_or(Rank::Other)).collect()
+}
+
+/// Standard error of the difference of two mean returns: over levels, in pairs, since what is hard for one is hard for the other,
+/// too; of two independent means where the returns on the levels are not known.
+fn error_of_difference(one: &ResultRow, other: &ResultRow) -> f64 {
+    let in_pairs = PairedDifference::of(&[&one.level_returns], &[&other.level_returns]);
+    // A single level says nothing about how levels differ.
+    let in_pairs = in_pairs.filter(|difference| difference.levels > 1);
+    in_pairs.map_or_else(|| one.return_se.hypot(other.return_se), |difference| difference.se)
 }
 
 /// The key to the signs of [`Rank`], for the signs that occur.
@@ -95,6 +108,7 @@ pub(super) fn sample_rows() -> Vec<ResultRow> {
         episodes: 500,
         return_mean,
         return_se,
+        level_returns: Vec::new(),
         success,
         length_mean: 83.25,
         steps_per_s,
@@ -123,6 +137,22 @@ mod tests {
         rows[0].return_mean = rows[1].return_mean;
         assert_eq!(ranks(&rows)[..2], [Best, Best], "a tie");
         assert_eq!(ranks(&[]), []);
+    }
+
+    #[test]
+    fn what_levels_do_to_both_is_no_noise() {
+        use Rank::*;
+        let mut rows = sample_rows();
+        rows.truncate(2);
+        let [levels, behind] = [[0.0, 9.0, 1.0, 10.0], [0.01, 0.02, 0.01, 0.02]];
+        rows[0].level_returns = levels.to_vec();
+        rows[1].level_returns = levels.iter().zip(behind).map(|(level, behind)| level - behind).collect();
+        (rows[0].return_mean, rows[1].return_mean) = (5.0, 4.985);
+        assert_eq!(ranks(&rows), [Best, Other], "behind on every level, by little");
+        rows[1].level_returns = vec![1.0, 8.0, 0.0, 10.94];
+        assert_eq!(ranks(&rows), [Best, CloseToBest], "now before, now behind");
+        rows[1].level_returns.pop();
+        assert_eq!(ranks(&rows), [Best, CloseToBest], "of other levels: each with its own error");
     }
 
     #[test]
