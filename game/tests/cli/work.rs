@@ -102,7 +102,7 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     std::fs::write(&saved, text).expect("writable");
     let foreign = eval(&["--levels", "hard:64..65"]);
     assert_eq!(code(&foreign), 3);
-    assert!(errors(&foreign).contains("runs/b is a run of `maze`"), "{}", errors(&foreign));
+    assert!(errors(&foreign).contains("runs/b: a run of the game `maze`, not of `coinrun`: name a run"), "{}", errors(&foreign));
 
     let quick = ok(run(&["quickstart", "--experiment", "tiny.ron", "--run", "runs/quick", "--json"]));
     let methods: Vec<_> = lines(&quick).iter().filter_map(|row| row["method"].as_str().map(str::to_owned)).collect();
