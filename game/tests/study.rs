@@ -234,6 +234,14 @@ fn the_table_follows_from_the_results() {
     let rewrite = || playbot(folder, &["study", "--out", "out", "--rewrite"]);
     ok(rewrite());
     assert!(fs::read(&table).expect("written again") == written);
+    // Nothing is trained in behaviour cloning: whoever asks for its policy is told where it is.
+    let cloned = playbot(folder, &["eval", "--run", "runs/cloned-seed1"]);
+    let words = errors(&cloned);
+    let skills = words.split("--skills ").last().and_then(|rest| rest.split('`').next()).expect("a file");
+    refused(&cloned, "runs/cloned-seed1 is a run of bc, which trains nothing and has no checkpoint");
+    ok(playbot(folder, &["eval", "--experiment", "tiny.ron", "--skills", skills]));
+    let curves = fs::read_to_string(folder.join("out/curves.svg")).expect("written");
+    assert!(curves.contains("the last 100 training episodes, mean and range of the seeds"), "{curves}");
     // What a variant sets itself stays as it is, and somebody who sets it is told.
     let set = study(folder, "others", &["--variant", "cloned", "--set", "algorithm=ppo", "--force"]);
     assert!(errors(&set).contains("--set algorithm=ppo does not change cloned"), "{}", errors(&set));

@@ -96,13 +96,21 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     for words in ["runs/b was trained on hard:64..65", "held-out levels hard:64..65", "--levels"] {
         assert!(errors(&seen).contains(words), "{}", errors(&seen));
     }
-    assert_eq!(lines(&ok(eval(&["--levels", "hard:64..65"]))).len(), 2, "on purpose");
+    let on_purpose = ok(eval(&["--levels", "hard:64..65"]));
+    assert_eq!(lines(&on_purpose).len(), 2);
+    let told =
+        "runs/b was trained on hard:64..65, and the levels hard:64..65 have some of these: not all of them are unseen";
+    assert!(errors(&on_purpose).contains(told), "{}", errors(&on_purpose));
     let saved = folder.path().join("runs/b/experiment.ron");
     let text = unsealed(&std::fs::read_to_string(&saved).expect("written")).replace("\"coinrun\"", "\"maze\"");
     std::fs::write(&saved, text).expect("writable");
     let foreign = eval(&["--levels", "hard:64..65"]);
     assert_eq!(code(&foreign), 3);
-    assert!(errors(&foreign).contains("runs/b: a run of the game `maze`, not of `coinrun`: name a run"), "{}", errors(&foreign));
+    assert!(
+        errors(&foreign).contains("runs/b: a run of the game `maze`, not of `coinrun`: name a run"),
+        "{}",
+        errors(&foreign)
+    );
 
     let quick = ok(run(&["quickstart", "--experiment", "tiny.ron", "--run", "runs/quick", "--json"]));
     let methods: Vec<_> = lines(&quick).iter().filter_map(|row| row["method"].as_str().map(str::to_owned)).collect();
@@ -115,4 +123,50 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     std::fs::write(folder.path().join("not.safetensors"), b"nothing of the kind").expect("writable");
     let foreign = run(&["eval", "--skills", "not.safetensors"]);
     assert_eq!(code(&foreign), 3, "{}", errors(&foreign));
+}
+
+#[test]
+fn skills_remember_the_levels_that_they_were_learned_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| playbot(folder.path(), args);
+    let config = r#"(
+        game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "a.demo", steps: 128, arenas: 8, worlds: 2,
+        skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+        ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
+        eval: (episodes_per_level: 1),
+    )"#;
+    std::fs::write(folder.path().join("tiny.ron"), config).expect("writable");
+    let with = |verb: &str, more: &[&str]| {
+        let output = run(&[&[verb, "--experiment", "tiny.ron"], more].concat());
+        (code(&output), errors(&output))
+    };
+    let (skills, shown) = (["--skills", "skills.safetensors"], "skills.safetensors");
+    assert_eq!(code(&run(&["record", "coinrun", "--levels", "hard:8..11", "--out", "a.demo"])), 0);
+    assert_eq!(with("learn-skills", &["--out", shown]).0, 0);
+
+    let other = ["--set", "test=hard:10..20", "--run", "runs/a"];
+    let (refused, words) = with("train", &[&skills[..], &other].concat());
+    assert_eq!(refused, 3, "{words}");
+    for part in [shown, "demonstrations of hard:8..11", "held-out levels hard:10..20"] {
+        assert!(words.contains(part), "{words}");
+    }
+    assert!(!folder.path().join("runs/a").exists(), "no run is begun");
+    let (refused, words) = with("eval", &[&skills[..], &["--set", "test=hard:11..12"]].concat());
+    assert!(refused == 3 && words.contains("shares levels with the held-out levels hard:11..12"), "{words}");
+    let (measured, words) = with("eval", &[&skills[..], &["--levels", "hard:11..12"]].concat());
+    assert!(measured == 0 && words.contains("not all of them are unseen"), "{words}");
+
+    let export = ["policy", "export", "--experiment", "tiny.ron", "--skills", shown, "--out", "bc.policy"];
+    assert_eq!(code(&run(&export)), 0);
+    let card = run(&["policy", "show", "bc.policy"]);
+    assert!(said(&card).contains("demonstrations of hard:8..11"), "{}", said(&card));
+
+    // What the skills were learned with is what the run has, however it is asked for.
+    let train = [&skills[..], &["--set", "skills.latent=4", "--run", "runs/b"]].concat();
+    let (trained, words) = with("train", &train);
+    let told = "`--set skills.latent=4` asks for skills.latent=4, and the skill model, which was learned before, has 2";
+    assert!(trained == 0 && words.contains(told), "{words}");
+    let saved = std::fs::read_to_string(folder.path().join("runs/b/experiment.ron")).expect("written");
+    assert!(saved.contains("latent: 2") && !saved.contains("latent: 4"), "{saved}");
+    assert_eq!(with("train", &[&train[..], &["--resume", "--steps", "256"]].concat()).0, 0);
 }

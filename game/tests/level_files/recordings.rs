@@ -68,4 +68,15 @@ fn learning_refuses_recordings_of_held_out_files() {
     let output = playbot(folder, &args);
     assert_eq!(code(&output), 3, "{}", errors(&output));
     assert!(errors(&output).contains("held-out levels files:held/*.json:0..0"), "{}", errors(&output));
+
+    // Skills that were learned on it elsewhere are not measured there either.
+    let small = ["epochs=1", "window=5", "hidden=[8]", "encoder_hidden=8", "gru_hidden=8", "latent=2"];
+    let small = small.map(|setting| format!("skills.{setting}"));
+    let sets = small.iter().flat_map(|setting| ["--set", setting]);
+    let learn: Vec<_> =
+        ["learn-skills", "--demos", "a.demo", "--out", "s.safetensors"].into_iter().chain(sets).collect();
+    done(folder, &learn);
+    let output = playbot(folder, &["eval", "--skills", "s.safetensors", "--set", "test=files:held/*.json"]);
+    assert_eq!(code(&output), 3, "{}", errors(&output));
+    assert!(errors(&output).contains("learned from demonstrations of the level file of hash"), "{}", errors(&output));
 }

@@ -57,6 +57,21 @@ fn what_recordings_earn_is_what_the_game_pays_now() {
 }
 
 #[test]
+fn recordings_that_earn_nothing_are_named_before_a_run_begins() {
+    let folder = prepared();
+    let folder = folder.path();
+    let (_, words) = ended(folder, &training("demos=played", "runs/played"), 0);
+    assert!(words.contains("recordings are of easy, and hard is trained: they earn what easy pays"), "{words}");
+    done(
+        folder,
+        &["record", "coinrun", "--bot", "random", "--levels", "easy:0..0", "--steps", "20", "--out", "poor/a.demo"],
+    );
+    let (_, words) = ended(folder, &training("demos=poor", "runs/poor"), 3);
+    assert!(words.contains("poor: nothing in these recordings is ever rewarded, and rlpd learns from"), "{words}");
+    assert!(!folder.join("runs/poor").exists(), "no run is begun");
+}
+
+#[test]
 fn recordings_of_another_game_are_named_and_nothing_is_lost() {
     let folder = prepared();
     let folder = folder.path();

@@ -7,6 +7,7 @@ use bevy_playbot::{
     vision::{ObservationConfig, ObservationKind},
 };
 use playbot_lab::{
+    demo::demo_card::shown_by_demos,
     eval::{EvalPlan, Player},
     game::Game,
     games::{Artifact, Games},
@@ -204,13 +205,17 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
     let mut players = Vec::new();
     for path in &args.run {
         let OpenedRun { run, experiment: own, info } = RunDir::open(path)?;
-        check_run(path, game, &own, experiment, args)?;
+        check_run_of(path, &own.game, &experiment.game)?;
+        let seen = |split: &LevelSplit| HeldOut::new(game, split).first_of(&own.train).map(|_| own.train.to_string());
+        check_unseen(path, "was trained on", seen, experiment, args)?;
         let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.compute.device())?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
         let model = open::skills(path, args.compute.device(), &args.from)?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
+        let seen = |split: &LevelSplit| shown_by_demos(&model, game, split);
+        check_unseen(path, "was learned from demonstrations of", seen, experiment, args)?;
         let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
         players.push(named(chosen, path, args.skills.len()));
     }
@@ -249,22 +254,27 @@ fn look_through(
     Ok(())
 }
 
-/// A run is measured in its own game, and on levels it was trained on only if somebody names them.
-fn check_run(
+/// What was learned in `path` is measured on levels that it has seen only if somebody names them. `seen` says which of a split those
+/// are.
+fn check_unseen(
     path: &Path,
-    game: &dyn Game,
-    own: &Experiment,
+    learned_on: &str,
+    seen: impl Fn(&LevelSplit) -> Option<String>,
     measured: &Experiment,
     args: &Args,
 ) -> Result<(), CliError> {
-    check_run_of(path, &own.game, &measured.game)?;
     let path = path.display();
-    if args.levels.is_empty() && HeldOut::new(game, &measured.test).first_of(&own.train).is_some() {
+    if args.levels.is_empty()
+        && let Some(own) = seen(&measured.test)
+    {
         return Err(CliError::Usage(format!(
-            "{path} was trained on {}, which shares levels with the held-out levels {}: choose levels that none of the \
-             runs has seen, or measure there on purpose, with --levels",
-            own.train, measured.test
+            "{path} {learned_on} {own}, which shares levels with the held-out levels {}: choose levels that none of the players has \
+             seen, or measure there on purpose, with --levels",
+            measured.test
         )));
+    }
+    for (split, own) in args.levels.iter().filter_map(|split| Some((split, seen(split)?))) {
+        tell!("{path} {learned_on} {own}, and the levels {split} have some of these: not all of them are unseen");
     }
     Ok(())
 }

@@ -13,6 +13,7 @@ use playbot_lab::{
     train::{
         Algorithm, Experiment, TrainedLearner,
         checkpoint::{self, Checkpoint, CheckpointChoice},
+        checksum::file_checksum,
         run_dir::{MEND, RunDir},
     },
 };
@@ -69,17 +70,35 @@ pub fn game<'a>(games: &Games<'a>, from: &ExperimentArgs, experiment: &Experimen
     }
 }
 
-/// A checkpoint of a run. Says which one is the best, and on what grounds.
+/// A checkpoint of a run of an algorithm. Says which one is the best, and on what grounds.
 ///
 /// # Errors
 ///
-/// There is none.
-pub fn checkpoint(run: &RunDir, choice: CheckpointChoice) -> Result<Checkpoint, CliError> {
+/// There is none: where nothing is trained, with what plays instead.
+pub fn checkpoint(run: &RunDir, algorithm: Algorithm, choice: CheckpointChoice) -> Result<Checkpoint, CliError> {
+    if !algorithm.is_trained() {
+        return Err(CliError::Usage(format!(
+            "{} is a run of {algorithm}, which trains nothing and has no checkpoint: what plays is its skill model; name that with \
+             --skills, as in `--skills {}`",
+            run.path().display(),
+            shown(&skills_beside(run.path()))
+        )));
+    }
     let checkpoint = run.checkpoint(choice)?;
     if choice == CheckpointChoice::Best {
         tell!("{}", best(run.path(), &checkpoint));
     }
     Ok(checkpoint)
+}
+
+/// The skill model that a run began with, if it lies in the same folder as the run, as in a study; else a name that it may have.
+fn skills_beside(run: &Path) -> PathBuf {
+    let wanted = RunDir::open(run).ok().and_then(|opened| opened.info.skills);
+    let study = run.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let files = std::fs::read_dir(study).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut models = files.filter(|file| file.extension().is_some_and(|ending| ending == "safetensors"));
+    let own = models.find(|file| wanted.is_some() && file_checksum(file).ok() == wanted);
+    own.unwrap_or_else(|| "skills.safetensors".into())
 }
 
 /// What a run had learned at a checkpoint.

@@ -106,7 +106,7 @@ impl Chosen {
         draw: ActionDraw,
         device: DeviceKind,
     ) -> Result<Self, CliError> {
-        let learner = open::learner(run, algorithm, &open::checkpoint(run, checkpoint)?, device)?;
+        let learner = open::learner(run, algorithm, &open::checkpoint(run, algorithm, checkpoint)?, device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
         let player = Player::Policy { policy: learner.policy(), prior, draw };
         Ok(Self { name: algorithm.name().to_owned(), player, observation_config: experiment.observation_config() })

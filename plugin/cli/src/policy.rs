@@ -22,6 +22,7 @@ use serde_json::json;
 use super::{
     cloning::{check_skills, cloning_skills},
     compute::Device,
+    differences::in_words,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
     open,
@@ -126,7 +127,7 @@ fn from_run<'a>(
         check_run_of(path, &experiment.game, named)?;
     }
     let game = games.of_file(Artifact::Run, path, &experiment.game)?;
-    let checkpoint = open::checkpoint(&run, choice)?;
+    let checkpoint = open::checkpoint(&run, info.algorithm, choice)?;
     let learner = open::learner(&run, info.algorithm, &checkpoint, DeviceKind::default())?;
     let training = format!(
         "{} of {} steps on {}, seed {}",
@@ -148,9 +149,10 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     let game = open::game(games, from, &experiment)?;
     let model = open::skills(path, DeviceKind::default(), from)?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
-    let training = match &experiment.demos {
-        Some(demos) => format!("demonstrations in {}", demos.display()),
-        None => "demonstrations".to_owned(),
+    let training = match (model.demos(), &experiment.demos) {
+        (Some(card), _) => format!("demonstrations of {}", in_words(card.levels.clone())),
+        (None, Some(demos)) => format!("demonstrations in {}", demos.display()),
+        (None, None) => "demonstrations".to_owned(),
     };
     let about = Provenance { algorithm: "bc".to_owned(), training, code };
     let observation_config = check_skills(path, &model, game, from, games)?;

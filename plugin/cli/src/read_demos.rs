@@ -51,12 +51,27 @@ pub fn read_rollouts(
     }
     experiment.check()?;
     let _replaying = NothingToSave::listen();
-    let demos = demonstrations(game, experiment, &from.recordings(experiment, games)?)?;
+    let path = from.recordings(experiment, games)?;
+    let demos = demonstrations(game, experiment, &path)?;
     tell!();
+    let trained = experiment.train.mode.as_str();
+    if let Some(other) = demos.modes().into_iter().find(|mode| *mode != trained) {
+        tell!(
+            "recordings are of {other}, and {trained} is trained: they earn what {other} pays, which may be for something else"
+        );
+    }
     let bar = progress::bar("replay recordings", demos.steps(), "steps");
     let rollouts = demos.rollouts(game, threads, |steps| bar.inc(steps));
     bar.finish_and_clear();
-    Ok(rollouts?)
+    let rollouts = rollouts?;
+    if rollouts.iter().flat_map(|rollout| &rollout.rewards).all(|&reward| reward == 0.0) {
+        let (algorithm, path) = (experiment.algorithm, path.display());
+        return Err(CliError::Usage(format!(
+            "{path}: nothing in these recordings is ever rewarded, and {algorithm} learns from their rewards: name recordings that \
+             reach the goal, or learn skills from these, with another algorithm"
+        )));
+    }
+    Ok(rollouts)
 }
 
 /// Whether the recordings of an experiment can be read, are of its game, and show no held-out level. Nothing is replayed.

@@ -4,7 +4,7 @@ mod length;
 mod new_run;
 mod repeated;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use playbot_lab::{
     games::{Artifact, Games},
@@ -18,12 +18,14 @@ use playbot_lab::{
 
 use super::{
     compute::Compute,
+    differences::{Options, in_words},
     error::{CliError, Outcome},
     experiment::{ExperimentArgs, sets_key},
     interrupt, open, program, progress,
     read_demos::read_rollouts,
 };
 use bevy_playbot::unknown_name::UnknownName;
+use playbot_learner::SkillModel;
 use repeated::resumed;
 
 pub use length::{never_learns, rounded};
@@ -34,7 +36,7 @@ pub use new_run::{create_run, run_info};
 #[command(after_help = "Examples:
   playbot train GAME --skills skills.safetensors --run runs/first
   playbot train --algorithm ppo --run runs/baseline --steps 200000
-  playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.hidden=[64,64]
+  playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.lr=0.0003
   playbot train --run runs/first --resume
   playbot train --run runs/first --resume --steps 1000000")]
 pub struct Args {
@@ -124,7 +126,7 @@ pub fn tell_length(experiment: &Experiment) {
 }
 
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
-    let experiment = args.from.load(games, args.settings())?;
+    let mut experiment = args.from.load(games, args.settings())?;
     check_new(&args.run, args.force)?;
     let game = open::game(games, &args.from, &experiment)?;
     // Levels are checked by the trainer, which takes longer.
@@ -139,6 +141,10 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         }
         None => None,
     };
+    if let Some(model) = &skills {
+        tell_learned_otherwise(args, &experiment, model);
+        experiment.skills = model.config().clone();
+    }
     let (device, threads) = (args.compute.device(), args.compute.threads());
     interrupt::leave("nothing is trained yet".to_owned());
     let demos = read_rollouts(game, &experiment, &args.from, games, threads)?;
@@ -152,12 +158,26 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     Ok((run, trainer))
 }
 
+/// Says which settings of skills are those of the model: it was learned before.
+fn tell_learned_otherwise(args: &Args, experiment: &Experiment, model: &SkillModel) {
+    let learned = Experiment { skills: model.config().clone(), ..experiment.clone() };
+    let options = Options { from: &args.from, own: &[] };
+    let differences = options.differences(experiment, &learned, "the skill model, which was learned before,", &[]);
+    if !differences.is_empty() {
+        tell!("{}: what it has holds", in_words(differences));
+    }
+}
+
 /// The error of a training that cannot begin: with the place of the key to blame, and where skills are missing, with the
 /// commands that make and use them.
 fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Games) -> CliError {
     let algorithm = match error {
         TrainError::NoSkills(algorithm) => algorithm,
         TrainError::Experiment(error) => return args.from.locate(games, args.settings(), error).into(),
+        TrainError::ForeignSkills { .. } | TrainError::SkillObservation { .. } | TrainError::SeenSkills { .. } => {
+            let path = args.skills.as_deref().unwrap_or_else(|| Path::new("skills.safetensors"));
+            return CliError::Usage(format!("{}: {error}", path.display()));
+        }
         other => return other.into(),
     };
     let plain = match experiment.algorithm.learner() {

@@ -35,7 +35,12 @@ impl<'a> HeldOut<'a> {
 
     /// Whether one of them is the level in this file, whatever number it has.
     pub fn contains_file(&self, file: &LevelFile) -> bool {
-        self.fingerprints.contains(&file.hash)
+        self.contains_hash(file.hash)
+    }
+
+    /// Whether one of them is the level in a file of this [hash](LevelFile::hash).
+    pub fn contains_hash(&self, hash: u64) -> bool {
+        self.fingerprints.contains(&hash)
     }
 
     /// The first of these levels that is held out.

@@ -60,6 +60,13 @@ impl LevelSplit {
         check_level(game, &self.mode, self.last)
     }
 
+    /// These levels of a mode, which ascend, in as few ranges as there can be.
+    pub fn ranges(mode: &str, levels: &[u64]) -> Vec<Self> {
+        let runs = levels.chunk_by(|one, next| one + 1 == *next);
+        let range = |run: &[u64]| Some(Self { mode: mode.to_owned(), first: *run.first()?, last: *run.last()? });
+        runs.filter_map(range).collect()
+    }
+
     /// Whether some level belongs to both.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.mode == other.mode && self.first <= other.last && other.first <= self.last

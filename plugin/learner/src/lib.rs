@@ -72,7 +72,7 @@ pub use rollout::{EndStates, ObsColumns, Rollout, RolloutStep};
 pub use sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics};
 pub use score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
 pub use skill::{
-    ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+    ActionInput, Dataset, DemoCard, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
     SkillProgress, SkillSource, SkillTrainer, WindowRule,
 };
 pub use space::{Action, ActionSpace, Actions};

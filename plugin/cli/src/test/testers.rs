@@ -72,7 +72,7 @@ impl TesterArgs {
         for path in &self.run {
             let OpenedRun { run, experiment, info } = RunDir::open(path)?;
             check_run_of(path, &experiment.game, game.name())?;
-            let checkpoint = open::checkpoint(&run, self.checkpoint)?;
+            let checkpoint = open::checkpoint(&run, info.algorithm, self.checkpoint)?;
             let checksum = Some(file_checksum(&checkpoint.learner_file())?);
             // The last one may be another by now, while the run is trained.
             let step = checkpoint.summary.step;

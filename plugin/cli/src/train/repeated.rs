@@ -36,6 +36,10 @@ pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &G
     if !is_set(&sets, FREE[1]) {
         wanted.checkpoints.every = saved.checkpoints.every;
     }
+    if info.skills.is_some() {
+        // Those of the skill model, which was learned before the run began.
+        wanted.skills = saved.skills.clone();
+    }
     let mut differences = differences(args, saved, &wanted);
     differences.extend(args.skills.as_deref().map(|path| other_skills(path, info)).transpose()?.flatten());
     if differences.is_empty() {

@@ -109,12 +109,8 @@ fn play(source: &Source, chunk: &LevelSplit, threads: usize) -> Result<Vec<Episo
 
 /// Numbers in their order, as ranges without gaps.
 pub(super) fn ranges(game: &str, mode: &str, numbers: &[u64]) -> Vec<SoundLevels> {
-    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
-    let range = |run: &[u64]| {
-        let (first, last) = (*run.first()?, *run.last()?);
-        Some(SoundLevels { game: game.to_owned(), range: LevelSplit { mode: mode.to_owned(), first, last } })
-    };
-    runs.filter_map(range).collect()
+    let ranges = LevelSplit::ranges(mode, numbers).into_iter();
+    ranges.map(|range| SoundLevels { game: game.to_owned(), range }).collect()
 }
 
 #[cfg(test)]

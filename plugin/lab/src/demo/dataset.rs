@@ -1,6 +1,10 @@
 //! Turning recordings into what the skill model learns from.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+    sync::Arc,
+};
 
 use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observations};
 
@@ -107,6 +111,11 @@ impl Demonstrations {
         })
     }
 
+    /// The modes that were recorded, each once.
+    pub fn modes(&self) -> BTreeSet<&str> {
+        self.episodes.iter().map(|demo| &*demo.mode).collect()
+    }
+
     /// Steps of all episodes together.
     pub fn steps(&self) -> u64 {
         self.episodes.iter().map(|demo| demo.episode.len() as u64).sum()
@@ -140,6 +149,7 @@ impl Demonstrations {
         progress: impl Fn(u64) + Sync,
     ) -> Result<Dataset, VerifyError> {
         let seen = self.seen(game, threads, &progress)?;
+        let seen = seen.with_card(self.card(game));
         if !self.with_states {
             return Ok(seen);
         }

@@ -142,22 +142,25 @@ impl StudyReport {
         y_range: Option<(f64, f64)>,
         curve: impl Fn(&LearningCurves) -> &Vec<(u64, f64)>,
     ) -> Chart {
+        let mut most_seeds = 0;
         let curves = self.variants().into_iter().filter_map(|variant| {
             let runs = self.results.iter().zip(&self.curves).filter(|(result, _)| result.variant == variant);
             let seeds: Vec<_> = runs.map(|(_, curves)| curve(curves).clone()).filter(|c| !c.is_empty()).collect();
             if seeds.is_empty() {
                 return None;
             }
+            most_seeds = most_seeds.max(seeds.len());
             let mean = mean_curve(&seeds);
             let line = Curve::new(variant, mean.iter().map(|point| (point.step as f64, point.mean)).collect());
             let band = mean.iter().map(|point| (point.low, point.high)).collect();
             Some(if seeds.len() > 1 { line.with_band(band) } else { line })
         });
+        let curves = curves.collect();
         Chart {
             title: format!("{}: {what} in training on {}", self.experiment.game, self.experiment.train),
             x_label: "environment steps".to_owned(),
-            y_label: format!("{mean_of} of the last 100 training episodes, mean and 95 % interval over the seeds"),
-            curves: curves.collect(),
+            y_label: format!("{mean_of} of the last 100 training episodes, {}", over_seeds(most_seeds)),
+            curves,
             y_range,
             marks: Vec::new(),
         }
@@ -170,5 +173,27 @@ impl StudyReport {
     /// The path of the demonstrations is not Unicode.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string_pretty(self).map(|text| text + "\n")
+    }
+}
+
+/// What lines and bands of this many seeds are.
+fn over_seeds(seeds: usize) -> &'static str {
+    match seeds {
+        0 | 1 => "one seed",
+        // A bootstrap draws the least of three seeds three times in 1 of 27 cases: the interval of 95 % is the range.
+        2 | 3 => "mean and range of the seeds",
+        _ => "mean and 95 % bootstrap interval over the seeds",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::over_seeds;
+
+    #[test]
+    fn a_band_over_few_seeds_is_their_range() {
+        assert_eq!(over_seeds(1), "one seed");
+        assert!(over_seeds(3).contains("range") && !over_seeds(3).contains("bootstrap"));
+        assert!(over_seeds(4).contains("95 % bootstrap interval"));
     }
 }

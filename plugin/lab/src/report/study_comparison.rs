@@ -71,8 +71,9 @@ impl StudyReport {
         format!(
             "The interquartile mean over the seeds: that of the middle half of the runs, each with its mean held-out return over \
              all levels. And the probability that a run of **{}** has a higher return on a level than a run of the variant, where \
-             equal returns count half. In brackets are 95 % intervals by a bootstrap over seeds and levels; variants with a \
-             single seed have none.\n\n{}\n",
+             equal returns count half. In brackets are 95 % intervals by a bootstrap over seeds and levels, which are too narrow for \
+             a handful of seeds: whether a difference is clear is what the p above says. Variants with a single seed have \
+             none.\n\n{}\n",
             variants[0],
             markdown_table(&["variant", "interquartile mean", &above], rows.into_iter())
         )

@@ -77,7 +77,7 @@ impl Checkpoint {
 }
 
 /// All whole checkpoints of the run in folder `run`, the oldest first. One whose summary cannot be read is passed over
-/// with a warning.
+/// with a warning, which says what the last whole one is.
 ///
 /// # Errors
 ///
@@ -88,19 +88,28 @@ pub fn list(run: &Path) -> Result<Vec<Checkpoint>, RunError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries.map_err(io_error("read", &folder))?,
     };
-    let mut checkpoints = Vec::new();
+    let (mut checkpoints, mut damaged) = (Vec::new(), Vec::new());
     for entry in entries {
         let path = entry.map_err(io_error("read", &folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if name.strip_prefix(PREFIX).is_some_and(|step| step.parse::<u64>().is_ok()) {
             match read_summary(&path.join(SUMMARY)) {
                 Ok(summary) => checkpoints.push(Checkpoint { path, summary }),
-                Err(error) => tracing::warn!("a checkpoint is passed over: {error}"),
+                Err(error) => damaged.push(error),
             }
         }
     }
     checkpoints.sort_by_key(|checkpoint| checkpoint.summary.step);
+    let last = last_whole(&checkpoints);
+    damaged.iter().for_each(|error| tracing::warn!("a checkpoint is passed over: {error}; {last}"));
     Ok(checkpoints)
+}
+
+/// What is left beside a damaged checkpoint.
+fn last_whole(checkpoints: &[Checkpoint]) -> String {
+    checkpoints.last().map_or("there is no other".to_owned(), |checkpoint| {
+        format!("the last whole one is that of step {}", checkpoint.summary.step)
+    })
 }
 
 /// The checkpoint that is meant, out of those of [`list`].
@@ -263,6 +272,17 @@ mod tests {
         assert!(matches!(choose(run.path(), CheckpointChoice::Last), Err(RunError::NoCheckpoint { .. })));
         save(run.path(), 10, 1.0, 1).expect("writable");
         assert_eq!(steps(run.path()), [10]);
+    }
+
+    #[test]
+    fn beside_a_damaged_checkpoint_it_is_said_what_is_left() {
+        let run = tempfile::tempdir().expect("a folder");
+        save(run.path(), 10, 1.0, 3).expect("writable");
+        save(run.path(), 20, 1.0, 3).expect("writable");
+        fs::write(list(run.path()).expect("readable")[1].path.join(SUMMARY), "{").expect("writable");
+        let whole = list(run.path()).expect("readable");
+        assert_eq!(last_whole(&whole), "the last whole one is that of step 10");
+        assert_eq!(last_whole(&[]), "there is no other");
     }
 
     #[test]

@@ -210,6 +210,7 @@ fn kind(example: Option<&str>) -> String {
     let example = example.unwrap_or_default();
     match example.chars().next() {
         Some('"') => "text in quotes".to_owned(),
+        Some('[') if example.len() > "[]".len() => format!("a list in square brackets such as {example}"),
         Some('[') => "a list in square brackets".to_owned(),
         Some('(') => format!("values in round brackets such as {example}"),
         Some('0'..='9' | '-') if example.contains(['.', 'e']) => format!("a number such as {example}"),

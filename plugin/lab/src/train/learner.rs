@@ -15,8 +15,7 @@ use super::{
     config::Experiment,
     train_error::TrainError,
 };
-use crate::game::Game;
-use crate::sensors::GameSensors;
+use crate::{demo::demo_card::shown_by_demos, game::Game, sensors::GameSensors};
 use bevy_playbot::vision::ObservationConfig;
 
 /// The learner of an experiment's algorithm, whichever that is.
@@ -141,5 +140,8 @@ fn fitting<'a>(
             game_actions: action_space,
         });
     }
-    Ok(skills)
+    match shown_by_demos(skills, game, &experiment.test) {
+        Some(seen) => Err(TrainError::SeenSkills { seen, test: experiment.test.clone() }),
+        None => Ok(skills),
+    }
 }

@@ -86,7 +86,9 @@ fn elsewhere(action: &str) -> &'static str {
 
 fn list_steps(steps: &[u64]) -> String {
     if steps.is_empty() {
-        return "no checkpoint yet: wait until its training has saved one, or start it again with --force".to_owned();
+        return "no checkpoint: wait until its training has saved one, bring back what it had from a copy, or start it again \
+                with --force"
+            .to_owned();
     }
     let steps: Vec<_> = steps.iter().map(u64::to_string).collect();
     format!("no such checkpoint; it has those of the steps {}", steps.join(", "))

@@ -7,6 +7,8 @@ use bevy_playbot::{
 use playbot_learner::LearnError;
 use thiserror::Error;
 
+use crate::split::LevelSplit;
+
 use super::{
     arena_state::RestoreError,
     config::{Algorithm, ExperimentError},
@@ -60,6 +62,17 @@ pub enum TrainError {
         model: ObservationConfig,
         /// What agents see in the experiment.
         experiment: ObservationConfig,
+    },
+    /// The skill model has seen what is kept for the test.
+    #[error(
+        "the skill model was learned from demonstrations of {seen}, which shares levels with the held-out levels {test} of `test`: what \
+         is measured there would be no generalisation; learn skills from recordings of other levels, or hold out others"
+    )]
+    SeenSkills {
+        /// Levels that its demonstrations show.
+        seen: String,
+        /// The held-out levels.
+        test: LevelSplit,
     },
     /// The file of the skill model says of its pictures what this version does not know.
     #[error(transparent)]

@@ -1,6 +1,6 @@
 //! Demonstrations.
 
-use super::Window;
+use super::{DemoCard, Window};
 use crate::norm::ObsStats;
 use crate::rng::fnv1a;
 use crate::{ActionSpace, Actions, LearnError, ObsKind, Observations};
@@ -26,6 +26,8 @@ pub struct Dataset {
     pub(super) levels: Arc<[usize]>,
     /// The same episodes as vectors of the game's state, if they are known.
     pub(super) states: Option<Arc<Self>>,
+    /// Where they come from, if somebody noted it.
+    pub(super) card: Option<Arc<DemoCard>>,
 }
 
 impl Dataset {
@@ -51,7 +53,7 @@ impl Dataset {
         }
         let levels = (0..episodes.len()).collect();
         let episodes = episodes.into_iter().map(Arc::new).collect();
-        Ok(Self { observation, space, episodes, levels, states: None })
+        Ok(Self { observation, space, episodes, levels, states: None, card: None })
     }
 
     /// Says which episodes were played on the same level, by any number that is the same for them: what
@@ -63,6 +65,11 @@ impl Dataset {
     pub fn with_levels(self, levels: Vec<usize>) -> Result<Self, LearnError> {
         LearnError::check("levels of episodes", self.episodes.len(), levels.len())?;
         Ok(Self { levels: levels.into(), ..self })
+    }
+
+    /// Notes where they come from: skill models that are learned from them [say so](super::SkillModel::demos).
+    pub fn with_card(self, card: DemoCard) -> Self {
+        Self { card: Some(Arc::new(card)), ..self }
     }
 
     /// What an observation is.
@@ -98,6 +105,7 @@ impl Dataset {
             episodes: numbers.iter().map(|&i| Arc::clone(&self.episodes[i])).collect(),
             levels: numbers.iter().map(|&i| self.levels[i]).collect(),
             states: self.states.as_ref().map(|states| Arc::new(states.subset(numbers))),
+            card: self.card.clone(),
         }
     }
 

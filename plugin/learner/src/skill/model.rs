@@ -1,6 +1,6 @@
 //! A trained skill model and its file.
 
-use super::{Prior, SkillConfig, SkillDescription, SkillNets};
+use super::{DemoCard, Prior, SkillConfig, SkillDescription, SkillNets};
 use crate::file::{FileKind, TensorFile};
 use crate::nn::frozen;
 use crate::norm::{ObsStats, put_obs_stats};
@@ -17,6 +17,8 @@ struct Header {
     skill: SkillDescription,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     picture: Option<PictureCard>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    demos: Option<DemoCard>,
 }
 
 const FILE: FileKind = FileKind { name: "skill model", version: 1 };
@@ -33,6 +35,7 @@ pub struct SkillModel {
     pub(crate) stats: Option<Arc<ObsStats>>,
     pub(crate) device: DeviceKind,
     picture: Option<PictureCard>,
+    demos: Option<DemoCard>,
 }
 
 impl SkillModel {
@@ -43,7 +46,7 @@ impl SkillModel {
         device: DeviceKind,
     ) -> Self {
         let nets = SkillNets { state_heads: None, ..frozen(nets) };
-        Self { description, nets, stats, device, picture: None }
+        Self { description, nets, stats, device, picture: None, demos: None }
     }
 
     /// The model with a note on how the images that it observes are made; `None` for vectors.
@@ -54,6 +57,16 @@ impl SkillModel {
     /// How the images that it observes are made, if somebody noted it.
     pub fn picture(&self) -> Option<&PictureCard> {
         self.picture.as_ref()
+    }
+
+    /// The model with a note on what it was learned from.
+    pub(super) fn with_demos(self, demos: Option<DemoCard>) -> Self {
+        Self { demos, ..self }
+    }
+
+    /// What it was learned from, if [that was noted](super::Dataset::with_card): not in files of older versions.
+    pub fn demos(&self) -> Option<&DemoCard> {
+        self.demos.as_ref()
     }
 
     /// The settings it was trained with.
@@ -113,12 +126,12 @@ impl SkillModel {
     /// # Errors
     /// [`FileError::Io`] if it cannot be written, [`FileError::Learner`] if the note on its images is not of their shape.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
-        let (skill, picture) = (self.description.clone(), self.picture.clone());
+        let (skill, picture, demos) = (self.description.clone(), self.picture.clone(), self.demos.clone());
         if let Some(picture) = &picture {
             let learner = |source| FileError::Learner { path: path.to_owned(), source };
             picture.check(self.observation()).map_err(learner)?;
         }
-        let mut file = TensorFile::new(path, FILE, &Header { skill, picture })?;
+        let mut file = TensorFile::new(path, FILE, &Header { skill, picture, demos })?;
         file.put_network("", &self.nets)?;
         if let Some(stats) = &self.stats {
             put_obs_stats(&mut file, "obs_norm", stats);
@@ -141,6 +154,6 @@ impl SkillModel {
         }
         let stats = description.take_stats(&mut file, "obs_norm")?;
         file.finish()?;
-        Ok(Self { description, nets, stats, device, picture: header.picture })
+        Ok(Self { description, nets, stats, device, picture: header.picture, demos: header.demos })
     }
 }
