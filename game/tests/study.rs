@@ -237,11 +237,18 @@ fn the_table_follows_from_the_results() {
     // Nothing is trained in behaviour cloning: whoever asks for its policy is told where it is.
     let cloned = playbot(folder, &["eval", "--run", "runs/cloned-seed1"]);
     let words = errors(&cloned);
-    let skills = words.split("--skills ").last().and_then(|rest| rest.split('`').next()).expect("a file");
+    let skills = words.split("--skills ").nth(1).and_then(|rest| rest.split('`').next()).expect("a file");
     refused(&cloned, "runs/cloned-seed1 is a run of bc, which trains nothing and has no checkpoint");
     ok(playbot(folder, &["eval", "--experiment", "tiny.ron", "--skills", skills]));
-    let curves = fs::read_to_string(folder.join("out/curves.svg")).expect("written");
-    assert!(curves.contains("the last 100 training episodes, mean and range of the seeds"), "{curves}");
+    // Its skills are not measured by another study on levels that they were learned on.
+    let other = TINY.replace("hard:64..65", "easy:4..5").replace("cloned", "seen");
+    fs::write(folder.join("other.ron"), other).expect("writable");
+    let other = ["study", "--experiment", "other.ron", "--out", "seen", "--runs", "runs", "--variant", "seen"];
+    refused(
+        &playbot(folder, &other),
+        "was learned from demonstrations of easy:0..7, and the held-out levels easy:4..5",
+    );
+    assert!(!folder.join("runs/seen-seed1/result.json").exists());
     // What a variant sets itself stays as it is, and somebody who sets it is told.
     let set = study(folder, "others", &["--variant", "cloned", "--set", "algorithm=ppo", "--force"]);
     assert!(errors(&set).contains("--set algorithm=ppo does not change cloned"), "{}", errors(&set));

@@ -142,17 +142,18 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     };
     let (skills, shown) = (["--skills", "skills.safetensors"], "skills.safetensors");
     assert_eq!(code(&run(&["record", "coinrun", "--levels", "hard:8..11", "--out", "a.demo"])), 0);
-    assert_eq!(with("learn-skills", &["--out", shown]).0, 0);
+    // The levels that are kept apart for the held-out NLL were shown too.
+    assert_eq!(with("learn-skills", &["--out", shown, "--set", "skills.held_out=0.5"]).0, 0);
 
     let other = ["--set", "test=hard:10..20", "--run", "runs/a"];
     let (refused, words) = with("train", &[&skills[..], &other].concat());
     assert_eq!(refused, 3, "{words}");
-    for part in [shown, "demonstrations of hard:8..11", "held-out levels hard:10..20"] {
+    for part in [shown, "demonstrations of hard:8..11", "held-out levels hard:10..20 of `test` have some"] {
         assert!(words.contains(part), "{words}");
     }
     assert!(!folder.path().join("runs/a").exists(), "no run is begun");
     let (refused, words) = with("eval", &[&skills[..], &["--set", "test=hard:11..12"]].concat());
-    assert!(refused == 3 && words.contains("shares levels with the held-out levels hard:11..12"), "{words}");
+    assert!(refused == 3 && words.contains("and the held-out levels hard:11..12 have some of these"), "{words}");
     let (measured, words) = with("eval", &[&skills[..], &["--levels", "hard:11..12"]].concat());
     assert!(measured == 0 && words.contains("not all of them are unseen"), "{words}");
 
@@ -161,12 +162,27 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let card = run(&["policy", "show", "bc.policy"]);
     assert!(said(&card).contains("demonstrations of hard:8..11"), "{}", said(&card));
 
-    // What the skills were learned with is what the run has, however it is asked for.
-    let train = [&skills[..], &["--set", "skills.latent=4", "--run", "runs/b"]].concat();
-    let (trained, words) = with("train", &train);
-    let told = "`--set skills.latent=4` asks for skills.latent=4, and the skill model, which was learned before, has 2";
-    assert!(trained == 0 && words.contains(told), "{words}");
-    let saved = std::fs::read_to_string(folder.path().join("runs/b/experiment.ron")).expect("written");
-    assert!(saved.contains("latent: 2") && !saved.contains("latent: 4"), "{saved}");
-    assert_eq!(with("train", &[&train[..], &["--resume", "--steps", "256"]].concat()).0, 0);
+    // A run knows what its skills have seen, though it was trained on other levels.
+    let train = [&skills[..], &["--run", "runs/b"]].concat();
+    assert_eq!(with("train", &train).0, 0);
+    let (refused, words) = with("eval", &["--run", "runs/b", "--set", "test=hard:11..12"]);
+    assert!(refused == 3 && words.contains("runs/b was learned from demonstrations of hard:8..11"), "{words}");
+    assert_eq!(with("eval", &["--run", "runs/b"]).0, 0);
+
+    // What differs from what the skills were learned with is refused; the same may be asked for again.
+    let (refused, words) = with("train", &[&skills[..], &["--set", "skills.latent=4", "--run", "runs/c"]].concat());
+    let told = "`--set skills.latent=4` asks for skills.latent=4, and the skill model has 2; drop the option";
+    assert!(refused == 3 && words.contains(told), "{words}");
+    assert_eq!(with("train", &[&skills[..], &["--set", "skills.latent=2", "--run", "runs/c"]].concat()).0, 0);
+
+    // Skills of another game are named before anything else is found wrong.
+    let (refused, words) = with(
+        "train",
+        &[
+            &skills[..],
+            &["--set", "game=maze2d", "--set", "train=medium:0..3", "--set", "test=large:0..3", "--run", "runs/d"],
+        ]
+        .concat(),
+    );
+    assert!(refused == 3 && words.contains("skills.safetensors: the skill model was learned for 563"), "{words}");
 }

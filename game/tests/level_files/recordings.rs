@@ -78,5 +78,9 @@ fn learning_refuses_recordings_of_held_out_files() {
     done(folder, &learn);
     let output = playbot(folder, &["eval", "--skills", "s.safetensors", "--set", "test=files:held/*.json"]);
     assert_eq!(code(&output), 3, "{}", errors(&output));
-    assert!(errors(&output).contains("learned from demonstrations of the level file of hash"), "{}", errors(&output));
+    assert!(
+        errors(&output).contains("learned from demonstrations of files:held/*.json:0, and the held-out"),
+        "{}",
+        errors(&output)
+    );
 }

@@ -60,8 +60,6 @@ fn what_recordings_earn_is_what_the_game_pays_now() {
 fn recordings_that_earn_nothing_are_named_before_a_run_begins() {
     let folder = prepared();
     let folder = folder.path();
-    let (_, words) = ended(folder, &training("demos=played", "runs/played"), 0);
-    assert!(words.contains("recordings are of easy, and hard is trained: they earn what easy pays"), "{words}");
     done(
         folder,
         &["record", "coinrun", "--bot", "random", "--levels", "easy:0..0", "--steps", "20", "--out", "poor/a.demo"],
@@ -91,4 +89,21 @@ fn recordings_of_another_game_are_named_and_nothing_is_lost() {
     done(folder, &study);
     refused(&[&study[..], &["--set", "demos=bent", "--force"]].concat());
     assert!(folder.join("studied/recorded-seed1/result.json").exists(), "a finished run was lost");
+}
+
+#[test]
+fn recordings_of_another_task_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    fs::write(folder.join("tiny.ron"), TINY).expect("writable");
+    fs::create_dir(folder.join("played")).expect("writable");
+    done(folder, &["record", "maze2d", "--levels", "umaze+retarget:0..1", "--steps", "400", "--out", "played/a.demo"]);
+    let maze = ["game=maze2d", "train=umaze:0..3", "test=medium:0..1"];
+    let sets = maze.iter().flat_map(|set| ["--set", set]);
+    let train: Vec<_> = training("demos=played", "runs/maze").into_iter().chain(sets).collect();
+    let (_, words) = ended(folder, &train, 0);
+    assert!(
+        words.contains("some recordings are of umaze+retarget, and umaze is trained: they earn what their own"),
+        "{words}"
+    );
 }

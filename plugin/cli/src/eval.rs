@@ -7,7 +7,6 @@ use bevy_playbot::{
     vision::{ObservationConfig, ObservationKind},
 };
 use playbot_lab::{
-    demo::demo_card::shown_by_demos,
     eval::{EvalPlan, Player},
     game::Game,
     games::{Artifact, Games},
@@ -208,14 +207,16 @@ fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games)
         check_run_of(path, &own.game, &experiment.game)?;
         let seen = |split: &LevelSplit| HeldOut::new(game, split).first_of(&own.train).map(|_| own.train.to_string());
         check_unseen(path, "was trained on", seen, experiment, args)?;
+        let seen = |split: &LevelSplit| HeldOut::new(game, split).shown_by(info.demos.as_ref());
+        check_unseen(path, FROM_DEMOS, seen, experiment, args)?;
         let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.compute.device())?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
         let model = open::skills(path, args.compute.device(), &args.from)?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
-        let seen = |split: &LevelSplit| shown_by_demos(&model, game, split);
-        check_unseen(path, "was learned from demonstrations of", seen, experiment, args)?;
+        let seen = |split: &LevelSplit| HeldOut::new(game, split).shown_by(model.demos());
+        check_unseen(path, FROM_DEMOS, seen, experiment, args)?;
         let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
         players.push(named(chosen, path, args.skills.len()));
     }
@@ -254,6 +255,9 @@ fn look_through(
     Ok(())
 }
 
+/// What skills, and runs with skills, have seen.
+const FROM_DEMOS: &str = "was learned from demonstrations of";
+
 /// What was learned in `path` is measured on levels that it has seen only if somebody names them. `seen` says which of a split those
 /// are.
 fn check_unseen(
@@ -268,7 +272,7 @@ fn check_unseen(
         && let Some(own) = seen(&measured.test)
     {
         return Err(CliError::Usage(format!(
-            "{path} {learned_on} {own}, which shares levels with the held-out levels {}: choose levels that none of the players has \
+            "{path} {learned_on} {own}, and the held-out levels {} have some of these: choose levels that none of the players has \
              seen, or measure there on purpose, with --levels",
             measured.test
         )));

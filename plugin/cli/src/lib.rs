@@ -54,6 +54,7 @@ mod runs;
 mod study;
 mod study_cost;
 mod study_demos;
+mod study_metrics;
 mod study_rewrite;
 mod study_run;
 mod test;

@@ -74,21 +74,26 @@ pub fn game<'a>(games: &Games<'a>, from: &ExperimentArgs, experiment: &Experimen
 ///
 /// # Errors
 ///
-/// There is none: where nothing is trained, with what plays instead.
+/// There is none; where nothing is trained, with the skill model that plays.
 pub fn checkpoint(run: &RunDir, algorithm: Algorithm, choice: CheckpointChoice) -> Result<Checkpoint, CliError> {
     if !algorithm.is_trained() {
-        return Err(CliError::Usage(format!(
-            "{} is a run of {algorithm}, which trains nothing and has no checkpoint: what plays is its skill model; name that with \
-             --skills, as in `--skills {}`",
-            run.path().display(),
-            shown(&skills_beside(run.path()))
-        )));
+        return Err(untrained(run.path(), algorithm));
     }
     let checkpoint = run.checkpoint(choice)?;
     if choice == CheckpointChoice::Best {
         tell!("{}", best(run.path(), &checkpoint));
     }
     Ok(checkpoint)
+}
+
+/// What to do about a run that trains nothing.
+pub fn untrained(run: &Path, algorithm: Algorithm) -> CliError {
+    let skills = shown(&skills_beside(run));
+    CliError::Usage(format!(
+        "{} is a run of {algorithm}, which trains nothing and has no checkpoint: what plays is its skill model; measure that with \
+         `playbot eval --skills {skills}`, or make a policy of it, `playbot policy export --skills {skills} --out clone.policy`",
+        run.display()
+    ))
 }
 
 /// The skill model that a run began with, if it lies in the same folder as the run, as in a study; else a name that it may have.

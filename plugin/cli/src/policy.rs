@@ -22,7 +22,6 @@ use serde_json::json;
 use super::{
     cloning::{check_skills, cloning_skills},
     compute::Device,
-    differences::in_words,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
     open,
@@ -150,7 +149,7 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     let model = open::skills(path, DeviceKind::default(), from)?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let training = match (model.demos(), &experiment.demos) {
-        (Some(card), _) => format!("demonstrations of {}", in_words(card.levels.clone())),
+        (Some(card), _) => format!("demonstrations of {card}"),
         (None, Some(demos)) => format!("demonstrations in {}", demos.display()),
         (None, None) => "demonstrations".to_owned(),
     };

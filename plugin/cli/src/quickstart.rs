@@ -29,7 +29,7 @@ use super::{
     experiment::{ExperimentArgs, option},
     interrupt, learn_skills, methods, open, program, progress,
     read_demos::read_demos,
-    train::{create_run, drive, tell_length},
+    train::{Source, create_run, drive, tell_length},
 };
 
 /// Seeds with which steps to success are measured.
@@ -202,7 +202,8 @@ fn train_one(
     let skills = algorithm.needs_skills().then_some(skills);
     let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.count())?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
-    let run = create_run(&folder, game, &experiment, Some(&skill_file), DeviceKind::default(), true)?;
+    let source = Source { skills: Some(&skill_file), demos: skills.and_then(SkillModel::demos).cloned() };
+    let run = create_run(&folder, game, &experiment, &source, DeviceKind::default(), true)?;
     interrupt::go_on_with(format!(
         "this training alone, `{} train --run {} --resume`",
         program::name(),

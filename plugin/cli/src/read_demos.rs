@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use playbot_lab::{demo::dataset::Demonstrations, game::Game, games::Games, train::Experiment};
-use playbot_learner::{Dataset, Rollout};
+use playbot_lab::{
+    demo::dataset::Demonstrations, game::Game, games::Games, level_files::is_level_files, train::Experiment,
+};
+use playbot_learner::{Dataset, DemoCard, Rollout};
 
 use super::{
     error::CliError, experiment::ExperimentArgs, interrupt::NothingToSave, missing_demos, number::counted, progress,
@@ -33,6 +35,15 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
     Ok(dataset?)
 }
 
+/// Recordings that are trained on.
+#[derive(Default)]
+pub struct Recorded {
+    /// Their episodes; none for what trains on none.
+    pub rollouts: Vec<Rollout>,
+    /// What they show.
+    pub card: Option<DemoCard>,
+}
+
 /// The recordings of an experiment with their rewards, if its algorithm trains on them: all of them are replayed.
 ///
 /// # Errors
@@ -45,33 +56,43 @@ pub fn read_rollouts(
     from: &ExperimentArgs,
     games: &Games,
     threads: usize,
-) -> Result<Vec<Rollout>, CliError> {
+) -> Result<Recorded, CliError> {
     if !experiment.algorithm.trains_on_demos() {
-        return Ok(Vec::new());
+        return Ok(Recorded::default());
     }
     experiment.check()?;
     let _replaying = NothingToSave::listen();
     let path = from.recordings(experiment, games)?;
     let demos = demonstrations(game, experiment, &path)?;
     tell!();
-    let trained = experiment.train.mode.as_str();
-    if let Some(other) = demos.modes().into_iter().find(|mode| *mode != trained) {
-        tell!(
-            "recordings are of {other}, and {trained} is trained: they earn what {other} pays, which may be for something else"
-        );
-    }
+    tell_other_modes(game, &demos, &experiment.train.mode);
+    let card = Some(demos.card(game));
     let bar = progress::bar("replay recordings", demos.steps(), "steps");
     let rollouts = demos.rollouts(game, threads, |steps| bar.inc(steps));
     bar.finish_and_clear();
     let rollouts = rollouts?;
-    if rollouts.iter().flat_map(|rollout| &rollout.rewards).all(|&reward| reward == 0.0) {
+    let mut rewards = rollouts.iter().flat_map(|rollout| &rollout.rewards).peekable();
+    if rewards.peek().is_some() && rewards.all(|&reward| reward == 0.0) {
         let (algorithm, path) = (experiment.algorithm, path.display());
         return Err(CliError::Usage(format!(
             "{path}: nothing in these recordings is ever rewarded, and {algorithm} learns from their rewards: name recordings that \
              reach the goal, or learn skills from these, with another algorithm"
         )));
     }
-    Ok(rollouts)
+    Ok(Recorded { rollouts, card })
+}
+
+/// Says if recordings are of another task than what is trained: they earn what theirs pays. Modes whose levels may be the same, and
+/// levels that are files, are of one task.
+fn tell_other_modes(game: &dyn Game, demos: &Demonstrations, trained: &str) {
+    let is_other = |mode: &&str| !is_level_files(mode) && game.family(mode) != game.family(trained);
+    let others: Vec<_> = demos.modes().into_iter().filter(is_other).collect();
+    if !others.is_empty() && !is_level_files(trained) {
+        tell!(
+            "some recordings are of {}, and {trained} is trained: they earn what their own mode pays, which may be for something else",
+            others.join(", ")
+        );
+    }
 }
 
 /// Whether the recordings of an experiment can be read, are of its game, and show no held-out level. Nothing is replayed.

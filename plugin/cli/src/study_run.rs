@@ -10,31 +10,30 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
-    report::{LearningCurves, StudyResult, TestResult, TrainingResult, statistics::steps_to_reach},
-    runs::RunCurves,
+    report::{LearningCurves, StudyResult, TestResult, TrainingResult},
     train::{
-        Experiment, Trainer,
+        Trainer,
         checkpoint::CheckpointChoice,
-        metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
         run_dir::{OpenedRun, RunDir, RunInfo, check_replaceable, end_replacement, is_unstarted},
         run_lock::RunLock,
         sealed_file::{read_sealed, write_sealed},
         study::StudyRun,
     },
 };
-use playbot_learner::{DeviceKind, SkillModel, disk};
+use playbot_learner::{DemoCard, DeviceKind, SkillModel, disk};
 
 use super::{
-    cloning::cloning,
+    cloning::{check_unseen_by, cloning},
     differences::{Options, in_words},
     error::CliError,
     experiment::ExperimentArgs,
     learn_skills::{self, SkillCheckpoint},
     methods,
-    read_demos::read_rollouts,
+    read_demos::{Recorded, read_rollouts},
     study_cost::CostClock,
     study_demos::StudyDemos,
-    train::{drive, run_info},
+    study_metrics::{learning_curves, training_result},
+    train::{Source, drive, run_info},
 };
 
 const RESULT: &str = "result.json";
@@ -199,10 +198,10 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes a folder that of a run, in place of what is there.
-    fn begin(&self, run: &StudyRun, lock: RunLock) -> Result<RunDir, CliError> {
+    fn begin(&self, run: &StudyRun, lock: RunLock, demos: Option<DemoCard>) -> Result<RunDir, CliError> {
         let skills = self.skill_file(run)?;
         let game = self.games.get(&run.experiment.game)?;
-        let info = run_info(game, &run.experiment, Some(&skills), self.device)?;
+        let info = run_info(game, &run.experiment, &Source { skills: Some(&skills), demos }, self.device)?;
         Ok(RunDir::begin(lock, &run.experiment, &info)?)
     }
 
@@ -225,11 +224,15 @@ impl<'a> Runner<'a> {
             },
             false => None,
         };
-        let demos =
-            if begun { Vec::new() } else { read_rollouts(game, experiment, self.from, self.games, self.threads)? };
+        let Recorded { rollouts, card } = match begun {
+            true => Recorded::default(),
+            false => read_rollouts(game, experiment, self.from, self.games, self.threads)?,
+        };
         let dir = match run_folder {
             RunFolder::Begun(dir) => dir,
-            RunFolder::New(lock) => self.begin(run, lock)?,
+            RunFolder::New(lock) => {
+                self.begin(run, lock, skills.as_ref().and_then(SkillModel::demos).cloned().or(card))?
+            }
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
             let player = cloning(skills, experiment, draw);
@@ -238,7 +241,7 @@ impl<'a> Runner<'a> {
         let mut trainer = if begun {
             dir.resume(game, experiment, self.device, self.threads)?
         } else {
-            Trainer::with_demos(game, experiment, skills.as_ref(), &demos, self.device, self.threads)?
+            Trainer::with_demos(game, experiment, skills.as_ref(), &rollouts, self.device, self.threads)?
         };
         if !drive(&dir, &mut trainer, title, |report| on_step(report.step))? {
             return Ok(None);
@@ -267,30 +270,15 @@ impl<'a> Runner<'a> {
             learn_skills::remove(&checkpoint)?;
             self.learned.insert(file.clone());
         }
-        Ok(Some(SkillModel::load(&file, self.device)?))
+        let model = SkillModel::load(&file, self.device)?;
+        check_unseen_by(&file, &model, game, &run.experiment.test)?;
+        Ok(Some(model))
     }
 
     fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, CliError> {
         let name = run.skill_file().map_err(|error| CliError::Usage(error.to_string()))?;
         Ok(self.folder.join(name))
     }
-}
-
-fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, CliError> {
-    let curves = RunCurves::read(run)?;
-    Ok(TrainingResult {
-        steps,
-        steps_to_threshold: steps_to_reach(curves.settled(SUCCESS_RATE), experiment.study.threshold),
-        success: curves.last(SUCCESS_RATE),
-        episodic_return: curves.last(EPISODIC_RETURN),
-    })
-}
-
-/// What was learned, from the metrics of a run.
-fn learning_curves(run: &Path) -> Result<LearningCurves, CliError> {
-    let curves = RunCurves::read(run)?;
-    let of = |tag| curves.curve(tag).to_vec();
-    Ok(LearningCurves { success: of(SUCCESS_RATE), returns: of(EPISODIC_RETURN) })
 }
 
 /// The result of a run that was measured. A damaged one is measured again.

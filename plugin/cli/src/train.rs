@@ -22,14 +22,14 @@ use super::{
     error::{CliError, Outcome},
     experiment::{ExperimentArgs, sets_key},
     interrupt, open, program, progress,
-    read_demos::read_rollouts,
+    read_demos::{Recorded, read_rollouts},
 };
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_learner::SkillModel;
 use repeated::resumed;
 
 pub use length::{never_learns, rounded};
-pub use new_run::{create_run, run_info};
+pub use new_run::{Source, create_run, run_info};
 
 /// Train a policy, headless, over the experiment's training levels.
 #[derive(clap::Args)]
@@ -126,7 +126,7 @@ pub fn tell_length(experiment: &Experiment) {
 }
 
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
-    let mut experiment = args.from.load(games, args.settings())?;
+    let experiment = args.from.load(games, args.settings())?;
     check_new(&args.run, args.force)?;
     let game = open::game(games, &args.from, &experiment)?;
     // Levels are checked by the trainer, which takes longer.
@@ -141,16 +141,15 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
         }
         None => None,
     };
-    if let Some(model) = &skills {
-        tell_learned_otherwise(args, &experiment, model);
-        experiment.skills = model.config().clone();
-    }
+    skills.iter().try_for_each(|model| check_asked(args, &experiment, model))?;
     let (device, threads) = (args.compute.device(), args.compute.threads());
     interrupt::leave("nothing is trained yet".to_owned());
-    let demos = read_rollouts(game, &experiment, &args.from, games, threads)?;
-    let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &demos, device, threads)
+    let Recorded { rollouts, card } = read_rollouts(game, &experiment, &args.from, games, threads)?;
+    let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &rollouts, device, threads)
         .map_err(|error| explain(error, args, &experiment, games))?;
-    let run = create_run(&args.run, game, &experiment, args.skills.as_deref(), args.compute.device(), args.force)?;
+    let demos = skills.as_ref().and_then(SkillModel::demos).cloned().or(card);
+    let source = Source { skills: args.skills.as_deref(), demos };
+    let run = create_run(&args.run, game, &experiment, &source, device, args.force)?;
     if args.from.experiment.is_none() {
         let Experiment { train, test, .. } = &experiment;
         tell!("no --experiment is named: training on {train}, held out for the test {test}");
@@ -158,14 +157,20 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     Ok((run, trainer))
 }
 
-/// Says which settings of skills are those of the model: it was learned before.
-fn tell_learned_otherwise(args: &Args, experiment: &Experiment, model: &SkillModel) {
+/// Refuses settings of skills that the model does not have: it was learned before. What only a file says otherwise is what `learn-skills`
+/// was told at that time.
+fn check_asked(args: &Args, experiment: &Experiment, model: &SkillModel) -> Result<(), CliError> {
     let learned = Experiment { skills: model.config().clone(), ..experiment.clone() };
+    let asked = Experiment { skills: learned.with_set(&args.from.set)?.skills, ..experiment.clone() };
     let options = Options { from: &args.from, own: &[] };
-    let differences = options.differences(experiment, &learned, "the skill model, which was learned before,", &[]);
-    if !differences.is_empty() {
-        tell!("{}: what it has holds", in_words(differences));
+    let differences = options.differences(&asked, &learned, "the skill model", &[]);
+    if differences.is_empty() {
+        return Ok(());
     }
+    Err(CliError::Usage(format!(
+        "the skills were learned before, and this differs: {}; drop the option, or learn other skills with it, `playbot learn-skills`",
+        in_words(differences)
+    )))
 }
 
 /// The error of a training that cannot begin: with the place of the key to blame, and where skills are missing, with the
@@ -194,6 +199,9 @@ fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Game
 fn resume(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let OpenedRun { run, experiment: saved, info } = RunDir::open_to_write(&args.run)?;
     let game = games.of_file(Artifact::Run, &args.run, &saved.game)?;
+    if !info.algorithm.is_trained() {
+        return Err(open::untrained(&args.run, info.algorithm));
+    }
     let experiment = resumed(args, &saved, &info, games)?;
     let trainer = run.resume(game, &experiment, args.compute.device(), args.compute.threads())?;
     if trainer.is_done() {

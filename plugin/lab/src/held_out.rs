@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use bevy_playbot::level_files::LevelFile;
+use playbot_learner::DemoCard;
 
 use crate::{game::Game, split::LevelSplit};
 
@@ -35,12 +36,7 @@ impl<'a> HeldOut<'a> {
 
     /// Whether one of them is the level in this file, whatever number it has.
     pub fn contains_file(&self, file: &LevelFile) -> bool {
-        self.contains_hash(file.hash)
-    }
-
-    /// Whether one of them is the level in a file of this [hash](LevelFile::hash).
-    pub fn contains_hash(&self, hash: u64) -> bool {
-        self.fingerprints.contains(&hash)
+        self.fingerprints.contains(&file.hash)
     }
 
     /// The first of these levels that is held out.
@@ -53,5 +49,27 @@ impl<'a> HeldOut<'a> {
             return None;
         }
         levels.levels().find(|&level| self.contains(&levels.mode, level))
+    }
+
+    /// Which of them demonstrations show, in words; `None` if these show none, or if nobody noted what they show.
+    pub fn shown_by(&self, demos: Option<&DemoCard>) -> Option<String> {
+        let card = demos.filter(|card| card.game == self.game.name())?;
+        // A mode that the game has no more has none of its levels.
+        let ranges = card.levels.iter().filter_map(|range| range.parse::<LevelSplit>().ok());
+        let mut known = ranges.filter(|range| self.game.check_mode(&range.mode).is_ok());
+        let shown = known.find(|range| self.first_of(range).is_some()).map(|range| range.to_string());
+        let shown = shown.or_else(|| self.file_of(card))?;
+        let is_all = card.levels.len() + card.level_files.len() == 1;
+        Some(if is_all { shown } else { format!("{shown}, among others") })
+    }
+
+    /// The first of these levels that is in a file which demonstrations show.
+    fn file_of(&self, card: &DemoCard) -> Option<String> {
+        let mode = &self.split.mode;
+        let is_shown = |level: &u64| {
+            let fingerprint = self.game.fingerprint(mode, *level);
+            fingerprint.is_some_and(|print| card.level_files.contains(&print))
+        };
+        self.split.levels().find(is_shown).map(|level| format!("{mode}:{level}"))
     }
 }

@@ -10,7 +10,15 @@ use playbot_lab::{
         run_dir::{RunDir, RunError, RunInfo},
     },
 };
-use playbot_learner::DeviceKind;
+use playbot_learner::{DemoCard, DeviceKind};
+
+/// What a run learns from besides playing.
+pub struct Source<'a> {
+    /// The file of the skill model, if there is one.
+    pub skills: Option<&'a Path>,
+    /// What the recordings showed that the skills were learned from, or that are trained on.
+    pub demos: Option<DemoCard>,
+}
 
 /// Makes the folder of a run, which says what file its skills are from.
 ///
@@ -21,11 +29,11 @@ pub fn create_run(
     path: &Path,
     game: &dyn Game,
     experiment: &Experiment,
-    skills: Option<&Path>,
+    source: &Source,
     device: DeviceKind,
     force: bool,
 ) -> Result<RunDir, RunError> {
-    let info = run_info(game, experiment, skills, device)?;
+    let info = run_info(game, experiment, source, device)?;
     RunDir::create(path, &experiment.without_study(), &info, force)
 }
 
@@ -37,10 +45,10 @@ pub fn create_run(
 pub fn run_info(
     game: &dyn Game,
     experiment: &Experiment,
-    skills: Option<&Path>,
+    source: &Source,
     device: DeviceKind,
 ) -> Result<RunInfo, RunError> {
-    let skills = skills.filter(|_| experiment.algorithm.needs_skills());
+    let skills = source.skills.filter(|_| experiment.algorithm.needs_skills());
     Ok(RunInfo {
         algorithm: experiment.algorithm,
         seed: experiment.seed,
@@ -48,6 +56,7 @@ pub fn run_info(
         revision: env!("PLAYBOT_REVISION").to_owned(),
         game_version: game.version(),
         skills: skills.map(file_checksum).transpose()?,
+        demos: source.demos.clone(),
         device,
     })
 }

@@ -36,10 +36,6 @@ pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &G
     if !is_set(&sets, FREE[1]) {
         wanted.checkpoints.every = saved.checkpoints.every;
     }
-    if info.skills.is_some() {
-        // Those of the skill model, which was learned before the run began.
-        wanted.skills = saved.skills.clone();
-    }
     let mut differences = differences(args, saved, &wanted);
     differences.extend(args.skills.as_deref().map(|path| other_skills(path, info)).transpose()?.flatten());
     if differences.is_empty() {
@@ -117,7 +113,7 @@ mod tests {
         let saved = from.load(&games, []).expect("valid");
         let (version, revision) = ("1".to_owned(), "r".to_owned());
         let (algorithm, seed, device) = (Algorithm::Ppo, 1, DeviceKind::default());
-        let info = RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, device };
+        let info = RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, demos: None, device };
         let words = ["train", "--run", "runs/first", "--resume"].into_iter().chain(options.iter().copied());
         let args = Train::try_parse_from(words).unwrap_or_else(|error| panic!("{error}")).args;
         resumed(&args, &saved, &info, &games).map_err(|error| error.to_string())

@@ -3,7 +3,7 @@
 mod action_noise;
 mod chosen;
 pub mod dataset;
-pub mod demo_card;
+mod demo_card;
 pub mod demonstration;
 mod observe;
 mod replay_observations;

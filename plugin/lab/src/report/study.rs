@@ -156,8 +156,12 @@ impl StudyReport {
             Some(if seeds.len() > 1 { line.with_band(band) } else { line })
         });
         let curves = curves.collect();
+        let levels = match self.trained_on() {
+            Some(levels) => format!(" on {levels}"),
+            None => ", each variant on its own levels".to_owned(),
+        };
         Chart {
-            title: format!("{}: {what} in training on {}", self.experiment.game, self.experiment.train),
+            title: format!("{}: {what} in training{levels}", self.experiment.game),
             x_label: "environment steps".to_owned(),
             y_label: format!("{mean_of} of the last 100 training episodes, {}", over_seeds(most_seeds)),
             curves,
@@ -179,7 +183,8 @@ impl StudyReport {
 /// What lines and bands of this many seeds are.
 fn over_seeds(seeds: usize) -> &'static str {
     match seeds {
-        0 | 1 => "one seed",
+        0 => "mean over the seeds",
+        1 => "one seed",
         // A bootstrap draws the least of three seeds three times in 1 of 27 cases: the interval of 95 % is the range.
         2 | 3 => "mean and range of the seeds",
         _ => "mean and 95 % bootstrap interval over the seeds",

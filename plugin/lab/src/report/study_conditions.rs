@@ -7,7 +7,10 @@ use super::{
     study::StudyReport,
     study_table::rate_cell,
 };
-use crate::train::{Experiment, LearnerKind, study::study_runs};
+use crate::{
+    split::LevelSplit,
+    train::{Experiment, LearnerKind, study::study_runs},
+};
 
 impl StudyReport {
     pub(super) fn conditions(&self) -> String {
@@ -29,14 +32,9 @@ impl StudyReport {
 
     /// On what levels and for how long the variants were trained: once if all were alike, else with the names of each kind.
     fn trainings(&self) -> String {
-        let runs = study_runs(&self.experiment).unwrap_or_default();
         let mut kinds: Vec<(String, Vec<&str>)> = Vec::new();
-        for variant in self.variants() {
-            let run = runs.iter().find(|run| run.variant == variant).map_or(&self.experiment, |run| &run.experiment);
-            if !run.algorithm.is_trained() {
-                continue;
-            }
-            let words = training(run);
+        for (variant, run) in self.trained() {
+            let words = training(&run);
             match kinds.iter_mut().find(|(kind, _)| *kind == words) {
                 Some((_, variants)) => variants.push(variant),
                 None => kinds.push((words, vec![variant])),
@@ -50,6 +48,24 @@ impl StudyReport {
                 format!("Trained {}", each.collect::<Vec<_>>().join(", "))
             }
         }
+    }
+
+    /// The levels that all variants were trained on; `None` if they differ.
+    pub(super) fn trained_on(&self) -> Option<LevelSplit> {
+        let mut splits = self.trained().into_iter().map(|(_, run)| run.train);
+        let first = splits.next()?;
+        splits.all(|split| split == first).then_some(first)
+    }
+
+    /// The variants that were trained, with their experiments.
+    fn trained(&self) -> Vec<(&str, Experiment)> {
+        let runs = study_runs(&self.experiment).unwrap_or_default();
+        let experiment = |variant: &str| {
+            let run = runs.iter().find(|run| run.variant == variant);
+            run.map_or_else(|| self.experiment.clone(), |run| run.experiment.clone())
+        };
+        let all = self.variants().into_iter().map(|variant| (variant, experiment(variant)));
+        all.filter(|(_, run)| run.algorithm.is_trained()).collect()
     }
 }
 
@@ -76,6 +92,10 @@ mod tests {
     };
 
     fn trainings(variants: &[(&str, &str)]) -> String {
+        report(variants).trainings()
+    }
+
+    fn report(variants: &[(&str, &str)]) -> StudyReport {
         let set = variants.iter().map(|(name, set)| format!("(name: \"{name}\", set: [{set}])"));
         let text = format!(
             r#"(game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused", steps: 32768,
@@ -97,13 +117,24 @@ mod tests {
                 level_returns: Vec::new(),
             },
         };
-        let report = StudyReport {
+        StudyReport {
             command: String::new(),
             experiment: parse_experiment(&text, Path::new("x.ron")).expect("valid"),
             results: variants.iter().map(|(name, _)| result(name)).collect(),
             curves: Vec::new(),
-        };
-        report.trainings()
+        }
+    }
+
+    #[test]
+    fn curves_of_different_levels_name_none() {
+        let title = |variants: &[(&str, &str)]| report(variants).charts()[0].title.clone();
+        let elsewhere = ("elsewhere", r#""train=plain:20..29""#);
+        assert_eq!(
+            title(&[("full", ""), ("plain", r#""algorithm=ppo""#)]),
+            "corridor: success in training on plain:0..7"
+        );
+        assert_eq!(title(&[elsewhere]), "corridor: success in training on plain:20..29");
+        assert_eq!(title(&[("full", ""), elsewhere]), "corridor: success in training, each variant on its own levels");
     }
 
     #[test]

@@ -138,8 +138,16 @@ pub(super) mod tests {
     pub fn run(algorithm: Algorithm, seed: u64, changes: &str) -> RunRecord {
         let experiment = experiment(&format!("seed: {seed}, {changes}"));
         let (version, revision) = ("1".into(), "r".into());
-        let info =
-            RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, device: DeviceKind::Flex };
+        let info = RunInfo {
+            algorithm,
+            seed,
+            version,
+            revision,
+            game_version: 1,
+            skills: None,
+            demos: None,
+            device: DeviceKind::Flex,
+        };
         let path = format!("{algorithm}-{seed}").into();
         RunRecord {
             path,

@@ -107,7 +107,7 @@ pub fn list(run: &Path) -> Result<Vec<Checkpoint>, RunError> {
 
 /// What is left beside a damaged checkpoint.
 fn last_whole(checkpoints: &[Checkpoint]) -> String {
-    checkpoints.last().map_or("there is no other".to_owned(), |checkpoint| {
+    checkpoints.last().map_or("no whole one is left".to_owned(), |checkpoint| {
         format!("the last whole one is that of step {}", checkpoint.summary.step)
     })
 }
@@ -282,7 +282,7 @@ mod tests {
         fs::write(list(run.path()).expect("readable")[1].path.join(SUMMARY), "{").expect("writable");
         let whole = list(run.path()).expect("readable");
         assert_eq!(last_whole(&whole), "the last whole one is that of step 10");
-        assert_eq!(last_whole(&[]), "there is no other");
+        assert_eq!(last_whole(&[]), "no whole one is left");
     }
 
     #[test]

@@ -205,9 +205,17 @@ fn one_of(key: &str, found: &str, names: &[&str]) -> String {
     format!("`{key}` cannot be `{found}`{hint}; valid: {}", names.join(", "))
 }
 
+/// A value that may have been written over several lines.
+fn one_line(value: &str) -> String {
+    let lines: Vec<_> = value.lines().map(str::trim).collect();
+    [("[ ", "["), (", ]", "]"), ("( ", "("), (", )", ")")]
+        .iter()
+        .fold(lines.join(" "), |text, (from, to)| text.replace(from, to))
+}
+
 /// The kind of value that an example is, in words.
 fn kind(example: Option<&str>) -> String {
-    let example = example.unwrap_or_default();
+    let example = one_line(example.unwrap_or_default());
     match example.chars().next() {
         Some('"') => "text in quotes".to_owned(),
         Some('[') if example.len() > "[]".len() => format!("a list in square brackets such as {example}"),
@@ -215,7 +223,7 @@ fn kind(example: Option<&str>) -> String {
         Some('(') => format!("values in round brackets such as {example}"),
         Some('0'..='9' | '-') if example.contains(['.', 'e']) => format!("a number such as {example}"),
         Some('0'..='9') => format!("a whole number such as {example}"),
-        _ if matches!(example, "true" | "false") => "true or false".to_owned(),
+        _ if matches!(example.as_str(), "true" | "false") => "true or false".to_owned(),
         _ if example == "None" => "None or Some(value)".to_owned(),
         _ if example.contains('(') => format!("something such as {example}"),
         _ => format!("a name such as {example}"),

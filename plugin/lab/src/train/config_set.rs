@@ -188,7 +188,7 @@ mod tests {
             ("ppo.lr=", "`ppo.lr` must be a number"),
             ("arenas=-3", "`arenas` must be a whole number such as 64, not -3"),
             ("score.kl=yes", "`score.kl` must be true or false, not yes"),
-            ("ppo.hidden=[64,a]", "`ppo.hidden` must be a list in square brackets such as [256, 256], not [64,a]"),
+            ("ppo.hidden=[64,a]", "`ppo.hidden` must be a list in square brackets such as [200, 200], not [64,a]"),
             ("ppo.activation=Rellu", "did you mean `Relu`?"),
             ("sac.entropy=Fixd(0.2)", "did you mean `Fixed`?"),
             ("sac.entropy=Fixed(high)", "`sac.entropy` must be something such as Auto("),

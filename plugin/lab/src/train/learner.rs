@@ -15,7 +15,7 @@ use super::{
     config::Experiment,
     train_error::TrainError,
 };
-use crate::{demo::demo_card::shown_by_demos, game::Game, sensors::GameSensors};
+use crate::{game::Game, held_out::HeldOut, sensors::GameSensors};
 use bevy_playbot::vision::ObservationConfig;
 
 /// The learner of an experiment's algorithm, whichever that is.
@@ -140,7 +140,7 @@ fn fitting<'a>(
             game_actions: action_space,
         });
     }
-    match shown_by_demos(skills, game, &experiment.test) {
+    match HeldOut::new(game, &experiment.test).shown_by(skills.demos()) {
         Some(seen) => Err(TrainError::SeenSkills { seen, test: experiment.test.clone() }),
         None => Ok(skills),
     }

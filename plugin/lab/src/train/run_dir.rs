@@ -12,7 +12,7 @@
 
 use std::path::{Path, PathBuf};
 
-use playbot_learner::{DeviceKind, disk, seal_text};
+use playbot_learner::{DemoCard, DeviceKind, disk, seal_text};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -71,6 +71,9 @@ pub struct RunInfo {
     /// [Checksum](super::checksum::file_checksum) of the skill model's file, if the algorithm needs one.
     #[serde(default)]
     pub skills: Option<String>,
+    /// What its skills were learned from, or what it was trained on beside its levels, if that was noted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub demos: Option<DemoCard>,
     /// What it was started on; the usual one where a run does not say.
     #[serde(default)]
     pub device: DeviceKind,

@@ -65,7 +65,7 @@ pub enum TrainError {
     },
     /// The skill model has seen what is kept for the test.
     #[error(
-        "the skill model was learned from demonstrations of {seen}, which shares levels with the held-out levels {test} of `test`: what \
+        "the skill model was learned from demonstrations of {seen}, and the held-out levels {test} of `test` have some of these: what \
          is measured there would be no generalisation; learn skills from recordings of other levels, or hold out others"
     )]
     SeenSkills {
