@@ -7,6 +7,21 @@ use crate::program::command;
 use crate::program::{code, errors, lines, playbot, said, unsealed};
 
 #[cfg(target_os = "linux")]
+const TINY: &str = r#"(
+    game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "demos", steps: 512, arenas: 8, worlds: 2,
+    skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
+    ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
+    eval: (episodes_per_level: 1),
+)"#;
+
+/// A folder with the tiny experiment, and one in it for its recordings.
+fn prepared() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("tiny.ron"), TINY).expect("writable");
+    std::fs::create_dir(folder.path().join("demos")).expect("writable");
+    folder
+}
+
 #[test]
 fn nobody_listening_stops_no_work() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -59,16 +74,8 @@ fn recording_verifying_and_repairing_from_the_shell() {
 
 #[test]
 fn a_small_run_from_demonstrations_to_evaluation() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = prepared();
     let run = |args: &[&str]| playbot(folder.path(), args);
-    let config = r#"(
-        game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "demos", steps: 512, arenas: 8, worlds: 2,
-        skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
-        ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
-        eval: (episodes_per_level: 1),
-    )"#;
-    std::fs::write(folder.path().join("tiny.ron"), config).expect("writable");
-    std::fs::create_dir(folder.path().join("demos")).expect("writable");
     let ok = |output: Output| {
         assert_eq!(code(&output), 0, "{}", errors(&output));
         output
@@ -127,21 +134,14 @@ fn a_small_run_from_demonstrations_to_evaluation() {
 
 #[test]
 fn skills_remember_the_levels_that_they_were_learned_on() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = prepared();
     let run = |args: &[&str]| playbot(folder.path(), args);
-    let config = r#"(
-        game: "coinrun", train: "hard:0..3", test: "hard:64..65", demos: "a.demo", steps: 128, arenas: 8, worlds: 2,
-        skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
-        ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
-        eval: (episodes_per_level: 1),
-    )"#;
-    std::fs::write(folder.path().join("tiny.ron"), config).expect("writable");
     let with = |verb: &str, more: &[&str]| {
         let output = run(&[&[verb, "--experiment", "tiny.ron"], more].concat());
         (code(&output), errors(&output))
     };
     let (skills, shown) = (["--skills", "skills.safetensors"], "skills.safetensors");
-    assert_eq!(code(&run(&["record", "coinrun", "--levels", "hard:8..11", "--out", "a.demo"])), 0);
+    assert_eq!(code(&run(&["record", "coinrun", "--levels", "hard:8..11", "--out", "demos/a.demo"])), 0);
     // The levels that are kept apart for the held-out NLL were shown too.
     assert_eq!(with("learn-skills", &["--out", shown, "--set", "skills.held_out=0.5"]).0, 0);
 

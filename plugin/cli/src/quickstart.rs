@@ -202,7 +202,7 @@ fn train_one(
     let skills = algorithm.needs_skills().then_some(skills);
     let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.count())?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
-    let source = Source { skills: Some(&skill_file), demos: skills.and_then(SkillModel::demos).cloned() };
+    let source = Source::new(Some(&skill_file), skills, None);
     let run = create_run(&folder, game, &experiment, &source, DeviceKind::default(), true)?;
     interrupt::go_on_with(format!(
         "this training alone, `{} train --run {} --resume`",

@@ -198,10 +198,16 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes a folder that of a run, in place of what is there.
-    fn begin(&self, run: &StudyRun, lock: RunLock, demos: Option<DemoCard>) -> Result<RunDir, CliError> {
-        let skills = self.skill_file(run)?;
+    fn begin(
+        &self,
+        run: &StudyRun,
+        lock: RunLock,
+        skills: Option<&SkillModel>,
+        recorded: Option<DemoCard>,
+    ) -> Result<RunDir, CliError> {
+        let file = self.skill_file(run)?;
         let game = self.games.get(&run.experiment.game)?;
-        let info = run_info(game, &run.experiment, &Source { skills: Some(&skills), demos }, self.device)?;
+        let info = run_info(game, &run.experiment, &Source::new(Some(&file), skills, recorded), self.device)?;
         Ok(RunDir::begin(lock, &run.experiment, &info)?)
     }
 
@@ -230,9 +236,7 @@ impl<'a> Runner<'a> {
         };
         let dir = match run_folder {
             RunFolder::Begun(dir) => dir,
-            RunFolder::New(lock) => {
-                self.begin(run, lock, skills.as_ref().and_then(SkillModel::demos).cloned().or(card))?
-            }
+            RunFolder::New(lock) => self.begin(run, lock, skills.as_ref(), card)?,
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
             let player = cloning(skills, experiment, draw);

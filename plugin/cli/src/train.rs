@@ -147,8 +147,7 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let Recorded { rollouts, card } = read_rollouts(game, &experiment, &args.from, games, threads)?;
     let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &rollouts, device, threads)
         .map_err(|error| explain(error, args, &experiment, games))?;
-    let demos = skills.as_ref().and_then(SkillModel::demos).cloned().or(card);
-    let source = Source { skills: args.skills.as_deref(), demos };
+    let source = Source::new(args.skills.as_deref(), skills.as_ref(), card);
     let run = create_run(&args.run, game, &experiment, &source, device, args.force)?;
     if args.from.experiment.is_none() {
         let Experiment { train, test, .. } = &experiment;

@@ -10,14 +10,21 @@ use playbot_lab::{
         run_dir::{RunDir, RunError, RunInfo},
     },
 };
-use playbot_learner::{DemoCard, DeviceKind};
+use playbot_learner::{DemoCard, DeviceKind, SkillModel};
 
 /// What a run learns from besides playing.
 pub struct Source<'a> {
     /// The file of the skill model, if there is one.
-    pub skills: Option<&'a Path>,
+    skills: Option<&'a Path>,
     /// What the recordings showed that the skills were learned from, or that are trained on.
-    pub demos: Option<DemoCard>,
+    demos: Option<DemoCard>,
+}
+
+impl<'a> Source<'a> {
+    /// A skill model and its file, if there is one, else what the recordings show that are trained on.
+    pub fn new(file: Option<&'a Path>, skills: Option<&SkillModel>, recorded: Option<DemoCard>) -> Self {
+        Self { skills: file, demos: skills.and_then(SkillModel::demos).cloned().or(recorded) }
+    }
 }
 
 /// Makes the folder of a run, which says what file its skills are from.
