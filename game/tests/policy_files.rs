@@ -26,7 +26,7 @@ fn learner(obs_dim: usize) -> PpoLearner {
 }
 
 fn provenance() -> Provenance {
-    Provenance { algorithm: "ppo".to_owned(), training: "nothing".to_owned(), code: "test".to_owned() }
+    Provenance { algorithm: "ppo".to_owned(), training: "nothing".to_owned(), seen: None, code: "test".to_owned() }
 }
 
 /// A policy file of an untrained policy, written into `folder`.

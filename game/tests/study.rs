@@ -250,8 +250,17 @@ fn the_table_follows_from_the_results() {
     );
     assert!(!folder.join("runs/seen-seed1/result.json").exists());
     // What a variant sets itself stays as it is, and somebody who sets it is told.
-    let set = study(folder, "others", &["--variant", "cloned", "--set", "algorithm=ppo", "--force"]);
+    let set = study(
+        folder,
+        "others",
+        &["--variant", "cloned", "--set", "algorithm=ppo", "--set", "rlpd.critics=3", "--force"],
+    );
     assert!(errors(&set).contains("--set algorithm=ppo does not change cloned"), "{}", errors(&set));
+    assert!(
+        errors(&set).contains("--set rlpd.critics=3 changes nothing: bc reads no settings of `rlpd`"),
+        "{}",
+        errors(&set)
+    );
     fs::write(folder.join("out/results.json"), "{").expect("writable");
     refused(&rewrite(), "results.json");
     fs::remove_file(folder.join("out/results.json")).expect("there");

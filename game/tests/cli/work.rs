@@ -100,13 +100,12 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     let eval = |more: &[&str]| run(&[&["eval", "--run", "runs/a", "--run", "runs/b", "--json"], more].concat());
     let seen = eval(&[]);
     assert_eq!(code(&seen), 3);
-    for words in ["runs/b was trained on hard:64..65", "held-out levels hard:64..65", "--levels"] {
+    for words in ["runs/b has seen hard:64..65 in training", "held-out levels hard:64..65", "--levels"] {
         assert!(errors(&seen).contains(words), "{}", errors(&seen));
     }
     let on_purpose = ok(eval(&["--levels", "hard:64..65"]));
     assert_eq!(lines(&on_purpose).len(), 2);
-    let told =
-        "runs/b was trained on hard:64..65, and the levels hard:64..65 have some of these: not all of them are unseen";
+    let told = "runs/b has seen hard:64..65 in training, and the levels hard:64..65 have some of these: not all of them are unseen";
     assert!(errors(&on_purpose).contains(told), "{}", errors(&on_purpose));
     let saved = folder.path().join("runs/b/experiment.ron");
     let text = unsealed(&std::fs::read_to_string(&saved).expect("written")).replace("\"coinrun\"", "\"maze\"");
@@ -166,8 +165,29 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let train = [&skills[..], &["--run", "runs/b"]].concat();
     assert_eq!(with("train", &train).0, 0);
     let (refused, words) = with("eval", &["--run", "runs/b", "--set", "test=hard:11..12"]);
-    assert!(refused == 3 && words.contains("runs/b was learned from demonstrations of hard:8..11"), "{words}");
+    assert!(refused == 3 && words.contains("runs/b has seen hard:8..11, among others, in training"), "{words}");
     assert_eq!(with("eval", &["--run", "runs/b"]).0, 0);
+
+    // A policy file knows what both have.
+    let exported = run(&["policy", "export", "--run", "runs/b", "--out", "b.policy"]);
+    assert!(errors(&exported).contains("eval --policy b.policy --levels hard:64..65`"), "{}", errors(&exported));
+    for (test, own) in [("hard:11..12", "hard:8..11"), ("hard:3..4", "hard:0..3")] {
+        let (refused, words) = with("eval", &["--policy", "b.policy", "--set", &format!("test={test}")]);
+        assert!(
+            refused == 3 && words.contains(&format!("b.policy has seen {own}, among others, in training")),
+            "{words}"
+        );
+    }
+    assert_eq!(with("eval", &["--policy", "b.policy"]).0, 0);
+    let (refused, words) = with("eval", &["--policy", "bc.policy", "--set", "test=hard:11..12"]);
+    assert!(refused == 3 && words.contains("bc.policy has seen hard:8..11 in training"), "{words}");
+
+    // Settings of algorithms that are not trained are told.
+    let (trained, words) = with("train", &[&train[..], &["--force", "--set", "rlpd.critics=3"]].concat());
+    assert!(
+        trained == 0 && words.contains("--set rlpd.critics=3 changes nothing: score-ppo reads no settings of `rlpd`"),
+        "{words}"
+    );
 
     // What differs from what the skills were learned with is refused; the same may be asked for again.
     let (refused, words) = with("train", &[&skills[..], &["--set", "skills.latent=4", "--run", "runs/c"]].concat());

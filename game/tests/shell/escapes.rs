@@ -50,7 +50,7 @@ fn write_policy(path: &Path) {
     let config = PpoConfig { hidden: vec![8], ..PpoConfig::default() };
     let learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid");
     let evil = || EVIL.to_owned();
-    let about = Provenance { algorithm: evil(), training: evil(), code: evil() };
+    let about = Provenance { algorithm: evil(), training: evil(), code: evil(), ..Provenance::default() };
     let mut file = policy_file(&game, &ObservationConfig::default(), learner.policy(), None, about);
     file.card.actions[0] = evil();
     file.card.observations[0] = evil();

@@ -3,10 +3,7 @@
 use std::path::Path;
 
 use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
-use playbot_lab::{
-    eval::Player, game::Game, games::Games, held_out::HeldOut, sensors::GameSensors, split::LevelSplit,
-    train::Experiment,
-};
+use playbot_lab::{eval::Player, game::Game, games::Games, sensors::GameSensors, train::Experiment};
 use playbot_learner::{SkillModel, SkillSource};
 
 use super::{error::CliError, experiment::ExperimentArgs};
@@ -44,20 +41,6 @@ pub fn check_skills(
         model.observation().describe(),
         model.action_space(),
         game.name()
-    )))
-}
-
-/// Refuses skills in a file that were learned on levels which are held out: a file of an earlier study in the folder of this one.
-///
-/// # Errors
-///
-/// They were, with what to do.
-pub fn check_unseen_by(file: &Path, model: &SkillModel, game: &dyn Game, test: &LevelSplit) -> Result<(), CliError> {
-    let Some(seen) = HeldOut::new(game, test).shown_by(model.demos()) else { return Ok(()) };
-    Err(CliError::Usage(format!(
-        "{} was learned from demonstrations of {seen}, and the held-out levels {test} have some of these: keep the runs of this study \
-         in a folder of their own, with --runs",
-        file.display()
     )))
 }
 

@@ -1,6 +1,9 @@
 //! `playbot eval`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    cell::LazyCell,
+    path::{Path, PathBuf},
+};
 
 use bevy_playbot::{
     policy::ActionDraw,
@@ -10,8 +13,8 @@ use playbot_lab::{
     eval::{EvalPlan, Player},
     game::Game,
     games::{Artifact, Games},
-    held_out::HeldOut,
     mode::ModeError,
+    policy_export::seen_by_training,
     report::to_text_table,
     split::LevelSplit,
     train::{
@@ -31,6 +34,7 @@ use super::{
     interrupt::{self, NothingToSave},
     methods, open,
     player::{Chosen, check_run_of},
+    unseen::Measured,
 };
 
 /// Measure policies and baselines, every level equally often.
@@ -118,7 +122,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     // Not after some of it was measured.
     let plan_of = |split| EvalPlan::of(&experiment, split, args.compute.threads());
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
-    let players = players(game, &experiment, &args, games)?;
+    let players = players(game, &experiment, &splits, &args, games)?;
     let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
     interrupt::leave(kept.to_owned());
     let measuring = NothingToSave::listen();
@@ -199,29 +203,36 @@ fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     Ok(vec![format!("game={}", game.name()), format!("test={levels}")])
 }
 
-fn players(game: &dyn Game, experiment: &Experiment, args: &Args, games: &Games) -> Result<Vec<Chosen>, CliError> {
+fn players(
+    game: &dyn Game,
+    experiment: &Experiment,
+    splits: &[LevelSplit],
+    args: &Args,
+    games: &Games,
+) -> Result<Vec<Chosen>, CliError> {
+    let device = args.compute.device();
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    // Looks at all levels, which is not needed for bots.
+    let measured = LazyCell::new(|| Measured::new(game, splits, !args.levels.is_empty()));
     let mut players = Vec::new();
     for path in &args.run {
         let OpenedRun { run, experiment: own, info } = RunDir::open(path)?;
         check_run_of(path, &own.game, &experiment.game)?;
-        let seen = |split: &LevelSplit| HeldOut::new(game, split).first_of(&own.train).map(|_| own.train.to_string());
-        check_unseen(path, "was trained on", seen, experiment, args)?;
-        let seen = |split: &LevelSplit| HeldOut::new(game, split).shown_by(info.demos.as_ref());
-        check_unseen(path, FROM_DEMOS, seen, experiment, args)?;
-        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, args.compute.device())?;
+        measured.check(path, Some(&seen_by_training(game, &own.train, info.demos.as_ref())))?;
+        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, device)?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
-        let model = open::skills(path, args.compute.device(), &args.from)?;
+        let model = open::skills(path, device, &args.from)?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
-        let seen = |split: &LevelSplit| HeldOut::new(game, split).shown_by(model.demos());
-        check_unseen(path, FROM_DEMOS, seen, experiment, args)?;
+        measured.check(path, model.demos())?;
         let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
         players.push(named(chosen, path, args.skills.len()));
     }
     for path in &args.policy {
-        let chosen = Chosen::policy_file(game, path, draw, args.compute.device())?;
+        let file = open::policy(path, device)?;
+        let chosen = Chosen::opened_policy(game, path, &file, draw)?;
+        measured.check(path, file.card.seen.as_ref())?;
         players.push(named(chosen, path, args.policy.len()));
     }
     for name in &args.bot {
@@ -252,34 +263,6 @@ fn look_through(
         )));
     }
     *observation_config = other;
-    Ok(())
-}
-
-/// What skills, and runs with skills, have seen.
-const FROM_DEMOS: &str = "was learned from demonstrations of";
-
-/// What was learned in `path` is measured on levels that it has seen only if somebody names them. `seen` says which of a split those
-/// are.
-fn check_unseen(
-    path: &Path,
-    learned_on: &str,
-    seen: impl Fn(&LevelSplit) -> Option<String>,
-    measured: &Experiment,
-    args: &Args,
-) -> Result<(), CliError> {
-    let path = path.display();
-    if args.levels.is_empty()
-        && let Some(own) = seen(&measured.test)
-    {
-        return Err(CliError::Usage(format!(
-            "{path} {learned_on} {own}, and the held-out levels {} have some of these: choose levels that none of the players has \
-             seen, or measure there on purpose, with --levels",
-            measured.test
-        )));
-    }
-    for (split, own) in args.levels.iter().filter_map(|split| Some((split, seen(split)?))) {
-        tell!("{path} {learned_on} {own}, and the levels {split} have some of these: not all of them are unseen");
-    }
     Ok(())
 }
 

@@ -60,6 +60,8 @@ mod study_run;
 mod test;
 mod trace;
 mod train;
+mod unread_settings;
+mod unseen;
 mod unwritten;
 mod usage_error;
 mod view;

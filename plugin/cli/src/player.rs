@@ -18,7 +18,7 @@ use playbot_lab::{
         run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::DeviceKind;
+use playbot_learner::{DeviceKind, PolicyFile};
 
 use super::{compute::Device, error::CliError, methods, open};
 
@@ -87,10 +87,18 @@ impl Chosen {
     ///
     /// It cannot be loaded, or was made for another game.
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
-        let file = open::policy(path, device)?;
-        check_policy(&game.card(), &file).map_err(|misfit| does_not_fit(path, &misfit))?;
-        let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
-        Ok(Self { name: file.card.algorithm, player, observation_config })
+        Self::opened_policy(game, path, &open::policy(path, device)?, draw)
+    }
+
+    /// The policy of a file that was read from `path`.
+    ///
+    /// # Errors
+    ///
+    /// It was made for another game.
+    pub fn opened_policy(game: &dyn Game, path: &Path, file: &PolicyFile, draw: ActionDraw) -> Result<Self, CliError> {
+        check_policy(&game.card(), file).map_err(|misfit| does_not_fit(path, &misfit))?;
+        let (player, observation_config) = (Player::of_file(file, draw), policy_observation(file)?);
+        Ok(Self { name: file.card.algorithm.clone(), player, observation_config })
     }
 
     /// What a run has learned, under the name of its algorithm.

@@ -8,8 +8,10 @@ use clap::ArgGroup;
 use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
-    policy_export::{Provenance, export_policy, policy_file},
+    held_out::HeldOut,
+    policy_export::{Provenance, export_policy, policy_file, seen_by_training},
     report::whole,
+    split::LevelSplit,
     train::{
         Experiment,
         checkpoint::CheckpointChoice,
@@ -99,13 +101,28 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
     };
     check_policy(&game.card(), &file)?;
     export_policy(game, &file, &experiment.train, experiment.seed, &args.out)?;
-    let out = args.out.display().to_string();
-    let mut command = format!("{} eval --policy {}", program::name(), quoted(&out));
-    if experiment.check_test(game).is_ok() {
-        command += &format!(" --levels {}", quoted(&experiment.test.to_string()));
-    }
-    tell!("policy written to {out}: measure it with `{command}`");
+    tell!(
+        "policy written to {}: measure it with {}",
+        args.out.display(),
+        measuring(&args.out, game, &experiment.test, &file)
+    );
     Ok(Outcome::Pass)
+}
+
+/// The command that measures a policy file: on the held-out levels of its training, if the game has them and it has seen none of them.
+fn measuring(path: &Path, game: &dyn Game, test: &LevelSplit, file: &PolicyFile) -> String {
+    let command = format!("{} eval --policy {}", program::name(), quoted(&path.to_string_lossy()));
+    if test.check(game).is_err() {
+        return format!("`{command}`");
+    }
+    match HeldOut::new(game, test).shown_by(file.card.seen.as_ref()) {
+        None => format!("`{command} --levels {}`", quoted(&test.to_string())),
+        Some(seen) => {
+            format!(
+                "`{command} --levels MODE:FIRST..LAST`, on levels that it has not seen in training, as it has {seen}"
+            )
+        }
+    }
 }
 
 /// A policy to export, and what it was trained by.
@@ -136,7 +153,8 @@ fn from_run<'a>(
         info.seed
     );
     let algorithm = info.algorithm.name().to_owned();
-    let about = Provenance { algorithm, training, code: code(&info.version, &info.revision) };
+    let seen = Some(seen_by_training(game, &experiment.train, info.demos.as_ref()));
+    let about = Provenance { algorithm, training, seen, code: code(&info.version, &info.revision) };
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
     file.card.game_version = info.game_version;
@@ -153,7 +171,7 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
         (None, Some(demos)) => format!("demonstrations in {}", demos.display()),
         (None, None) => "demonstrations".to_owned(),
     };
-    let about = Provenance { algorithm: "bc".to_owned(), training, code };
+    let about = Provenance { algorithm: "bc".to_owned(), training, seen: model.demos().cloned(), code };
     let observation_config = check_skills(path, &model, game, from, games)?;
     experiment.check_train(game)?;
     let file = policy_file(game, &observation_config, model.policy(), Some(cloning_skills(&model, &experiment)), about);

@@ -5,7 +5,7 @@ use std::path::Path;
 use playbot_lab::{
     demo::dataset::Demonstrations, game::Game, games::Games, level_files::is_level_files, train::Experiment,
 };
-use playbot_learner::{Dataset, DemoCard, Rollout};
+use playbot_learner::{Dataset, Rollout, SeenLevels};
 
 use super::{
     error::CliError, experiment::ExperimentArgs, interrupt::NothingToSave, missing_demos, number::counted, progress,
@@ -40,8 +40,8 @@ pub fn read_demos(game: &dyn Game, experiment: &Experiment, path: &Path, threads
 pub struct Recorded {
     /// Their episodes; none for what trains on none.
     pub rollouts: Vec<Rollout>,
-    /// What they show.
-    pub card: Option<DemoCard>,
+    /// The levels that they show.
+    pub seen: Option<SeenLevels>,
 }
 
 /// The recordings of an experiment with their rewards, if its algorithm trains on them: all of them are replayed.
@@ -66,20 +66,19 @@ pub fn read_rollouts(
     let demos = demonstrations(game, experiment, &path)?;
     tell!();
     tell_other_modes(game, &demos, &experiment.train.mode);
-    let card = Some(demos.card(game));
+    let seen = Some(demos.seen_levels(game));
     let bar = progress::bar("replay recordings", demos.steps(), "steps");
     let rollouts = demos.rollouts(game, threads, |steps| bar.inc(steps));
     bar.finish_and_clear();
     let rollouts = rollouts?;
-    let mut rewards = rollouts.iter().flat_map(|rollout| &rollout.rewards).peekable();
-    if rewards.peek().is_some() && rewards.all(|&reward| reward == 0.0) {
+    if !rollouts.is_empty() && !rollouts.iter().any(Rollout::is_rewarded) {
         let (algorithm, path) = (experiment.algorithm, path.display());
         return Err(CliError::Usage(format!(
             "{path}: nothing in these recordings is ever rewarded, and {algorithm} learns from their rewards: name recordings that \
              reach the goal, or learn skills from these, with another algorithm"
         )));
     }
-    Ok(Recorded { rollouts, card })
+    Ok(Recorded { rollouts, seen })
 }
 
 /// Says if recordings are of another task than what is trained: they earn what theirs pays. Modes whose levels may be the same, and

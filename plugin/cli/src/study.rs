@@ -11,7 +11,7 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     report::{StudyReport, to_svg},
     train::{
-        Experiment,
+        Algorithm, Experiment,
         run_dir::{is_unstarted, write_atomically},
         sealed_file::read_sealed,
         study::{StudyError, StudyRun, study_runs, study_variants},
@@ -29,6 +29,7 @@ use super::{
     study_rewrite::rewrite,
     study_run::Runner,
     train::{never_learns, rounded},
+    unread_settings::tell_unread,
 };
 
 /// Compare variants of an experiment over several seeds.
@@ -85,6 +86,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let runs = study_runs(&experiment)?;
     check_games(&runs, &args.from, games)?;
     tell_taken_back(&experiment, &args.from.set);
+    tell_idle_settings(&experiment, &runs, &args.from.set);
     let folder = runs_folder(&args, &experiment);
     check_folder(&folder, &runs, &args)?;
     check_results(&runs, &args)?;
@@ -188,6 +190,17 @@ fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
         if !names.is_empty() {
             tell!("warning: --set {key}={value} does not change {}: their own value comes last", names.join(", "));
         }
+    }
+}
+
+/// Says which settings are of algorithms that are not run: of the `--set`, and of each variant's own.
+fn tell_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String]) {
+    let of = |variant: &str| runs.iter().find(|run| run.variant == variant).map(|run| run.experiment.algorithm);
+    let is_run = |algorithm: &Algorithm| runs.iter().any(|run| run.experiment.algorithm == *algorithm);
+    tell_unread("--set ", sets, &Algorithm::ALL.into_iter().filter(is_run).collect::<Vec<_>>());
+    for variant in &experiment.variants {
+        let algorithm: Vec<_> = of(&variant.name).into_iter().collect();
+        tell_unread(&format!("{}: ", variant.name), &variant.set, &algorithm);
     }
 }
 

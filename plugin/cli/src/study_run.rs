@@ -20,10 +20,10 @@ use playbot_lab::{
         study::StudyRun,
     },
 };
-use playbot_learner::{DemoCard, DeviceKind, SkillModel, disk};
+use playbot_learner::{DeviceKind, SeenLevels, SkillModel, disk};
 
 use super::{
-    cloning::{check_unseen_by, cloning},
+    cloning::cloning,
     differences::{Options, in_words},
     error::CliError,
     experiment::ExperimentArgs,
@@ -34,6 +34,7 @@ use super::{
     study_demos::StudyDemos,
     study_metrics::{learning_curves, training_result},
     train::{Source, drive, run_info},
+    unseen::check_skills_unseen,
 };
 
 const RESULT: &str = "result.json";
@@ -203,7 +204,7 @@ impl<'a> Runner<'a> {
         run: &StudyRun,
         lock: RunLock,
         skills: Option<&SkillModel>,
-        recorded: Option<DemoCard>,
+        recorded: Option<SeenLevels>,
     ) -> Result<RunDir, CliError> {
         let file = self.skill_file(run)?;
         let game = self.games.get(&run.experiment.game)?;
@@ -230,13 +231,13 @@ impl<'a> Runner<'a> {
             },
             false => None,
         };
-        let Recorded { rollouts, card } = match begun {
+        let Recorded { rollouts, seen } = match begun {
             true => Recorded::default(),
             false => read_rollouts(game, experiment, self.from, self.games, self.threads)?,
         };
         let dir = match run_folder {
             RunFolder::Begun(dir) => dir,
-            RunFolder::New(lock) => self.begin(run, lock, skills.as_ref(), card)?,
+            RunFolder::New(lock) => self.begin(run, lock, skills.as_ref(), seen)?,
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
             let player = cloning(skills, experiment, draw);
@@ -275,7 +276,7 @@ impl<'a> Runner<'a> {
             self.learned.insert(file.clone());
         }
         let model = SkillModel::load(&file, self.device)?;
-        check_unseen_by(&file, &model, game, &run.experiment.test)?;
+        check_skills_unseen(&file, &model, game, &run.experiment.test)?;
         Ok(Some(model))
     }
 

@@ -4,7 +4,7 @@ mod length;
 mod new_run;
 mod repeated;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use playbot_lab::{
     games::{Artifact, Games},
@@ -23,6 +23,7 @@ use super::{
     experiment::{ExperimentArgs, sets_key},
     interrupt, open, program, progress,
     read_demos::{Recorded, read_rollouts},
+    unread_settings::tell_unread,
 };
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_learner::SkillModel;
@@ -127,6 +128,7 @@ pub fn tell_length(experiment: &Experiment) {
 
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = args.from.load(games, args.settings())?;
+    tell_unread("--set ", &args.from.set, &[experiment.algorithm]);
     check_new(&args.run, args.force)?;
     let game = open::game(games, &args.from, &experiment)?;
     // Levels are checked by the trainer, which takes longer.
@@ -144,14 +146,13 @@ fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     skills.iter().try_for_each(|model| check_asked(args, &experiment, model))?;
     let (device, threads) = (args.compute.device(), args.compute.threads());
     interrupt::leave("nothing is trained yet".to_owned());
-    let Recorded { rollouts, card } = read_rollouts(game, &experiment, &args.from, games, threads)?;
+    let Recorded { rollouts, seen } = read_rollouts(game, &experiment, &args.from, games, threads)?;
     let trainer = Trainer::with_demos(game, &experiment, skills.as_ref(), &rollouts, device, threads)
         .map_err(|error| explain(error, args, &experiment, games))?;
-    let source = Source::new(args.skills.as_deref(), skills.as_ref(), card);
+    let source = Source::new(args.skills.as_deref(), skills.as_ref(), seen);
     let run = create_run(&args.run, game, &experiment, &source, device, args.force)?;
     if args.from.experiment.is_none() {
-        let Experiment { train, test, .. } = &experiment;
-        tell!("no --experiment is named: training on {train}, held out for the test {test}");
+        tell!("no --experiment is named: training on {}, held out for the test {}", experiment.train, experiment.test);
     }
     Ok((run, trainer))
 }
@@ -179,8 +180,8 @@ fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Game
         TrainError::NoSkills(algorithm) => algorithm,
         TrainError::Experiment(error) => return args.from.locate(games, args.settings(), error).into(),
         TrainError::ForeignSkills { .. } | TrainError::SkillObservation { .. } | TrainError::SeenSkills { .. } => {
-            let path = args.skills.as_deref().unwrap_or_else(|| Path::new("skills.safetensors"));
-            return CliError::Usage(format!("{}: {error}", path.display()));
+            let file = args.skills.iter().map(|path| format!("{}: ", path.display())).collect::<String>();
+            return CliError::Usage(format!("{file}{error}"));
         }
         other => return other.into(),
     };

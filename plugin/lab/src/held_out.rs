@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use bevy_playbot::level_files::LevelFile;
-use playbot_learner::DemoCard;
+use playbot_learner::SeenLevels;
 
 use crate::{game::Game, split::LevelSplit};
 
@@ -51,24 +51,27 @@ impl<'a> HeldOut<'a> {
         levels.levels().find(|&level| self.contains(&levels.mode, level))
     }
 
-    /// Which of them demonstrations show, in words; `None` if these show none, or if nobody noted what they show.
-    pub fn shown_by(&self, demos: Option<&DemoCard>) -> Option<String> {
-        let card = demos.filter(|card| card.game == self.game.name())?;
+    /// What of `seen` is among them, in words; `None` if nothing is, or if nobody noted what was seen.
+    pub fn shown_by(&self, seen: Option<&SeenLevels>) -> Option<String> {
+        let seen = seen.filter(|seen| seen.game == self.game.name())?;
         // A mode that the game has no more has none of its levels.
-        let ranges = card.levels.iter().filter_map(|range| range.parse::<LevelSplit>().ok());
+        let ranges = seen.levels.iter().filter_map(|range| range.parse::<LevelSplit>().ok());
         let mut known = ranges.filter(|range| self.game.check_mode(&range.mode).is_ok());
         let shown = known.find(|range| self.first_of(range).is_some()).map(|range| range.to_string());
-        let shown = shown.or_else(|| self.file_of(card))?;
-        let is_all = card.levels.len() + card.level_files.len() == 1;
+        let shown = shown.or_else(|| self.file_of(&seen.level_files))?;
+        let is_all = seen.levels.len() + seen.level_files.len() == 1;
         Some(if is_all { shown } else { format!("{shown}, among others") })
     }
 
-    /// The first of these levels that is in a file which demonstrations show.
-    fn file_of(&self, card: &DemoCard) -> Option<String> {
+    /// The first of them that is one of these files.
+    fn file_of(&self, hashes: &[u64]) -> Option<String> {
+        if !hashes.iter().any(|hash| self.fingerprints.contains(hash)) {
+            return None;
+        }
         let mode = &self.split.mode;
         let is_shown = |level: &u64| {
             let fingerprint = self.game.fingerprint(mode, *level);
-            fingerprint.is_some_and(|print| card.level_files.contains(&print))
+            fingerprint.is_some_and(|print| hashes.contains(&print))
         };
         self.split.levels().find(is_shown).map(|level| format!("{mode}:{level}"))
     }

@@ -36,7 +36,7 @@ use crate::{
     eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
-    policy_export::{Provenance, policy_file},
+    policy_export::{Provenance, policy_file, seen_by_training},
     split::LevelSplit,
     train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
 };
@@ -171,6 +171,7 @@ pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
     let provenance = Provenance {
         algorithm: experiment.algorithm.name().to_owned(),
         training: format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed),
+        seen: Some(seen_by_training(game, &experiment.train, None)),
         code: format!("playbot {}", env!("CARGO_PKG_VERSION")),
     };
     policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), provenance)

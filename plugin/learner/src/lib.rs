@@ -50,6 +50,7 @@ pub mod rng;
 mod rollout;
 pub mod sac;
 pub mod score;
+mod seen_levels;
 pub mod skill;
 mod space;
 mod spec;
@@ -71,8 +72,9 @@ pub use rng::{RngState, Streams};
 pub use rollout::{EndStates, ObsColumns, Rollout, RolloutStep};
 pub use sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics};
 pub use score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
+pub use seen_levels::SeenLevels;
 pub use skill::{
-    ActionInput, Dataset, DemoCard, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+    ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
     SkillProgress, SkillSource, SkillTrainer, WindowRule,
 };
 pub use space::{Action, ActionSpace, Actions};

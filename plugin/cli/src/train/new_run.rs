@@ -10,19 +10,19 @@ use playbot_lab::{
         run_dir::{RunDir, RunError, RunInfo},
     },
 };
-use playbot_learner::{DemoCard, DeviceKind, SkillModel};
+use playbot_learner::{DeviceKind, SeenLevels, SkillModel};
 
 /// What a run learns from besides playing.
 pub struct Source<'a> {
     /// The file of the skill model, if there is one.
     skills: Option<&'a Path>,
     /// What the recordings showed that the skills were learned from, or that are trained on.
-    demos: Option<DemoCard>,
+    demos: Option<SeenLevels>,
 }
 
 impl<'a> Source<'a> {
     /// A skill model and its file, if there is one, else what the recordings show that are trained on.
-    pub fn new(file: Option<&'a Path>, skills: Option<&SkillModel>, recorded: Option<DemoCard>) -> Self {
+    pub fn new(file: Option<&'a Path>, skills: Option<&SkillModel>, recorded: Option<SeenLevels>) -> Self {
         Self { skills: file, demos: skills.and_then(SkillModel::demos).cloned().or(recorded) }
     }
 }

@@ -149,7 +149,7 @@ impl Demonstrations {
         progress: impl Fn(u64) + Sync,
     ) -> Result<Dataset, VerifyError> {
         let seen = self.seen(game, threads, &progress)?;
-        let seen = seen.with_card(self.card(game));
+        let seen = seen.with_seen(self.seen_levels(game));
         if !self.with_states {
             return Ok(seen);
         }

@@ -3,10 +3,10 @@
 mod action_noise;
 mod chosen;
 pub mod dataset;
-mod demo_card;
 pub mod demonstration;
 mod observe;
 mod replay_observations;
 mod replayed;
 mod rollouts;
+mod seen_levels;
 pub mod verify;

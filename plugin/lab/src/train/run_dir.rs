@@ -12,7 +12,7 @@
 
 use std::path::{Path, PathBuf};
 
-use playbot_learner::{DemoCard, DeviceKind, disk, seal_text};
+use playbot_learner::{DeviceKind, SeenLevels, disk, seal_text};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -73,7 +73,7 @@ pub struct RunInfo {
     pub skills: Option<String>,
     /// What its skills were learned from, or what it was trained on beside its levels, if that was noted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub demos: Option<DemoCard>,
+    pub demos: Option<SeenLevels>,
     /// What it was started on; the usual one where a run does not say.
     #[serde(default)]
     pub device: DeviceKind,

@@ -1,6 +1,6 @@
 //! What a policy file says about itself to people.
 
-use crate::PictureCard;
+use crate::{PictureCard, SeenLevels};
 use serde::{Deserialize, Serialize};
 
 /// What a policy was made for and by, for people and for checks.
@@ -22,6 +22,9 @@ pub struct PolicyCard {
     pub algorithm: String,
     /// What it was trained on, and for how long.
     pub training: String,
+    /// The levels that it has seen, those that its demonstrations show among them; `None` where nobody noted them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seen: Option<SeenLevels>,
     /// Version and revision of the code that wrote the file.
     pub code: String,
 }

@@ -93,6 +93,11 @@ impl Rollout {
         self.steps * self.envs
     }
 
+    /// Whether any step was rewarded, well or badly: there is nothing to learn of rewards elsewhere.
+    pub fn is_rewarded(&self) -> bool {
+        self.rewards.iter().any(|&reward| reward != 0.0)
+    }
+
     /// Forgets all steps and keeps the memory.
     pub fn clear(&mut self) {
         self.steps = 0;

@@ -27,7 +27,7 @@ impl Demos {
         if rows == 0 {
             return Err(LearnError::Config("the recordings hold no steps to learn from".to_owned()));
         }
-        if episodes.iter().flat_map(|episode| &episode.rewards).all(|&reward| reward == 0.0) {
+        if !episodes.iter().any(Rollout::is_rewarded) {
             let text = "nothing in the recordings was ever rewarded, and this algorithm learns from their rewards; learn \
                         skills from them instead";
             return Err(LearnError::Config(text.to_owned()));

@@ -1,9 +1,9 @@
 //! Demonstrations.
 
-use super::{DemoCard, Window};
+use super::Window;
 use crate::norm::ObsStats;
 use crate::rng::fnv1a;
-use crate::{ActionSpace, Actions, LearnError, ObsKind, Observations};
+use crate::{ActionSpace, Actions, LearnError, ObsKind, Observations, SeenLevels};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,8 +26,8 @@ pub struct Dataset {
     pub(super) levels: Arc<[usize]>,
     /// The same episodes as vectors of the game's state, if they are known.
     pub(super) states: Option<Arc<Self>>,
-    /// Where they come from, if somebody noted it.
-    pub(super) card: Option<Arc<DemoCard>>,
+    /// Which levels they show, if somebody noted it.
+    pub(super) seen: Option<Arc<SeenLevels>>,
 }
 
 impl Dataset {
@@ -53,7 +53,7 @@ impl Dataset {
         }
         let levels = (0..episodes.len()).collect();
         let episodes = episodes.into_iter().map(Arc::new).collect();
-        Ok(Self { observation, space, episodes, levels, states: None, card: None })
+        Ok(Self { observation, space, episodes, levels, states: None, seen: None })
     }
 
     /// Says which episodes were played on the same level, by any number that is the same for them: what
@@ -67,9 +67,9 @@ impl Dataset {
         Ok(Self { levels: levels.into(), ..self })
     }
 
-    /// Notes where they come from: skill models that are learned from them [say so](super::SkillModel::demos).
-    pub fn with_card(self, card: DemoCard) -> Self {
-        Self { card: Some(Arc::new(card)), ..self }
+    /// Notes which levels they show: skill models that are learned from them [say so](super::SkillModel::demos).
+    pub fn with_seen(self, seen: SeenLevels) -> Self {
+        Self { seen: Some(Arc::new(seen)), ..self }
     }
 
     /// What an observation is.
@@ -105,7 +105,7 @@ impl Dataset {
             episodes: numbers.iter().map(|&i| Arc::clone(&self.episodes[i])).collect(),
             levels: numbers.iter().map(|&i| self.levels[i]).collect(),
             states: self.states.as_ref().map(|states| Arc::new(states.subset(numbers))),
-            card: self.card.clone(),
+            seen: self.seen.clone(),
         }
     }
 

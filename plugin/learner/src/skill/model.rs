@@ -1,11 +1,11 @@
 //! A trained skill model and its file.
 
-use super::{DemoCard, Prior, SkillConfig, SkillDescription, SkillNets};
+use super::{Prior, SkillConfig, SkillDescription, SkillNets};
 use crate::file::{FileKind, TensorFile};
 use crate::nn::frozen;
 use crate::norm::{ObsStats, put_obs_stats};
 use crate::policy::{Actor, Policy};
-use crate::{ActionSpace, DeviceKind, FileError, ObsKind, PictureCard};
+use crate::{ActionSpace, DeviceKind, FileError, ObsKind, PictureCard, SeenLevels};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     picture: Option<PictureCard>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    demos: Option<DemoCard>,
+    demos: Option<SeenLevels>,
 }
 
 const FILE: FileKind = FileKind { name: "skill model", version: 1 };
@@ -35,7 +35,7 @@ pub struct SkillModel {
     pub(crate) stats: Option<Arc<ObsStats>>,
     pub(crate) device: DeviceKind,
     picture: Option<PictureCard>,
-    demos: Option<DemoCard>,
+    demos: Option<SeenLevels>,
 }
 
 impl SkillModel {
@@ -60,12 +60,12 @@ impl SkillModel {
     }
 
     /// The model with a note on what it was learned from.
-    pub(super) fn with_demos(self, demos: Option<DemoCard>) -> Self {
+    pub(super) fn with_demos(self, demos: Option<SeenLevels>) -> Self {
         Self { demos, ..self }
     }
 
-    /// What it was learned from, if [that was noted](super::Dataset::with_card): not in files of older versions.
-    pub fn demos(&self) -> Option<&DemoCard> {
+    /// What it was learned from, if [that was noted](super::Dataset::with_seen): not in files of older versions.
+    pub fn demos(&self) -> Option<&SeenLevels> {
         self.demos.as_ref()
     }
 

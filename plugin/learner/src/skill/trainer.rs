@@ -192,7 +192,7 @@ impl SkillTrainer {
     /// The model as it is now; with [`SkillConfig::patience`] as it was best.
     pub fn model(&self) -> SkillModel {
         SkillModel::new(self.description(), &self.nets_of_model(), self.stats.clone(), self.device)
-            .with_demos(self.dataset.card.as_deref().cloned())
+            .with_demos(self.dataset.seen.as_deref().cloned())
     }
 
     pub(super) fn cut_windows(&self, epoch: u64) -> Result<Vec<Window>, LearnError> {

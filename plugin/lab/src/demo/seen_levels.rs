@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use playbot_learner::DemoCard;
+use playbot_learner::SeenLevels;
 
 use super::dataset::Demonstrations;
 use crate::{game::Game, split::LevelSplit};
 
 impl Demonstrations {
-    /// What is noted of them by what learns from them.
-    pub fn card(&self, game: &dyn Game) -> DemoCard {
+    /// The levels that they show.
+    pub fn seen_levels(&self, game: &dyn Game) -> SeenLevels {
         let (mut levels, mut files) = (BTreeMap::<&str, BTreeSet<u64>>::new(), BTreeSet::new());
         for demo in &self.episodes {
             match &demo.episode.level_file {
@@ -20,7 +20,7 @@ impl Demonstrations {
         let ranges = levels
             .into_iter()
             .flat_map(|(mode, seeds)| LevelSplit::ranges(mode, &seeds.into_iter().collect::<Vec<_>>()));
-        DemoCard {
+        SeenLevels {
             game: game.name().to_owned(),
             levels: ranges.map(|range| range.to_string()).collect(),
             level_files: files.into_iter().collect(),

@@ -1,26 +1,26 @@
-//! What demonstrations say about themselves to people.
+//! Which levels a training has seen.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Most ranges that are named where a card is said.
+/// Most ranges that are named in words.
 const NAMED: usize = 4;
 
-/// Where the demonstrations come from that skills are learned from, for people and for checks: a policy that plays these skills has
-/// seen their levels.
+/// Levels that something has learned from, by playing them or from demonstrations that show them, for people and for checks: what it
+/// does there says nothing of unseen ones.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug, Default)]
 #[serde(deny_unknown_fields)]
-pub struct DemoCard {
+pub struct SeenLevels {
     /// Name of the game.
     pub game: String,
-    /// The levels that they show, as ranges with both ends, such as `hard:0..63`.
+    /// The levels, as ranges with both ends, such as `hard:0..63`.
     pub levels: Vec<String>,
-    /// Hashes of the level files that they show.
+    /// Hashes of those that are files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub level_files: Vec<u64>,
 }
 
-impl fmt::Display for DemoCard {
+impl fmt::Display for SeenLevels {
     /// Its levels: `hard:0..63, easy:5..5 and 2 level files`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts: Vec<String> = self.levels.iter().take(NAMED).cloned().collect();
@@ -44,15 +44,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_card_is_said_in_few_words() {
-        let card = |levels: usize, files: u64| {
+    fn they_are_said_in_few_words() {
+        let seen = |levels: usize, files: u64| {
             let levels = (0..levels).map(|i| format!("hard:{i}..{i}")).collect();
-            DemoCard { game: "a".to_owned(), levels, level_files: (0..files).collect() }.to_string()
+            SeenLevels { game: "a".to_owned(), levels, level_files: (0..files).collect() }.to_string()
         };
-        assert_eq!(card(1, 0), "hard:0..0");
-        assert_eq!(card(2, 1), "hard:0..0, hard:1..1 and 1 level file");
-        assert_eq!(card(0, 2), "2 level files");
-        assert!(card(9, 0).ends_with("hard:3..3 and 5 more ranges of levels"), "{}", card(9, 0));
-        assert_eq!(card(0, 0), "no levels");
+        assert_eq!(seen(1, 0), "hard:0..0");
+        assert_eq!(seen(2, 1), "hard:0..0, hard:1..1 and 1 level file");
+        assert_eq!(seen(0, 2), "2 level files");
+        assert!(seen(9, 0).ends_with("hard:3..3 and 5 more ranges of levels"), "{}", seen(9, 0));
+        assert_eq!(seen(0, 0), "no levels");
     }
 }
