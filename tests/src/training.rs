@@ -22,7 +22,7 @@ pub fn run_info(experiment: &Experiment) -> RunInfo {
         revision: "test".into(),
         game_version: 1,
         skills: None,
-        demos: None,
+        seen: None,
         device: DeviceKind::Flex,
     }
 }

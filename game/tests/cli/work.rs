@@ -160,6 +160,13 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     assert_eq!(code(&run(&export)), 0);
     let card = run(&["policy", "show", "bc.policy"]);
     assert!(said(&card).contains("demonstrations of hard:8..11"), "{}", said(&card));
+    let seen_one = ["--set", "test=hard:11..12", "--force"];
+    let exported = errors(&run(&[&export[..], &seen_one].concat()));
+    assert!(
+        exported
+            .contains("--levels MODE:FIRST..LAST`, on levels that it has not seen in training, as it has hard:8..11"),
+        "{exported}"
+    );
 
     // A run knows what its skills have seen, though it was trained on other levels.
     let train = [&skills[..], &["--run", "runs/b"]].concat();
@@ -171,6 +178,8 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     // A policy file knows what both have.
     let exported = run(&["policy", "export", "--run", "runs/b", "--out", "b.policy"]);
     assert!(errors(&exported).contains("eval --policy b.policy --levels hard:64..65`"), "{}", errors(&exported));
+    let card = run(&["policy", "show", "b.policy"]);
+    assert!(said(&card).contains("has seen      hard:0..3 and hard:8..11"), "{}", said(&card));
     for (test, own) in [("hard:11..12", "hard:8..11"), ("hard:3..4", "hard:0..3")] {
         let (refused, words) = with("eval", &["--policy", "b.policy", "--set", &format!("test={test}")]);
         assert!(

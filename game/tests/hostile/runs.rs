@@ -37,7 +37,7 @@ fn trained(path: &Path) {
         revision: "r".to_owned(),
         game_version: 1,
         skills: None,
-        demos: None,
+        seen: None,
         device: DeviceKind::Flex,
     };
     let run = RunDir::create(path, &experiment, &info, false).expect("writable");

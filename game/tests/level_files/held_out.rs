@@ -1,7 +1,12 @@
 //! Held-out levels that are files.
 
-use playbot_games::coinrun::CoinRun;
-use playbot_lab::{held_out::HeldOut, level_files::level_files_mode, prelude::*};
+use playbot_games::{coinrun::CoinRun, maze2d::Maze2d};
+use playbot_lab::{
+    held_out::{HeldOut, seen_by_training},
+    level_files::level_files_mode,
+    prelude::*,
+};
+use playbot_learner::SeenLevels;
 
 #[test]
 fn a_copy_of_a_held_out_level_is_found_under_any_name() {
@@ -27,4 +32,53 @@ fn a_copy_of_a_held_out_level_is_found_under_any_name() {
     assert_eq!(hidden.first_of(&train), Some(1));
     assert!(!hidden.contains(&train.mode, 0) && hidden.contains(&train.mode, 1) && !hidden.contains(&train.mode, 2));
     assert!(!hidden.contains("hard", 0));
+
+    // What was trained on files has seen what was in them then, whatever becomes of them.
+    let seen = seen_by_training(&game, &train);
+    assert!(seen.levels.is_empty() && seen.level_files.len() == 3, "{seen:?}");
+    std::fs::remove_dir_all(folder.path().join("train")).expect("removable");
+    let shown = hidden.shown_by(Some(&seen)).expect("it has seen the copy");
+    assert!(shown.contains("test/*.json:0, among others"), "{shown}");
+    let others = SeenLevels {
+        level_files: seen.level_files.iter().copied().filter(|hash| test_hash(&game, &test) != *hash).collect(),
+        ..seen
+    };
+    assert_eq!((others.level_files.len(), hidden.shown_by(Some(&others))), (2, None));
+}
+
+fn test_hash(game: &CoinRun, test: &LevelSplit) -> u64 {
+    game.fingerprint(&test.mode, 0).expect("a file")
+}
+
+#[test]
+fn what_a_file_says_that_it_has_seen_is_not_believed_beyond_reason() {
+    let game = CoinRun::default();
+    let test = LevelSplit { mode: "hard".to_owned(), first: 64, last: 127 };
+    let hidden = HeldOut::new(&game, &test);
+    let shown = |levels: &[&str]| {
+        let levels = levels.iter().map(|&range| range.to_owned()).collect();
+        hidden.shown_by(Some(&SeenLevels { game: "coinrun".to_owned(), levels, ..SeenLevels::default() }))
+    };
+    assert_eq!(shown(&["hard:0..63"]), None);
+    assert_eq!(shown(&["hard:127..130"]).as_deref(), Some("hard:127..130"));
+    assert_eq!(shown(&["hard:0..63", "hard:90..90"]).as_deref(), Some("hard:90..90, among others"));
+    // No pattern is looked for on the disk, and no mode or range that there is not is taken for one.
+    assert_eq!(shown(&["files:/**", "files:/**/*.json:0..3", "no-such-mode:64..70", "hard", "", "hard:9..3"]), None);
+    let other_game =
+        SeenLevels { game: "maze2d".to_owned(), levels: vec!["hard:64..127".to_owned()], ..SeenLevels::default() };
+    assert_eq!((hidden.shown_by(Some(&other_game)), hidden.shown_by(None)), (None, None));
+
+    // Small mazes are found by what they look like, too, but not among millions.
+    let game = Maze2d::default();
+    let mazes = |first, last| LevelSplit { mode: "random+size=3x3".to_owned(), first, last };
+    let test = mazes(0, 63);
+    let hidden = HeldOut::new(&game, &test);
+    let shown = |ranges: &[LevelSplit]| {
+        let levels = ranges.iter().map(LevelSplit::to_string).collect();
+        hidden.shown_by(Some(&SeenLevels { game: "maze2d".to_owned(), levels, ..SeenLevels::default() }))
+    };
+    let (few, millions) = (mazes(1000, 1999), mazes(1 << 20, (1 << 24) - 1));
+    assert_eq!(shown(std::slice::from_ref(&few)), Some(few.to_string()));
+    assert_eq!(shown(&[millions.clone(), few]), None, "that would take long");
+    assert_eq!(shown(&[millions, mazes(63, 64)]).as_deref(), Some("random+size=3x3:63..64, among others"));
 }

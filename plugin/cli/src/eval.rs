@@ -14,7 +14,6 @@ use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
     mode::ModeError,
-    policy_export::seen_by_training,
     report::to_text_table,
     split::LevelSplit,
     train::{
@@ -34,7 +33,7 @@ use super::{
     interrupt::{self, NothingToSave},
     methods, open,
     player::{Chosen, check_run_of},
-    unseen::Measured,
+    unseen::{Measured, seen_by_run},
 };
 
 /// Measure policies and baselines, every level equally often.
@@ -218,7 +217,7 @@ fn players(
     for path in &args.run {
         let OpenedRun { run, experiment: own, info } = RunDir::open(path)?;
         check_run_of(path, &own.game, &experiment.game)?;
-        measured.check(path, Some(&seen_by_training(game, &own.train, info.demos.as_ref())))?;
+        measured.check(path, Some(&seen_by_run(game, &own, &info)))?;
         let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, device)?;
         players.push(named(chosen, path, args.run.len()));
     }

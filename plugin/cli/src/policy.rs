@@ -9,7 +9,7 @@ use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
     held_out::HeldOut,
-    policy_export::{Provenance, export_policy, policy_file, seen_by_training},
+    policy_export::{Provenance, export_policy, policy_file},
     report::whole,
     split::LevelSplit,
     train::{
@@ -29,7 +29,9 @@ use super::{
     open,
     output::prepare,
     player::check_run_of,
-    program, words,
+    program,
+    unseen::seen_by_run,
+    words,
 };
 
 /// Make and look at policy files, which a game ships with.
@@ -153,7 +155,7 @@ fn from_run<'a>(
         info.seed
     );
     let algorithm = info.algorithm.name().to_owned();
-    let seen = Some(seen_by_training(game, &experiment.train, info.demos.as_ref()));
+    let seen = Some(seen_by_run(game, &experiment, &info));
     let about = Provenance { algorithm, training, seen, code: code(&info.version, &info.revision) };
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules that it was trained under, which may not be those of today.
@@ -203,6 +205,9 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
     print_line(format!("{}, version {} of its rules{where_else}", card.game, card.game_version))?;
     print_line(format!("algorithm     {}", card.algorithm))?;
     print_line(format!("trained on    {}", card.training))?;
+    if let Some(seen) = &card.seen {
+        print_line(format!("has seen      {seen}"))?;
+    }
     print_line(format!("code          {}", card.code))?;
     print_line(match policy_observation(&file)? {
         observation_config if observation_config.is_image() => format!("observation   {observation_config}"),

@@ -1,4 +1,4 @@
-//! Settings that change nothing, since they are those of another algorithm.
+//! Settings in sections of other algorithms, which change nothing.
 
 use playbot_lab::train::Algorithm;
 

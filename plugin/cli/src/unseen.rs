@@ -2,7 +2,12 @@
 
 use std::path::Path;
 
-use playbot_lab::{game::Game, held_out::HeldOut, split::LevelSplit};
+use playbot_lab::{
+    game::Game,
+    held_out::{HeldOut, seen_by_training},
+    split::LevelSplit,
+    train::{Experiment, run_dir::RunInfo},
+};
 use playbot_learner::{SeenLevels, SkillModel};
 
 use super::error::CliError;
@@ -41,6 +46,11 @@ impl<'a> Measured<'a> {
         }
         Ok(())
     }
+}
+
+/// The levels that a run has seen; of runs that do not say, those that it was trained on.
+pub fn seen_by_run(game: &dyn Game, experiment: &Experiment, info: &RunInfo) -> SeenLevels {
+    info.seen.clone().unwrap_or_else(|| seen_by_training(game, &experiment.train))
 }
 
 /// Refuses skills in a file that were learned on levels which are held out: a file of an earlier study in the folder of this one.

@@ -5,7 +5,10 @@ use std::collections::BTreeSet;
 use bevy_playbot::level_files::LevelFile;
 use playbot_learner::SeenLevels;
 
-use crate::{game::Game, split::LevelSplit};
+use crate::{game::Game, level_files::is_level_files, split::LevelSplit};
+
+/// Most levels that a file can ask to be drawn and compared: what it says is not to take for ever.
+const MOST_COMPARED: u64 = 1 << 18;
 
 /// Held-out levels, as nobody may see them before the test: neither under the rules of another mode, nor where another seed
 /// happens to draw the same places.
@@ -41,23 +44,41 @@ impl<'a> HeldOut<'a> {
 
     /// The first of these levels that is held out.
     pub fn first_of(&self, levels: &LevelSplit) -> Option<u64> {
+        self.first_by_number(levels).or_else(|| self.first_by_look(levels))
+    }
+
+    fn first_by_number(&self, levels: &LevelSplit) -> Option<u64> {
         let (first, last) = (levels.first.max(self.split.first), levels.last.min(self.split.last));
-        if first <= last && self.game.family(&levels.mode) == self.family {
-            return Some(first);
-        }
+        (first <= last && self.game.family(&levels.mode) == self.family).then_some(first)
+    }
+
+    fn first_by_look(&self, levels: &LevelSplit) -> Option<u64> {
         if self.fingerprints.is_empty() {
             return None;
         }
         levels.levels().find(|&level| self.contains(&levels.mode, level))
     }
 
-    /// What of `seen` is among them, in words; `None` if nothing is, or if nobody noted what was seen.
+    /// What of `seen` is among them, in words; `None` if nothing is, or if nobody noted what was seen. Of the many levels that a file
+    /// may name, all are compared by their numbers, and those of the first ranges by what they look like.
     pub fn shown_by(&self, seen: Option<&SeenLevels>) -> Option<String> {
         let seen = seen.filter(|seen| seen.game == self.game.name())?;
+        // Files are noted by what is in them: a pattern from a stranger is not looked for on the disk.
+        let ranges = seen.levels.iter().filter(|range| !is_level_files(range));
+        let ranges = ranges.filter_map(|range| range.parse::<LevelSplit>().ok());
         // A mode that the game has no more has none of its levels.
-        let ranges = seen.levels.iter().filter_map(|range| range.parse::<LevelSplit>().ok());
-        let mut known = ranges.filter(|range| self.game.check_mode(&range.mode).is_ok());
-        let shown = known.find(|range| self.first_of(range).is_some()).map(|range| range.to_string());
+        let known: Vec<_> = ranges.filter(|range| self.game.check_mode(&range.mode).is_ok()).collect();
+        let by_number = || known.iter().find(|range| self.first_by_number(range).is_some());
+        let by_look = || {
+            let mut left = MOST_COMPARED;
+            let mut near = known.iter().take_while(|range| {
+                let is_near = range.len() <= left;
+                left = left.saturating_sub(range.len());
+                is_near
+            });
+            near.find(|range| self.first_by_look(range).is_some())
+        };
+        let shown = by_number().or_else(by_look).map(|range| range.to_string());
         let shown = shown.or_else(|| self.file_of(&seen.level_files))?;
         let is_all = seen.levels.len() + seen.level_files.len() == 1;
         Some(if is_all { shown } else { format!("{shown}, among others") })
@@ -75,4 +96,14 @@ impl<'a> HeldOut<'a> {
         };
         self.split.levels().find(is_shown).map(|level| format!("{mode}:{level}"))
     }
+}
+
+/// What a training on these levels sees. Files are noted by what is in them now.
+pub fn seen_by_training(game: &dyn Game, train: &LevelSplit) -> SeenLevels {
+    let game_name = game.name().to_owned();
+    if is_level_files(&train.mode) {
+        let level_files = train.levels().filter_map(|level| game.fingerprint(&train.mode, level)).collect();
+        return SeenLevels { game: game_name, levels: Vec::new(), level_files };
+    }
+    SeenLevels { game: game_name, levels: vec![train.to_string()], level_files: Vec::new() }
 }

@@ -36,7 +36,7 @@ use crate::{
     eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
-    policy_export::{Provenance, policy_file, seen_by_training},
+    policy_export::{Provenance, policy_file},
     split::LevelSplit,
     train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
 };
@@ -135,11 +135,16 @@ pub fn train(
     threads: usize,
     mut after_update: impl FnMut(&UpdateReport),
 ) -> Result<Trainer, PipelineError> {
-    let demos = match experiment.algorithm.trains_on_demos() {
-        true => Demonstrations::of(game, experiment, experiment.recordings()?)?.rollouts(game, threads, |_| {})?,
-        false => Vec::new(),
+    let mut trainer = if experiment.algorithm.trains_on_demos() {
+        let demos = Demonstrations::of(game, experiment, experiment.recordings()?)?;
+        let seen = demos.seen_levels(game);
+        let rollouts = demos.rollouts(game, threads, |_| {})?;
+        let mut trainer = Trainer::with_demos(game, experiment, skills, &rollouts, device, threads)?;
+        trainer.note_seen(&seen);
+        trainer
+    } else {
+        Trainer::new(game, experiment, skills, device, threads)?
     };
-    let mut trainer = Trainer::with_demos(game, experiment, skills, &demos, device, threads)?;
     while !trainer.is_done() {
         after_update(&trainer.update()?);
     }
@@ -171,7 +176,7 @@ pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
     let provenance = Provenance {
         algorithm: experiment.algorithm.name().to_owned(),
         training: format!("{} steps on {}, seed {}", trainer.steps(), experiment.train, experiment.seed),
-        seen: Some(seen_by_training(game, &experiment.train, None)),
+        seen: trainer.seen().cloned(),
         code: format!("playbot {}", env!("CARGO_PKG_VERSION")),
     };
     policy_file(game, &experiment.observation_config(), trainer.policy(), trainer.skill_source(), provenance)

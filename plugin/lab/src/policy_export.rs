@@ -5,9 +5,7 @@ use std::path::Path;
 use playbot_learner::{FileError, Observations, Policy, PolicyCard, PolicyFile, SeenLevels, SkillSource};
 use thiserror::Error;
 
-use crate::{
-    arrangement::at_most, game::Game, level_files::is_level_files, split::LevelSplit, train::collect::Collector,
-};
+use crate::{arrangement::at_most, game::Game, split::LevelSplit, train::collect::Collector};
 use bevy_playbot::{
     fault::Fault,
     policy_file::policy_observation,
@@ -49,22 +47,6 @@ pub struct Provenance {
     pub seen: Option<SeenLevels>,
     /// Name, version and, where it is known, revision of the program that trained it.
     pub code: String,
-}
-
-/// What a policy has seen that was trained on `train`, beside what its demonstrations show. Levels that are files are told by what is in
-/// them.
-pub fn seen_by_training(game: &dyn Game, train: &LevelSplit, demos: Option<&SeenLevels>) -> SeenLevels {
-    let nothing = || SeenLevels { game: game.name().to_owned(), ..SeenLevels::default() };
-    let mut seen = demos.cloned().unwrap_or_else(nothing);
-    let range = train.to_string();
-    if is_level_files(&train.mode) {
-        let hashes = train.levels().filter_map(|level| game.fingerprint(&train.mode, level));
-        let new: Vec<u64> = hashes.filter(|hash| !seen.level_files.contains(hash)).collect();
-        seen.level_files.extend(new);
-    } else if !seen.levels.contains(&range) {
-        seen.levels.push(range);
-    }
-    seen
 }
 
 /// A policy for this game that sees it so, with the card filled in from both.

@@ -20,6 +20,16 @@ pub struct SeenLevels {
     pub level_files: Vec<u64>,
 }
 
+impl SeenLevels {
+    /// Adds those of `other` that are not among them yet.
+    pub fn extend(&mut self, other: &Self) {
+        let levels = other.levels.iter().filter(|range| !self.levels.contains(range));
+        self.levels.extend(levels.cloned().collect::<Vec<_>>());
+        let files = other.level_files.iter().filter(|hash| !self.level_files.contains(hash));
+        self.level_files.extend(files.copied().collect::<Vec<_>>());
+    }
+}
+
 impl fmt::Display for SeenLevels {
     /// Its levels: `hard:0..63, easy:5..5 and 2 level files`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -50,6 +50,11 @@ fn experiment(demos: &Path) -> Experiment {
     Experiment { demos: Some(demos.to_owned()), ..experiment }
 }
 
+/// The levels that a policy file says it has seen.
+fn seen(file: &PolicyFile) -> &[String] {
+    &file.card.seen.as_ref().expect("noted").levels
+}
+
 #[test]
 fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -73,6 +78,7 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     assert_eq!((file.card.game.as_str(), file.card.algorithm.as_str()), ("corridor", "score-ppo"));
     assert!(file.card.training.starts_with("512 steps on plain:0..7"), "{}", file.card.training);
     assert!(file.skills.is_some(), "SCORE acts with skills");
+    assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "what it has played, and what its skills were shown");
     let path = folder.path().join("corridor.policy");
     playbot_lab::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
     let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
@@ -100,6 +106,7 @@ fn what_chooses_skills_is_shipped_with_what_it_has_learned_of_them() {
         let trainer = pipeline::train(&Shown, &experiment, skills.as_ref(), DeviceKind::Flex, 2, |_| {});
         let file = pipeline::policy(&Shown, &trainer.expect("trained"));
         assert_eq!((file.card.algorithm.as_str(), file.skills.is_some()), (algorithm.name(), skills.is_some()));
+        assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "{algorithm}");
         let path = folder.path().join(algorithm.name());
         playbot_lab::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
         let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
@@ -136,7 +143,9 @@ fn without_skills_plain_ppo_is_trained() {
     let folder = tempfile::tempdir().expect("a folder");
     let experiment = Experiment { algorithm: Algorithm::Ppo, ..experiment(folder.path()) };
     let trainer = pipeline::train(&Corridor, &experiment, None, DeviceKind::Flex, 1, |_| {}).expect("trained");
-    assert!(pipeline::policy(&Corridor, &trainer).skills.is_none());
+    let file = pipeline::policy(&Corridor, &trainer);
+    assert!(file.skills.is_none());
+    assert_eq!(seen(&file), ["plain:0..7"]);
 }
 
 #[test]

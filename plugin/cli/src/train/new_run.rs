@@ -4,6 +4,7 @@ use std::path::Path;
 
 use playbot_lab::{
     game::Game,
+    held_out::seen_by_training,
     train::{
         Experiment,
         checksum::file_checksum,
@@ -16,14 +17,14 @@ use playbot_learner::{DeviceKind, SeenLevels, SkillModel};
 pub struct Source<'a> {
     /// The file of the skill model, if there is one.
     skills: Option<&'a Path>,
-    /// What the recordings showed that the skills were learned from, or that are trained on.
-    demos: Option<SeenLevels>,
+    /// The levels of the recordings that the skills were learned from, or that are trained on.
+    seen: Option<SeenLevels>,
 }
 
 impl<'a> Source<'a> {
     /// A skill model and its file, if there is one, else what the recordings show that are trained on.
     pub fn new(file: Option<&'a Path>, skills: Option<&SkillModel>, recorded: Option<SeenLevels>) -> Self {
-        Self { skills: file, demos: skills.and_then(SkillModel::demos).cloned().or(recorded) }
+        Self { skills: file, seen: skills.and_then(SkillModel::demos).cloned().or(recorded) }
     }
 }
 
@@ -56,6 +57,10 @@ pub fn run_info(
     device: DeviceKind,
 ) -> Result<RunInfo, RunError> {
     let skills = source.skills.filter(|_| experiment.algorithm.needs_skills());
+    let mut seen = experiment.algorithm.is_trained().then(|| seen_by_training(game, &experiment.train));
+    if let Some(recorded) = &source.seen {
+        seen.get_or_insert_with(|| recorded.clone()).extend(recorded);
+    }
     Ok(RunInfo {
         algorithm: experiment.algorithm,
         seed: experiment.seed,
@@ -63,7 +68,7 @@ pub fn run_info(
         revision: env!("PLAYBOT_REVISION").to_owned(),
         game_version: game.version(),
         skills: skills.map(file_checksum).transpose()?,
-        demos: source.demos.clone(),
+        seen,
         device,
     })
 }

@@ -113,7 +113,7 @@ mod tests {
         let saved = from.load(&games, []).expect("valid");
         let (version, revision) = ("1".to_owned(), "r".to_owned());
         let (algorithm, seed, device) = (Algorithm::Ppo, 1, DeviceKind::default());
-        let info = RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, demos: None, device };
+        let info = RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, seen: None, device };
         let words = ["train", "--run", "runs/first", "--resume"].into_iter().chain(options.iter().copied());
         let args = Train::try_parse_from(words).unwrap_or_else(|error| panic!("{error}")).args;
         resumed(&args, &saved, &info, &games).map_err(|error| error.to_string())

@@ -145,7 +145,7 @@ pub(super) mod tests {
             revision,
             game_version: 1,
             skills: None,
-            demos: None,
+            seen: None,
             device: DeviceKind::Flex,
         };
         let path = format!("{algorithm}-{seed}").into();

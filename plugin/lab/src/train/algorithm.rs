@@ -90,7 +90,8 @@ impl Algorithm {
         }
     }
 
-    /// Whether settings in this section of an experiment change what it does. Sections that are of no algorithm are for all.
+    /// Whether it reads this section of an experiment at all; not each of its settings counts everywhere. Sections that are of no algorithm
+    /// are for all.
     pub fn reads(self, section: &str) -> bool {
         let is_by = |learner| self.is_trained() && self.learner() == learner;
         match section {

@@ -71,9 +71,9 @@ pub struct RunInfo {
     /// [Checksum](super::checksum::file_checksum) of the skill model's file, if the algorithm needs one.
     #[serde(default)]
     pub skills: Option<String>,
-    /// What its skills were learned from, or what it was trained on beside its levels, if that was noted.
+    /// The levels that it sees, those of its recordings and of its skills' among them; runs of older versions do not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub demos: Option<SeenLevels>,
+    pub seen: Option<SeenLevels>,
     /// What it was started on; the usual one where a run does not say.
     #[serde(default)]
     pub device: DeviceKind,
@@ -259,6 +259,7 @@ impl RunDir {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
         trainer.progress = state.progress;
+        trainer.seen = read_sealed::<RunInfo>(&self.path.join("run.json"))?.0.seen;
         checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;
         self.metrics_log().rewind(trainer.progress.steps, trainer.progress.updates)?;
         Ok(trainer)

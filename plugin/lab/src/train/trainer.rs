@@ -8,7 +8,8 @@ use std::{
 use bevy::prelude::World;
 use bevy_playbot::{episode::EpisodeEnded, fault::Fault, shared_batch::SharedBatch, skill_prior::SkillPrior};
 use playbot_learner::{
-    ActionSpace, DeviceKind, LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout, SkillModel, SkillSource,
+    ActionSpace, DeviceKind, LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout, SeenLevels, SkillModel,
+    SkillSource,
 };
 
 use super::{
@@ -22,6 +23,7 @@ use super::{
 use crate::{
     arrangement::Arrangement,
     game::Game,
+    held_out::seen_by_training,
     parallel::{on_own_threads, on_threads},
     sensors::GameSensors,
 };
@@ -37,6 +39,7 @@ pub struct Trainer {
     pub(crate) learner: TrainedLearner,
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
+    pub(crate) seen: Option<SeenLevels>,
     obs_kind: ObsKind,
     /// Memory of the last rollout's observations, for the next.
     obs: Observations,
@@ -74,7 +77,12 @@ impl Trainer {
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
         let learner = TrainedLearner::new(game, experiment, skills, demos, device)?;
-        Self::with_learner(game, experiment, learner, threads)
+        let mut seen = seen_by_training(game, &experiment.train);
+        if let Some(demos) = skills.filter(|_| experiment.algorithm.needs_skills()).and_then(SkillModel::demos) {
+            seen.extend(demos);
+        }
+        let trainer = Self::with_learner(game, experiment, learner, threads)?;
+        Ok(Self { seen: Some(seen), ..trainer })
     }
 
     /// A trainer around a learner that exists already, for an experiment that was checked.
@@ -95,7 +103,7 @@ impl Trainer {
         let (experiment, collectors) = (experiment.clone(), collectors?);
         let obs_kind = observation_config.obs_kind(game);
         let (progress, obs) = (Progress::default(), Observations::empty(&obs_kind));
-        Ok(Self { experiment, threads, learner, collectors, progress, obs_kind, obs })
+        Ok(Self { experiment, threads, learner, collectors, progress, seen: None, obs_kind, obs })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -189,6 +197,16 @@ impl Trainer {
     /// The experiment.
     pub fn experiment(&self) -> &Experiment {
         &self.experiment
+    }
+
+    /// The levels that it sees, and those that the demonstrations of its skills show; `None` where a run of an older version goes on.
+    pub fn seen(&self) -> Option<&SeenLevels> {
+        self.seen.as_ref()
+    }
+
+    /// Notes what recordings show that it trains on.
+    pub fn note_seen(&mut self, recorded: &SeenLevels) {
+        self.seen.iter_mut().for_each(|seen| seen.extend(recorded));
     }
 
     /// The policy as it is now.
