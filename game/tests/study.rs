@@ -257,7 +257,7 @@ fn the_table_follows_from_the_results() {
     );
     assert!(errors(&set).contains("--set algorithm=ppo does not change cloned"), "{}", errors(&set));
     assert!(
-        errors(&set).contains("--set rlpd.critics=3 changes nothing: bc reads no settings of `rlpd`"),
+        errors(&set).contains("--set rlpd.critics=3 changes nothing: bc does not read `rlpd.critics`"),
         "{}",
         errors(&set)
     );

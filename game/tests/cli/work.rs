@@ -100,12 +100,12 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     let eval = |more: &[&str]| run(&[&["eval", "--run", "runs/a", "--run", "runs/b", "--json"], more].concat());
     let seen = eval(&[]);
     assert_eq!(code(&seen), 3);
-    for words in ["runs/b has seen hard:64..65 in training", "held-out levels hard:64..65", "--levels"] {
+    for words in ["runs/b has learned from hard:64..65", "held-out levels hard:64..65", "--levels"] {
         assert!(errors(&seen).contains(words), "{}", errors(&seen));
     }
     let on_purpose = ok(eval(&["--levels", "hard:64..65"]));
     assert_eq!(lines(&on_purpose).len(), 2);
-    let told = "runs/b has seen hard:64..65 in training, and the levels hard:64..65 have some of these: not all of them are unseen";
+    let told = "runs/b has learned from hard:64..65, and the levels hard:64..65 have some of these: not all of them are unseen";
     assert!(errors(&on_purpose).contains(told), "{}", errors(&on_purpose));
     let saved = folder.path().join("runs/b/experiment.ron");
     let text = unsealed(&std::fs::read_to_string(&saved).expect("written")).replace("\"coinrun\"", "\"maze\"");
@@ -164,7 +164,7 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let exported = errors(&run(&[&export[..], &seen_one].concat()));
     assert!(
         exported
-            .contains("--levels MODE:FIRST..LAST`, on levels that it has not seen in training, as it has hard:8..11"),
+            .contains("--levels MODE:FIRST..LAST`, on levels that it has not learned from, as it has from hard:8..11"),
         "{exported}"
     );
 
@@ -172,7 +172,7 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let train = [&skills[..], &["--run", "runs/b"]].concat();
     assert_eq!(with("train", &train).0, 0);
     let (refused, words) = with("eval", &["--run", "runs/b", "--set", "test=hard:11..12"]);
-    assert!(refused == 3 && words.contains("runs/b has seen hard:8..11, among others, in training"), "{words}");
+    assert!(refused == 3 && words.contains("runs/b has learned from hard:8..11, among others,"), "{words}");
     assert_eq!(with("eval", &["--run", "runs/b"]).0, 0);
 
     // A policy file knows what both have.
@@ -182,19 +182,34 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     assert!(said(&card).contains("has seen      hard:0..3 and hard:8..11"), "{}", said(&card));
     for (test, own) in [("hard:11..12", "hard:8..11"), ("hard:3..4", "hard:0..3")] {
         let (refused, words) = with("eval", &["--policy", "b.policy", "--set", &format!("test={test}")]);
-        assert!(
-            refused == 3 && words.contains(&format!("b.policy has seen {own}, among others, in training")),
-            "{words}"
-        );
+        assert!(refused == 3 && words.contains(&format!("b.policy has learned from {own}, among others,")), "{words}");
     }
     assert_eq!(with("eval", &["--policy", "b.policy"]).0, 0);
     let (refused, words) = with("eval", &["--policy", "bc.policy", "--set", "test=hard:11..12"]);
-    assert!(refused == 3 && words.contains("bc.policy has seen hard:8..11 in training"), "{words}");
+    assert!(refused == 3 && words.contains("bc.policy has learned from hard:8..11,"), "{words}");
+
+    // So does what is recorded of it, of which nobody takes note: whoever records is told.
+    let recorded = run(&["record", "coinrun", "--run", "runs/b", "--levels", "hard:200..201", "--out", "pupil.demo"]);
+    let told = "the player has learned from hard:0..3 and hard:8..11: hold none of these out";
+    assert!(code(&recorded) == 0 && errors(&recorded).contains(told), "{}", errors(&recorded));
+
+    // A run whose last checkpoint is not of its end is told from one that is.
+    let told = "runs/b is not trained to its end: it has ";
+    assert!(!errors(&run(&["eval", "--run", "runs/b"])).contains(told));
+    let mut checkpoints: Vec<_> = std::fs::read_dir(folder.path().join("runs/b/checkpoints"))
+        .expect("checkpoints")
+        .map(|entry| entry.expect("readable").path())
+        .collect();
+    checkpoints.sort();
+    assert!(checkpoints.len() > 1, "{checkpoints:?}");
+    std::fs::remove_dir_all(checkpoints.last().expect("one")).expect("removable");
+    let (measured, words) = with("eval", &["--run", "runs/b"]);
+    assert!(measured == 0 && words.contains(told), "{words}");
 
     // Settings of algorithms that are not trained are told.
     let (trained, words) = with("train", &[&train[..], &["--force", "--set", "rlpd.critics=3"]].concat());
     assert!(
-        trained == 0 && words.contains("--set rlpd.critics=3 changes nothing: score-ppo reads no settings of `rlpd`"),
+        trained == 0 && words.contains("--set rlpd.critics=3 changes nothing: score-ppo does not read `rlpd.critics`"),
         "{words}"
     );
 

@@ -79,7 +79,7 @@ fn learning_refuses_recordings_of_held_out_files() {
     let output = playbot(folder, &["eval", "--skills", "s.safetensors", "--set", "test=files:held/*.json"]);
     assert_eq!(code(&output), 3, "{}", errors(&output));
     assert!(
-        errors(&output).contains("s.safetensors has seen files:held/*.json:0 in training, and the held-out"),
+        errors(&output).contains("s.safetensors has learned from files:held/*.json:0, and the held-out"),
         "{}",
         errors(&output)
     );

@@ -16,11 +16,7 @@ use playbot_lab::{
     mode::ModeError,
     report::to_text_table,
     split::LevelSplit,
-    train::{
-        Experiment,
-        checkpoint::CheckpointChoice,
-        run_dir::{OpenedRun, RunDir},
-    },
+    train::{Experiment, checkpoint::CheckpointChoice, run_dir::RunDir},
 };
 
 use super::{
@@ -33,7 +29,7 @@ use super::{
     interrupt::{self, NothingToSave},
     methods, open,
     player::{Chosen, check_run_of},
-    unseen::{Measured, seen_by_run},
+    unseen::Measured,
 };
 
 /// Measure policies and baselines, every level equally often.
@@ -128,7 +124,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
-        for Chosen { name, player, observation_config } in &players {
+        for Chosen { name, player, observation_config, .. } in &players {
             let plan = EvalPlan { observation_config: *observation_config, ..plan_of(split) };
             let measured = match &mut footprints {
                 Some(footprints) => {
@@ -215,23 +211,23 @@ fn players(
     let measured = LazyCell::new(|| Measured::new(game, splits, !args.levels.is_empty()));
     let mut players = Vec::new();
     for path in &args.run {
-        let OpenedRun { run, experiment: own, info } = RunDir::open(path)?;
-        check_run_of(path, &own.game, &experiment.game)?;
-        measured.check(path, Some(&seen_by_run(game, &own, &info)))?;
-        let chosen = Chosen::run(&run, &own, info.algorithm, args.checkpoint, draw, device)?;
+        let opened = RunDir::open(path)?;
+        check_run_of(path, &opened.experiment.game, &experiment.game)?;
+        let chosen = Chosen::run(game, &opened, args.checkpoint, draw, device)?;
+        measured.check(path, chosen.seen.as_ref())?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
         let model = open::skills(path, device, &args.from)?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
-        measured.check(path, model.demos())?;
-        let chosen = Chosen { name: "bc".to_owned(), player: cloning(&model, experiment, draw), observation_config };
+        let (player, seen) = (cloning(&model, experiment, draw), model.demos().cloned());
+        measured.check(path, seen.as_ref())?;
+        let chosen = Chosen { name: "bc".to_owned(), player, observation_config, seen };
         players.push(named(chosen, path, args.skills.len()));
     }
     for path in &args.policy {
-        let file = open::policy(path, device)?;
-        let chosen = Chosen::opened_policy(game, path, &file, draw)?;
-        measured.check(path, file.card.seen.as_ref())?;
+        let chosen = Chosen::policy_file(game, path, draw, device)?;
+        measured.check(path, chosen.seen.as_ref())?;
         players.push(named(chosen, path, args.policy.len()));
     }
     for name in &args.bot {

@@ -12,15 +12,15 @@ use playbot_lab::sensors::GameSensors;
 use playbot_lab::{
     eval::Player,
     game::Game,
+    report::whole,
     train::{
-        Algorithm, Experiment,
         checkpoint::CheckpointChoice,
         run_dir::{OpenedRun, RunDir},
     },
 };
-use playbot_learner::{DeviceKind, PolicyFile};
+use playbot_learner::{DeviceKind, SeenLevels};
 
-use super::{compute::Device, error::CliError, methods, open};
+use super::{compute::Device, error::CliError, methods, open, unseen::seen_by_run};
 
 /// A policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
@@ -53,6 +53,8 @@ pub struct Chosen {
     pub player: Player,
     /// What it was trained to see; vectors for bots.
     pub observation_config: ObservationConfig,
+    /// The levels that it has learned from, where they are noted; nothing for bots.
+    pub seen: Option<SeenLevels>,
 }
 
 impl Chosen {
@@ -66,6 +68,7 @@ impl Chosen {
             name: name.to_owned(),
             player: methods::bot(game, name)?,
             observation_config: ObservationConfig::default(),
+            seen: None,
         })
     }
 
@@ -87,37 +90,39 @@ impl Chosen {
     ///
     /// It cannot be loaded, or was made for another game.
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
-        Self::opened_policy(game, path, &open::policy(path, device)?, draw)
+        let file = open::policy(path, device)?;
+        check_policy(&game.card(), &file).map_err(|misfit| does_not_fit(path, &misfit))?;
+        let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
+        Ok(Self { name: file.card.algorithm, player, observation_config, seen: file.card.seen })
     }
 
-    /// The policy of a file that was read from `path`.
-    ///
-    /// # Errors
-    ///
-    /// It was made for another game.
-    pub fn opened_policy(game: &dyn Game, path: &Path, file: &PolicyFile, draw: ActionDraw) -> Result<Self, CliError> {
-        check_policy(&game.card(), file).map_err(|misfit| does_not_fit(path, &misfit))?;
-        let (player, observation_config) = (Player::of_file(file, draw), policy_observation(file)?);
-        Ok(Self { name: file.card.algorithm.clone(), player, observation_config })
-    }
-
-    /// What a run has learned, under the name of its algorithm.
+    /// What a run has learned, under the name of its algorithm. Says so if its training has not ended.
     ///
     /// # Errors
     ///
     /// The checkpoint cannot be loaded.
     pub fn run(
-        run: &RunDir,
-        experiment: &Experiment,
-        algorithm: Algorithm,
-        checkpoint: CheckpointChoice,
+        game: &dyn Game,
+        opened: &OpenedRun,
+        choice: CheckpointChoice,
         draw: ActionDraw,
         device: DeviceKind,
     ) -> Result<Self, CliError> {
-        let learner = open::learner(run, algorithm, &open::checkpoint(run, algorithm, checkpoint)?, device)?;
+        let OpenedRun { run, experiment, info } = opened;
+        let checkpoint = open::checkpoint(run, info.algorithm, choice)?;
+        let (done, wanted) = (checkpoint.summary.step, experiment.whole_steps());
+        if choice == CheckpointChoice::Last && done < wanted {
+            let path = run.path().display();
+            tell!("{path} is not trained to its end: it has {} of {} steps", whole(done as f64), whole(wanted as f64));
+        }
+        let learner = open::learner(run, info.algorithm, &checkpoint, device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let player = Player::Policy { policy: learner.policy(), prior, draw };
-        Ok(Self { name: algorithm.name().to_owned(), player, observation_config: experiment.observation_config() })
+        Ok(Self {
+            name: info.algorithm.name().to_owned(),
+            player: Player::Policy { policy: learner.policy(), prior, draw },
+            observation_config: experiment.observation_config(),
+            seen: Some(seen_by_run(game, experiment, info)),
+        })
     }
 
     /// Checks that a policy reads what the game shows it, and acts as the game does; bots always fit.
@@ -187,9 +192,9 @@ impl PlayerArgs {
             return Ok(Some(Chosen::policy_file(game, path, draw, self.device.device)?));
         }
         let Some(path) = &self.run else { return Ok(None) };
-        let OpenedRun { run, experiment, info } = RunDir::open(path)?;
-        check_run_of(path, &experiment.game, game.name())?;
-        let chosen = Chosen::run(&run, &experiment, info.algorithm, self.checkpoint, draw, self.device.device)?;
+        let opened = RunDir::open(path)?;
+        check_run_of(path, &opened.experiment.game, game.name())?;
+        let chosen = Chosen::run(game, &opened, self.checkpoint, draw, self.device.device)?;
         chosen.check_fit(game)?;
         Ok(Some(chosen))
     }

@@ -121,7 +121,7 @@ fn measuring(path: &Path, game: &dyn Game, test: &LevelSplit, file: &PolicyFile)
         None => format!("`{command} --levels {}`", quoted(&test.to_string())),
         Some(seen) => {
             format!(
-                "`{command} --levels MODE:FIRST..LAST`, on levels that it has not seen in training, as it has {seen}"
+                "`{command} --levels MODE:FIRST..LAST`, on levels that it has not learned from, as it has from {seen}"
             )
         }
     }

@@ -69,6 +69,15 @@ pub struct Args {
 /// The last of the levels from 0 that are recorded where none are named.
 const LAST_LEVEL: u64 = 499;
 
+/// Says what a recording does not note: whoever learns from it learns from what its player has learned from.
+fn warn_of_pupils(player: &Chosen) {
+    if let Some(seen) = &player.seen {
+        tell!(
+            "the player has learned from {seen}: hold none of these out from what is to learn of its recordings, which do not note them"
+        );
+    }
+}
+
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
@@ -101,6 +110,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut header = plan.header(game);
     if let Some(chosen) = &chosen_player {
         header.demonstrator.clone_from(&chosen.name);
+        warn_of_pupils(chosen);
     }
     let writer = args.overwrite.open(&args.out, header)?;
     let (mut world, agent) = match &chosen_player {

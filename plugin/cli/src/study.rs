@@ -11,7 +11,7 @@ use playbot_lab::games::Games;
 use playbot_lab::{
     report::{StudyReport, to_svg},
     train::{
-        Algorithm, Experiment,
+        Experiment,
         run_dir::{is_unstarted, write_atomically},
         sealed_file::read_sealed,
         study::{StudyError, StudyRun, study_runs, study_variants},
@@ -193,14 +193,14 @@ fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
     }
 }
 
-/// Says which settings are of algorithms that are not run: of the `--set`, and of each variant's own.
+/// Says which settings are not read: of the `--set` by no run, and of a variant's own by none of its runs.
 fn tell_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String]) {
-    let of = |variant: &str| runs.iter().find(|run| run.variant == variant).map(|run| run.experiment.algorithm);
-    let is_run = |algorithm: &Algorithm| runs.iter().any(|run| run.experiment.algorithm == *algorithm);
-    tell_unread("--set ", sets, &Algorithm::ALL.into_iter().filter(is_run).collect::<Vec<_>>());
+    let of = |is_meant: &dyn Fn(&StudyRun) -> bool| -> Vec<&Experiment> {
+        runs.iter().filter(|run| is_meant(run)).map(|run| &run.experiment).collect()
+    };
+    tell_unread("--set ", sets, &of(&|_| true));
     for variant in &experiment.variants {
-        let algorithm: Vec<_> = of(&variant.name).into_iter().collect();
-        tell_unread(&format!("{}: ", variant.name), &variant.set, &algorithm);
+        tell_unread(&format!("{}: ", variant.name), &variant.set, &of(&|run| run.variant == variant.name));
     }
 }
 

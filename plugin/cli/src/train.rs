@@ -128,7 +128,7 @@ pub fn tell_length(experiment: &Experiment) {
 
 fn start(args: &Args, games: &Games) -> Result<(RunDir, Trainer), CliError> {
     let experiment = args.from.load(games, args.settings())?;
-    tell_unread("--set ", &args.from.set, &[experiment.algorithm]);
+    tell_unread("--set ", &args.from.set, &[&experiment]);
     check_new(&args.run, args.force)?;
     let game = open::game(games, &args.from, &experiment)?;
     // Levels are checked by the trainer, which takes longer.

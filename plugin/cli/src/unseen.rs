@@ -36,12 +36,12 @@ impl<'a> Measured<'a> {
             let (path, split) = (path.display(), levels.split());
             if !self.are_named {
                 return Err(CliError::Usage(format!(
-                    "{path} has seen {own} in training, and the held-out levels {split} have some of these: choose levels that none of \
+                    "{path} has learned from {own}, and the held-out levels {split} have some of these: choose levels that none of \
                      the players has seen, or measure there on purpose, with --levels"
                 )));
             }
             tell!(
-                "{path} has seen {own} in training, and the levels {split} have some of these: not all of them are unseen"
+                "{path} has learned from {own}, and the levels {split} have some of these: not all of them are unseen"
             );
         }
         Ok(())

@@ -69,7 +69,7 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
 /// Whoever takes over with Tab, and what it sees.
 fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, ObservationConfig), CliError> {
     Ok(match args.autopilot.load(game)? {
-        Some(Chosen { name, player, observation_config }) => (Some(Autopilot { name, player }), observation_config),
+        Some(Chosen { name, player, observation_config, .. }) => (Some(Autopilot { name, player }), observation_config),
         None => (None, ObservationConfig::default()),
     })
 }

@@ -5,11 +5,7 @@ use std::path::PathBuf;
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::{
     game::Game,
-    train::{
-        checkpoint::CheckpointChoice,
-        checksum::file_checksum,
-        run_dir::{OpenedRun, RunDir},
-    },
+    train::{checkpoint::CheckpointChoice, checksum::file_checksum, run_dir::RunDir},
     verdict::{TestedRun, Tester, TesterRecord},
 };
 use playbot_learner::DeviceKind;
@@ -70,13 +66,13 @@ impl TesterArgs {
             testers.push(self.of_policy(chosen, record));
         }
         for path in &self.run {
-            let OpenedRun { run, experiment, info } = RunDir::open(path)?;
-            check_run_of(path, &experiment.game, game.name())?;
-            let checkpoint = open::checkpoint(&run, info.algorithm, self.checkpoint)?;
+            let opened = RunDir::open(path)?;
+            check_run_of(path, &opened.experiment.game, game.name())?;
+            let checkpoint = open::checkpoint(&opened.run, opened.info.algorithm, self.checkpoint)?;
             let checksum = Some(file_checksum(&checkpoint.learner_file())?);
             // The last one may be another by now, while the run is trained.
             let step = checkpoint.summary.step;
-            let chosen = Chosen::run(&run, &experiment, info.algorithm, CheckpointChoice::Step(step), draw, device)?;
+            let chosen = Chosen::run(game, &opened, CheckpointChoice::Step(step), draw, device)?;
             chosen.check_fit(game)?;
             let name = path.file_name().map_or(chosen.name.clone(), |name| name.to_string_lossy().into_owned());
             let tested = Some(TestedRun { folder: path.display().to_string(), step });
@@ -96,7 +92,7 @@ impl TesterArgs {
 }
 
 fn of_bot(chosen: Chosen) -> Tester {
-    let Chosen { name, player, observation_config } = chosen;
+    let Chosen { name, player, observation_config, .. } = chosen;
     Tester { record: TesterRecord::bot(name), player, observation_config }
 }
 

@@ -18,14 +18,20 @@ impl StudyReport {
         let mut seeds: Vec<u64> = self.results.iter().map(|result| result.seed).collect();
         seeds.sort_unstable();
         seeds.dedup();
-        let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+        let over = match &seeds[..] {
+            [seed] => format!("Seed {seed} alone"),
+            _ => {
+                let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+                format!("Means ± standard deviations over the seeds {}", seeds.join(", "))
+            }
+        };
         format!(
-            "{}, measured on {}, each level {}. Means ± standard deviations over the seeds {}. Training figures are those of \
-             the last 100 episodes; the steps are those until their success rate first was {}.",
+            "{}, measured on {}, each level {}. {}. Training figures are those of the last 100 episodes, or of all where there were \
+             fewer; the steps are those until their success rate first was {}.",
             self.trainings(),
             experiment.test,
             times(experiment.eval.episodes_per_level),
-            seeds.join(", "),
+            over,
             rate_cell(experiment.study.threshold),
         )
     }

@@ -90,21 +90,6 @@ impl Algorithm {
         }
     }
 
-    /// Whether it reads this section of an experiment at all; not each of its settings counts everywhere. Sections that are of no algorithm
-    /// are for all.
-    pub fn reads(self, section: &str) -> bool {
-        let is_by = |learner| self.is_trained() && self.learner() == learner;
-        match section {
-            // A decoder that SPiRL fine-tunes moves by PPO.
-            "ppo" => is_by(LearnerKind::Ppo) || self == Self::SpirlSac,
-            "sac" => is_by(LearnerKind::Sac),
-            "skills" | "score" => self.needs_skills(),
-            "spirl" => self.learns_prior(),
-            "rlpd" => self.trains_on_demos(),
-            _ => true,
-        }
-    }
-
     /// Whether it learns from play; the others are ready as soon as they have their skills.
     pub fn is_trained(self) -> bool {
         self != Self::BehaviourCloning

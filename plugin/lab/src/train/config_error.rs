@@ -108,6 +108,12 @@ fn neighbour(section: &str, name: &str) -> Option<String> {
     // Of several, the one whose section looks like this one.
     let of_near_section = |path: &&str| near_section.is_some_and(|near| **path == join(near, name));
     let elsewhere = || Keys::all().paths().filter(same_name);
+    // `lr` of a section that has several is `actor_lr` there, rather than that of another one.
+    let longer =
+        |path: &&str| path.strip_prefix(&format!("{section}.")).is_some_and(|own| own.ends_with(&format!("_{name}")));
+    if let Some(longer) = Keys::all().paths().find(longer) {
+        return Some(longer.to_owned());
+    }
     if let Some(elsewhere) = elsewhere().find(of_near_section).or_else(|| elsewhere().next()) {
         return Some(elsewhere.to_owned());
     }

@@ -33,7 +33,8 @@ const MOST_KEYS: usize = 200;
 static ALL: LazyLock<Keys> = LazyLock::new(|| {
     // With keys that are not written as long as they do nothing.
     let least = r#"(game: "-", train: "-:0..0", test: "-:1..1", demos: "-", demo_wins: true, steps: 1, skills: (
-        augment: [Translate(1)], weight_decay: 0.1, held_out: 0.1, patience: Some(1), state_weight: 1.0, anneal_lr: true))"#;
+        augment: [Translate(1)], weight_decay: 0.1, held_out: 0.1, patience: Some(1), state_weight: 1.0, anneal_lr: true),
+        ppo: (augment: [Translate(1)]))"#;
     let example: Experiment = reader().from_str(least).expect("every required key is there");
     Keys::of_experiment(&example, &Origin::start_of(Path::new("example"))).expect("it was just read")
 });

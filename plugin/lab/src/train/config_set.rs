@@ -171,6 +171,11 @@ mod tests {
         for (set, words) in [
             ("ppo.lr", "write key=value"),
             ("ppo.gama=1", "unknown key `ppo.gama`; did you mean `ppo.gamma`?"),
+            ("sac.lr=1", "unknown key `sac.lr`; did you mean `sac.actor_lr`?"),
+            (
+                "ppo.augment=[Translate]",
+                "`ppo.augment` must be a list in square brackets such as [Translate(1)], not [Translate]",
+            ),
             ("kl_coef=1", "did you mean `score.kl_coef`?"),
             ("image.stak=2", "did you mean `image.stack`?"),
             ("stack=2", "did you mean `image.stack`?"),

@@ -35,6 +35,7 @@ pub mod presets;
 mod prior_checks;
 mod proc_files;
 pub(crate) mod progress;
+mod read_keys;
 pub(crate) mod replaced_run;
 mod ron_keys;
 pub mod run_dir;
