@@ -181,7 +181,9 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let card = run(&["policy", "show", "b.policy"]);
     assert!(said(&card).contains("has seen      hard:0..3 and hard:8..11"), "{}", said(&card));
     for (test, own) in [("hard:11..12", "hard:8..11"), ("hard:3..4", "hard:0..3")] {
-        let (refused, words) = with("eval", &["--policy", "b.policy", "--set", &format!("test={test}")]);
+        let test = format!("test={test}");
+        let sets = ["--set", "train=hard:30..33", "--set", &test];
+        let (refused, words) = with("eval", &[&["--policy", "b.policy"][..], &sets].concat());
         assert!(refused == 3 && words.contains(&format!("b.policy has learned from {own}, among others,")), "{words}");
     }
     assert_eq!(with("eval", &["--policy", "b.policy"]).0, 0);
