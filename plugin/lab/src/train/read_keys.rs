@@ -42,7 +42,6 @@ impl Experiment {
 mod tests {
     use std::path::Path;
 
-    use super::*;
     use crate::train::config_file::parse_experiment;
 
     /// Those of the keys that an experiment reads.
