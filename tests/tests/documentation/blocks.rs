@@ -5,7 +5,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folder of the workspace.
+/// A document, the marker around its block, and the source that holds the block.
+pub const SHOWN: [(&str, &str, &str); 5] = [
+    ("README.md", "adapter", "tests/tests/documentation/hand_made.rs"),
+    ("README.md", "red", "tests/tests/documentation/tutorial.rs"),
+    ("docs/tutorial/test-your-levels.md", "hand_made", "tests/tests/documentation/hand_made.rs"),
+    ("docs/tutorial/test-your-levels.md", "red", "tests/tests/documentation/tutorial.rs"),
+    ("docs/tutorial/train-a-bot.md", "runner", "tests/tests/documentation/runner.rs"),
+];
+
+/// Returns the folder of the workspace.
 pub fn workspace() -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     folder.canonicalize().unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
@@ -23,23 +32,32 @@ pub struct Document {
 pub struct Block {
     /// Line of the document in which it begins.
     pub line: usize,
-    /// What stands behind the opening fence.
+    /// Text behind the opening fence.
     pub language: String,
     pub text: String,
 }
 
-/// Everything that is written for readers of the repository.
+/// Returns all documents for readers of the repository.
 pub fn documents() -> Vec<Document> {
-    let folders = ["", "demos", "game", "plugin", "plugin/cli", "plugin/lab", "plugin/learner"].map(str::to_owned);
-    let folders = folders.into_iter().chain(folders_below("docs"));
+    let crates =
+        folders_below("plugin").into_iter().filter(|folder| workspace().join(folder).join("Cargo.toml").exists());
+    let folders = ["", "assets", "demos", "game", "tests"].map(str::to_owned).into_iter().chain(crates);
+    let folders = folders.chain(folders_below("docs"));
     let documents: Vec<_> = folders.flat_map(|folder| documents_of(&folder)).collect();
-    for path in ["README.md", "CONTRIBUTING.md", "docs/tutorial.md", "docs/foreign/table.md", "plugin/cli/README.md"] {
+    for path in [
+        "README.md",
+        "CONTRIBUTING.md",
+        "docs/README.md",
+        "docs/tutorial/test-your-levels.md",
+        "docs/results/foreign/table.md",
+        "plugin/cli/README.md",
+    ] {
         assert!(documents.iter().any(|document| document.path == path), "{path} is missing");
     }
     documents
 }
 
-/// A folder, and all that are in it.
+/// Returns a folder, and all folders below it.
 fn folders_below(folder: &str) -> Vec<String> {
     let entries = fs::read_dir(workspace().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
     let entries = entries.map(|entry| entry.expect("readable")).filter(|entry| entry.path().is_dir());
@@ -49,7 +67,7 @@ fn folders_below(folder: &str) -> Vec<String> {
     std::iter::once(folder.to_owned()).chain(below).collect()
 }
 
-/// The documents in a folder, but for the list of changes, which tells of what was.
+/// Returns the documents in a folder, but for the list of changes, which describes the past.
 fn documents_of(folder: &str) -> Vec<Document> {
     let entries = fs::read_dir(workspace().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
     let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
@@ -59,12 +77,12 @@ fn documents_of(folder: &str) -> Vec<Document> {
     names.iter().map(|name| Document { path: path(name), text: read(&path(name)) }).collect()
 }
 
-/// A file of the workspace.
+/// Returns a file of the workspace.
 pub fn read(path: &str) -> String {
     fs::read_to_string(workspace().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// The blocks of code of a text.
+/// Returns the blocks of code of a text.
 pub fn blocks(text: &str) -> Vec<Block> {
     let mut found = Vec::new();
     let mut open: Option<Block> = None;
@@ -92,29 +110,44 @@ fn blocks_are_found_with_their_lines() {
     assert_eq!(found, [block(2, "sh", "b\nc\n"), block(7, "", "e\n")]);
 }
 
-/// Whatever is shown is checked by somebody: Rust by `cargo test --doc`, the others by the tests beside this one.
+/// Every block is checked: Rust by `cargo test --doc` or as an excerpt of a source, the others by the tests beside this
+/// one.
 #[test]
 fn every_block_is_of_a_kind_that_is_checked() {
     let compiled = read("tests/src/documentation.rs");
     for Document { path, text } in documents() {
-        for Block { line, language, .. } in blocks(&text) {
+        for Block { line, language, text: block } in blocks(&text) {
+            // The marker above a block: `<!-- name -->`.
+            let above = text.lines().nth(line.saturating_sub(2)).unwrap_or_default();
+            let marker = above.strip_prefix("<!-- ").and_then(|rest| rest.strip_suffix(" -->")).unwrap_or_default();
             match language.as_str() {
                 "sh" | "ron" => {}
                 // Level files: see `level_files`.
-                "json" => assert_eq!(path, "docs/how-to/level-files.md", "line {line} is read by nobody"),
+                "json" => assert_eq!(path, "docs/reference/level-formats.md", "line {line} is read by nobody"),
+                // Dependencies: see `sources`.
+                "toml" => {
+                    assert!(block.contains("[dependencies]") || block.contains("-dependencies]"), "{path}:{line}")
+                }
+                // A workflow that runs a command, in spaces, as YAML has it.
+                "yaml" => assert!(block.contains("runs-on:") && block.contains("- run: ") && !block.contains('\t')),
+                // Output of a command: the command stands above it, and can be called (see `commands`).
+                "text" => assert!(
+                    !marker.is_empty() || text.lines().take(line - 1).any(|line| line == "```sh"),
+                    "{path}:{line}: no command above says where this output is from"
+                ),
                 "rust" | "rust,no_run" => {
                     let own = path.strip_suffix("README.md").map(|folder| format!("{folder}src/lib.rs"));
                     let own = own.filter(|root| workspace().join(root).exists()).map(|root| read(&root));
                     let is_own = own.is_some_and(|root| root.contains("include_str!(\"../README.md\")"));
                     let is_compiled = is_own || compiled.contains(&format!("include_str!(\"../../{path}\")"));
-                    assert!(is_compiled, "{path}:{line} is compiled by nobody: add it to tests/src/documentation.rs");
+                    assert!(is_compiled, "{path}:{line} is not compiled: add it to tests/src/documentation.rs");
                 }
-                // It is the source of a program that is compiled: see `sources`.
+                // An excerpt of a source that is compiled: see `sources`.
                 "rust,ignore" => {
-                    let before = text.lines().nth(line.saturating_sub(2)).unwrap_or_default();
-                    assert_eq!(before, "<!-- breakout -->", "{path}:{line} is compiled by nobody");
+                    let is_shown = SHOWN.iter().any(|(document, name, _)| *document == path && *name == marker);
+                    assert!(is_shown, "{path}:{line} is not compiled: add it to `SHOWN`");
                 }
-                other => panic!("{path}:{line}: nobody checks blocks of `{other}`"),
+                other => panic!("{path}:{line}: blocks of `{other}` are not checked"),
             }
         }
     }

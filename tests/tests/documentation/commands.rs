@@ -1,4 +1,4 @@
-//! Commands that documents show can be called.
+//! Tests that commands in documents can be called.
 
 use std::fs;
 
@@ -7,19 +7,20 @@ use super::blocks::{Document, blocks, documents, workspace};
 /// Verbs whose first argument is the name of a game.
 const OF_A_GAME: [&str; 9] = ["record", "play", "doctor", "level", "test", "explore", "trace", "view", "eyes"];
 
-/// The commands of a shell's text, in words: lines go on behind a backslash, `#` begins a comment, `&&` another command.
+/// Returns the commands of a shell's text, in words: lines go on behind a backslash, `#` begins a comment, `&&` another
+/// command.
 fn commands(text: &str) -> Vec<Vec<String>> {
     let mut commands = Vec::new();
     for line in text.replace("\\\n", " ").lines() {
         let line = line.split(" #").next().unwrap_or_default();
-        // What the shell writes into a file is no part of the command.
+        // A redirection of the shell is no part of the command.
         let line = line.split(" > ").next().unwrap_or_default();
         commands.extend(line.split("&&").map(words).filter(|words| !words.is_empty()));
     }
     commands
 }
 
-/// Words, those in quotes as one.
+/// Splits words, those in quotes as one.
 fn words(line: &str) -> Vec<String> {
     let mut words = Vec::new();
     for (index, part) in line.split(['"', '\'']).enumerate() {
@@ -32,7 +33,7 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// What the program would be called with; `None` for other programs.
+/// Returns the arguments of the program; `None` for other programs.
 fn arguments(words: &[String]) -> Option<Vec<String>> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let rest = match words.as_slice() {
@@ -47,7 +48,7 @@ fn arguments(words: &[String]) -> Option<Vec<String>> {
     Some(["playbot"].iter().chain(rest).map(|word| (*word).to_owned()).collect())
 }
 
-/// The games in `tests/foreign`, each of which has a program of its own, `foreign_` and its name.
+/// Returns the games in `tests/foreign`, each of which has a program of its own, `foreign_` and its name.
 fn foreign_games() -> Vec<String> {
     let entries = fs::read_dir(workspace().join("tests/foreign")).expect("the games are there");
     let entries = entries.map(|entry| entry.expect("readable"));
@@ -55,7 +56,7 @@ fn foreign_games() -> Vec<String> {
     games.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
 }
 
-/// `foreign_NAME` is a command of each of these games, whose name then stands wherever `NAME` does.
+/// Replaces `foreign_NAME` by the command of each of these games, and `NAME` elsewhere by the game.
 fn for_each_game(words: Vec<String>) -> Vec<Vec<String>> {
     if words.first().is_none_or(|program| program != "foreign_NAME") {
         return vec![words];
@@ -64,7 +65,7 @@ fn for_each_game(words: Vec<String>) -> Vec<Vec<String>> {
     games.iter().map(|game| words.iter().map(|word| word.replace("NAME", game)).collect()).collect()
 }
 
-/// What a command of `tests/foreign` names and is not there: the program, or the game, which has the program's name.
+/// Returns the missing name in a command of `tests/foreign`: the program, or the game, which has the program's name.
 fn missing_game(words: &[String]) -> Option<String> {
     let game = words.first()?.strip_prefix("foreign_")?;
     if !foreign_games().iter().any(|known| known == game) {
@@ -75,7 +76,7 @@ fn missing_game(words: &[String]) -> Option<String> {
     names_another.then(|| format!("foreign_{game} has no game `{named}`"))
 }
 
-/// What stands in the text between single backticks and is a whole command.
+/// Returns the whole commands between single backticks in the text.
 fn inline_commands(text: &str) -> Vec<Vec<String>> {
     let code = text.split('`').skip(1).step_by(2).map(|code| code.replace('\n', " "));
     let is_program = |code: &String| code.starts_with("playbot ") || code.starts_with("foreign_");
@@ -83,7 +84,7 @@ fn inline_commands(text: &str) -> Vec<Vec<String>> {
     code.flat_map(|code| commands(&code)).collect()
 }
 
-/// A document without its blocks.
+/// Returns a document without its blocks.
 fn prose(text: &str) -> String {
     text.split("\n```").step_by(2).collect::<Vec<_>>().join("\n")
 }

@@ -1,4 +1,4 @@
-//! Level files that documents show are levels, which bots solve.
+//! Tests that level files in documents are levels that bots solve.
 
 use playbot_games::{coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{
@@ -12,7 +12,7 @@ use super::blocks::{blocks, read};
 
 #[test]
 fn level_files_of_the_page_about_them_are_solved() {
-    let text = read("docs/how-to/level-files.md");
+    let text = read("docs/reference/level-formats.md");
     let levels: Vec<_> = blocks(&text).into_iter().filter(|block| block.language == "json").collect();
     let games = [&CoinRun { physics: false } as &dyn Game, &Maze2d { physics: false }];
     assert_eq!(levels.len(), games.len());

@@ -3,10 +3,7 @@
 use std::process::ExitCode;
 
 use bevy::prelude::*;
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::EpisodeEnd,
-};
+use playbot::prelude::*;
 
 // The game.
 
@@ -43,7 +40,7 @@ fn run(keys: Res<ButtonInput<KeyCode>>, time: Res<Time>, mut runner: Single<&mut
     }
 }
 
-// What bots need to know of it.
+// Its adapter for testers.
 
 pub fn runner() -> ForeignGame {
     ForeignGame::new("runner", 1, game)
@@ -69,5 +66,5 @@ fn over(runner: Single<&Runner>, pit: Res<Pit>) -> Option<EpisodeEnd> {
 }
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&runner()])
+    playbot::main(&[&runner()])
 }

@@ -1,19 +1,29 @@
-//! What the tutorial promises of its game is true.
+//! Tests of the tutorials' promises about their games.
 
-use std::path::Path;
+use std::{panic::catch_unwind, path::Path};
 
+use bevy::prelude::{Res, ResMut};
 use playbot_lab::{
     doctor::{DoctorOptions, examine},
     eval::{EvalSummary, Player, evaluate, summarize},
+    foreign::{ForeignGame, LevelSeed},
     games::Games,
     pipeline,
     prelude::*,
-    train::{Experiment, config_file::parse_experiment, default_experiment::default_experiment},
+    train::{
+        Experiment, config_file::parse_experiment, default_experiment::default_experiment, run_observer::Unobserved,
+        train_run::TrainingSetup,
+    },
 };
 use playbot_learner::DeviceKind;
 use playbot_tests::measuring::plan;
 
-use super::runner::runner;
+use super::{
+    blocks::read,
+    hand_made::{self, PITS, Pit},
+    runner::runner,
+    sources::between_markers,
+};
 
 fn measure(player: &Player) -> EvalSummary {
     let plan = plan("default:64..83");
@@ -21,10 +31,46 @@ fn measure(player: &Player) -> EvalSummary {
 }
 
 #[test]
-fn the_game_is_sound() {
-    let options = DoctorOptions { ticks: 200, ..DoctorOptions::new("default".to_owned()) };
-    let report = examine(&runner(), &options, |_| {}).expect("the game has this mode");
-    assert!(report.is_healthy(), "{report}");
+fn the_games_are_deterministic() {
+    for game in [runner(), hand_made::runner()] {
+        let options = DoctorOptions { ticks: 200, ..DoctorOptions::new("default".to_owned()) };
+        let report = examine(&game, &options, |_| {}).expect("the game has this mode");
+        assert!(report.is_healthy(), "{report}");
+    }
+}
+
+/// The test of the first tutorial, which fails.
+mod red {
+    use super::{super::hand_made::runner, *};
+
+    fn every_level_can_be_finished() {
+        assert_levels_solvable(&runner(), "default:0..7");
+    }
+
+    #[test]
+    fn it_fails_on_level_4_with_the_message_that_is_shown() {
+        let panic = catch_unwind(every_level_can_be_finished).expect_err("level 4 cannot be finished");
+        let message = panic.downcast_ref::<String>().expect("a message in words");
+        let shown = between_markers("docs/tutorial/test-your-levels.md", "red-message");
+        for line in shown.lines() {
+            assert!(message.contains(line), "{line:?} is not in {message}");
+        }
+    }
+}
+
+/// Returns the repair of the first tutorial: another end of the pit of level 4.
+fn repaired() -> ForeignGame {
+    hand_made::runner().level(|level: Res<LevelSeed>, mut pit: ResMut<Pit>| {
+        pit.0 = if level.0 == 4 { [4.0, 5.5] } else { PITS[level.0 as usize] };
+    })
+}
+
+#[test]
+fn the_repair_that_is_shown_makes_all_levels_solvable() {
+    assert!(read("docs/tutorial/test-your-levels.md").contains("| `[4.0, 7.5]` | `[4.0, 5.5]` |"));
+    assert_eq!(PITS[4], [4.0, 7.5]);
+    assert_levels_solvable(&repaired(), "default:0..7");
+    assert_no_findings(&repaired(), "default:0..7");
 }
 
 #[test]
@@ -46,8 +92,11 @@ fn what_is_trained_finishes_levels_that_nobody_has_played() {
     let usual = parse_experiment(&usual.text, Path::new(&*usual.origin)).expect("valid");
     let mut experiment = Experiment { demos: Some(demos), steps: 8192, arenas: 8, worlds: 2, ..usual };
     experiment.skills.epochs = 5;
-    let skills = pipeline::learn_skills(&game, &experiment, DeviceKind::Flex, 2).expect("learned");
-    let trainer = pipeline::train(&game, &experiment, Some(&skills), DeviceKind::Flex, 2, |_| {}).expect("trained");
+    let (file, run) = (folder.path().join("skills.safetensors"), folder.path().join("run"));
+    let setup = TrainingSetup::new(DeviceKind::Flex, 2);
+    let skills = pipeline::learn_skills(&game, &experiment, &file, &setup, &mut Unobserved).expect("learned");
+    let with_file = Some((file.as_path(), &skills));
+    let trainer = pipeline::train(&game, &experiment, with_file, &run, &setup, &mut Unobserved).expect("trained");
     let trained = measure(&Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Sample));
     let random = measure(&Player::Blind(BlindBot::Uniform));
     assert!(trained.success >= 0.7 && random.success <= 0.5, "{trained:?}\n{random:?}");
