@@ -1,4 +1,5 @@
-//! Shakes ants in a narrow room and in mazes, by turns, with random torques for as long as asked, and stops at the first thing that should not be.
+//! Soak test of ants: shakes them in a narrow room and in mazes, by turns, with random torques, and stops at the first
+//! impossible state.
 //!
 //! `cargo run --release --example ant_soak -- 10000000` takes about six minutes on two cores.
 
@@ -19,7 +20,7 @@ use rand_chacha::ChaCha8Rng;
 const ROOM: f32 = 2.0;
 /// Control steps between two starts.
 const EPISODE: u64 = 1000;
-/// Nothing this ant does throws it higher, in metres, or makes it faster, in m/s and rad/s.
+/// Limits of height, in metres, and of speed, in m/s and rad/s, of a shaken ant.
 const CEILING: f32 = 4.0;
 const FASTEST: f32 = 60.0;
 
@@ -57,7 +58,7 @@ struct Extremes {
     gap: f32,
 }
 
-/// Where an ant is shaken, and from where.
+/// Surroundings and start of a shaken ant.
 struct Place {
     walls: Vec<WallBox>,
     start: [f32; 2],
@@ -90,13 +91,13 @@ fn shake(seed: u64, steps: u64) -> Result<Extremes, String> {
     Ok(seen)
 }
 
-/// From the outside of a wall to a place, in metres, seen from above; 0 within.
+/// Returns the distance from the outside of a wall to a position, in metres, seen from above; 0 within.
 fn distance(wall: &WallBox, place: [f32; 2]) -> f32 {
     let beyond = [0, 1].map(|axis| ((place[axis] - wall.centre[axis]).abs() - wall.half[axis]).max(0.0));
     beyond[0].hypot(beyond[1])
 }
 
-/// Four walls of AntMaze's height, so near that legs and walls meet often.
+/// Returns four walls of AntMaze's height, so near that legs and walls meet often.
 fn narrow_room(rng: &mut ChaCha8Rng) -> Place {
     let walls = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(|[x, y]| WallBox {
         centre: [x * (ROOM + 2.0), y * (ROOM + 2.0), 1.0],
@@ -105,7 +106,7 @@ fn narrow_room(rng: &mut ChaCha8Rng) -> Place {
     Place { walls: walls.to_vec(), start: [(); 2].map(|()| rng.random_range(-1.0..1.0)) }
 }
 
-/// A generated maze, with corners that stand out and seams between boxes, from anywhere in it.
+/// Returns a generated maze, with corners that stand out and seams between boxes, from anywhere in it.
 fn maze(rng: &mut ChaCha8Rng) -> Result<Place, String> {
     let spec = MazeSpec { rows: 9, columns: 9, loops: rng.random_range(0.0..=1.0), ..MazeSpec::default() };
     let maze = generate(&spec, rng.random()).map_err(|error| error.to_string())?;

@@ -1,10 +1,10 @@
-//! A game with a window that ships with a policy, on `bevy_playbot` alone: land a capsule softly.
+//! A game with a window and a shipped policy, on `bevy_playbot` alone: land a capsule softly.
 //!
 //! `cargo run --release -p bevy_playbot --features camera,window --example lander_window [-- FILE.policy]`
 //!
-//! The policy is part of the program, and plays; F9 gives you the controls, of which there is one (space burns), and takes
-//! them back. A file, or `PLAYBOT`, lets another policy play, or records or replays instead. The policy was made by
-//! `playbot_lab`'s example `lander`.
+//! The policy is part of the program, and plays. F9 hands the controls to you and takes them back;
+//! the space bar burns. A file, or `PLAYBOT`, lets another policy play, or records or replays
+//! instead. The policy was trained by the example `lander` of `playbot_lab`.
 
 pub mod lander_rules;
 
@@ -27,14 +27,14 @@ const SCALE: f32 = 10.0;
 const GROUND: f32 = 280.0;
 
 fn main() -> AppExit {
-    // What `PLAYBOT` says goes first.
+    // `PLAYBOT` takes precedence.
     let mut takeover = TakeoverPlugin::new(GameIdentity::new("lander", 1).with_mode("moon"));
     if let (None, Some(file)) = (&takeover.request, std::env::args_os().nth(1)) {
         takeover = takeover.with_request(TakeoverRequest::Policy(file.into()));
     }
     let ships_alone = takeover.request.is_none();
     if ships_alone {
-        // The key is for the policy that is part of the program.
+        // The key is reserved for the policy that is part of the program.
         takeover.key = None;
     }
     let window = Window { title: "Lander: space burns, F9 takes over".to_owned(), ..default() };
@@ -52,7 +52,8 @@ fn main() -> AppExit {
     app.run()
 }
 
-/// Lets the policy that is part of the program play agents under [`Control::Policy`], and F9 give them to a person.
+/// Lets the policy that is part of the program play agents under [`Control::Policy`]. F9 hands them
+/// to a person.
 ///
 /// # Errors
 ///
@@ -73,14 +74,14 @@ pub fn add_shipped_policy(app: &mut App) -> Result<(), Box<dyn std::error::Error
     Ok(())
 }
 
-/// Between two ticks, F9 gives the controls to whoever does not have them.
+/// Between two ticks, F9 switches the controls between the person and the policy.
 fn hand_over(keys: Option<Res<ButtonInput<KeyCode>>>, mut capsules: Query<(&mut Control, &mut ActiveSkill)>) {
     if keys.is_none_or(|keys| !keys.just_pressed(KeyCode::F9)) {
         return;
     }
     for (mut control, mut skill) in &mut capsules {
         *control = if *control == Control::Policy { Control::Human } else { Control::Policy };
-        // A skill that was drawn for another state says nothing about this one.
+        // A skill that was drawn for another state does not fit this one.
         skill.ticks_left = 0;
     }
 }
@@ -99,7 +100,7 @@ fn setup(mut commands: Commands, shipped: Option<Res<ActivePolicy>>) {
     ));
 }
 
-/// Between two ticks the capsule is drawn where its speed has taken it. It glows while it burns.
+/// Draws the capsule at its position between two ticks. It glows while it burns.
 fn draw(ticks: Res<Time<Fixed>>, mut capsules: Query<(&Capsule, &Action, &mut Transform, &mut Sprite)>) {
     for (capsule, action, mut place, mut sprite) in &mut capsules {
         let height = (capsule.height + capsule.speed * ticks.overstep().as_secs_f32()).max(0.0);

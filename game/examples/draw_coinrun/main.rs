@@ -12,7 +12,7 @@ use std::{error::Error, fs::File, io::BufWriter, path::Path};
 use art::canvas::Canvas;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/coinrun");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/coinrun");
     for (name, picture) in art::pictures()? {
         write(&folder.join(&name), &picture)?;
         println!("{name}: {} × {}", picture.width, picture.height);

@@ -12,8 +12,8 @@ const FLOOR: Texel = [0xec, 0xef, 0xf4, 255];
 const BALL: Texel = [0xd7, 0x26, 0x3d, 255];
 const GOAL: Texel = [0xf5, 0xb7, 0x00, 255];
 
-/// Every picture with its file name in `assets/maze2d`: a strip of two tiles, and two discs. Each is [`SIDE`] wide, top
-/// row first.
+/// Returns every picture with its file name in `assets/maze2d`: a strip of two tiles, and two discs. Each is [`SIDE`]
+/// wide, top row first.
 pub fn pictures() -> [(&'static str, Vec<Texel>); 3] {
     let flat = |colour| std::iter::repeat_n(colour, SIDE * SIDE);
     let tiles = flat(WALL).chain(flat(FLOOR)).collect();

@@ -10,7 +10,7 @@ mod art;
 use std::{error::Error, fs::File, io::BufWriter, path::Path};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/maze2d");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/maze2d");
     for (name, texels) in art::pictures() {
         let height = texels.len() / art::SIDE;
         let file = BufWriter::new(File::create(folder.join(name))?);

@@ -1,3 +1,3 @@
-//! The lander: what a shipped game and the laboratory share.
+//! The lander: the part that a shipped game and its training share.
 
 pub mod rules;

@@ -5,21 +5,21 @@ use bevy_playbot::prelude::*;
 
 /// Ticks per second of game time.
 pub const TICK_HZ: f64 = 5.0;
-/// What the agent sees.
+/// Names of the values of an observation.
 pub const OBSERVATION: [&str; 3] = ["height", "speed", "fuel"];
 
-/// What falls.
+/// The falling capsule.
 #[derive(Component, Default)]
 pub struct Capsule {
     /// Height above ground, metres.
     pub height: f32,
     /// Speed, metres per second upwards.
     pub speed: f32,
-    /// Ticks for which it can still burn.
+    /// Ticks for which the fuel lasts.
     pub fuel: f32,
 }
 
-/// A capsule and its agent.
+/// Returns a capsule and its agent.
 pub fn capsule(index: u32) -> impl Bundle {
     (Agent::new(index, ActionSpace::Discrete(2)), VectorSensor::new(OBSERVATION), Capsule::default())
 }
@@ -29,7 +29,8 @@ pub fn add_rules(app: &mut App) {
     app.add_observer(start).add_systems(ObserveSchedule, see).add_systems(FixedUpdate, fly);
 }
 
-/// The level's number decides how high and how fast the capsule starts: 217 ways.
+/// Starts an episode. The level's number sets the initial height and speed, out of 217
+/// combinations.
 fn start(event: On<StartEpisode>, mut capsules: Query<&mut Capsule>) {
     if let Ok(mut capsule) = capsules.get_mut(event.entity) {
         let (height, speed) = ((event.level * 11 % 31) as f32, (event.level % 7) as f32);

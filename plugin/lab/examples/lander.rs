@@ -1,11 +1,12 @@
 //! A game of one's own, and the whole road with it as functions, without the command line: record, learn skills, train,
 //! measure, ship.
 //!
-//! `cargo run --release -p playbot_lab --example lander -- assets/models/lander.policy` writes the policy with which
+//! `cargo run --release -p playbot_lab --example lander -- plugin/examples/lander.policy` writes the policy with which
 //! `bevy_playbot`'s example `lander_window` ships; without a path it is thrown away.
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
+#[path = "../../examples/lander_rules/mod.rs"]
 pub mod lander_rules;
 
 use std::path::{Path, PathBuf};
@@ -14,11 +15,17 @@ use bevy::prelude::*;
 use playbot_lab::{
     demo::verify::verify_file,
     eval::{EvalSummary, Player},
+    game::BotTools,
     parallel::default_threads,
     pipeline,
     policy_export::export_policy,
     prelude::*,
-    train::{Experiment, config_file::parse_experiment},
+    train::{
+        Experiment, UpdateReport,
+        config_file::parse_experiment,
+        run_observer::{AfterUpdate, Unobserved},
+        train_run::TrainingSetup,
+    },
 };
 use playbot_learner::DeviceKind;
 
@@ -62,6 +69,12 @@ impl Game for Lander {
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         world.spawn(capsule(index)).id()
     }
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { bots: self, ..GameTools::default() }
+    }
+}
+
+impl BotTools for Lander {
     fn demonstrator(&self) -> Option<&'static str> {
         Some("pilot")
     }
@@ -95,12 +108,15 @@ pub fn road(experiment: &str, demos: &str, policy: &Path) -> Result<[EvalSummary
     let differing = verify_file(&Lander, &recording, |_| {})?.divergences.len();
     println!("{episodes} episodes recorded, {differing} of them replay differently");
 
-    let skills = pipeline::learn_skills(&Lander, &experiment, device, threads)?;
-    let trainer = pipeline::train(&Lander, &experiment, Some(&skills), device, threads, |report| {
+    let setup = TrainingSetup::new(device, threads);
+    let (file, run) = (folder.path().join("skills.safetensors"), folder.path().join("run"));
+    let skills = pipeline::learn_skills(&Lander, &experiment, &file, &setup, &mut Unobserved)?;
+    let mut observer = AfterUpdate(|report: &UpdateReport| {
         if let Some(success) = report.success_rate.filter(|_| report.update.is_multiple_of(10)) {
             println!("{} steps: {:.0} % of the last episodes landed softly", report.step, 100.0 * success);
         }
-    })?;
+    });
+    let trainer = pipeline::train(&Lander, &experiment, Some((&file, &skills)), &run, &setup, &mut observer)?;
 
     let file = pipeline::policy(&Lander, &trainer);
     export_policy(&Lander, &file, &experiment.train, experiment.seed, policy)?;

@@ -1,7 +1,7 @@
-//! Takes the game out of the `bevy` package.
+//! Build script: copies the game out of the `bevy` package.
 
-// A link, not a dependency: packages may depend on nothing that is not published.
-#[path = "showcase/lib.rs"]
+// A path, not a dependency: packages may depend on nothing that is not published.
+#[path = "../showcase/src/lib.rs"]
 mod showcase;
 
 fn main() {

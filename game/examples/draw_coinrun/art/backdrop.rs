@@ -1,6 +1,6 @@
-//! Paints what lies behind a level: a sky and things in front of it, layer by layer.
+//! Painter of backdrops: a sky and scenery in front of it, layer by layer.
 //!
-//! Whole numbers only, so that every machine paints the same.
+//! Whole numbers only, so every machine paints the same.
 
 use super::canvas::{Canvas, Texel, rgb};
 
@@ -17,11 +17,11 @@ pub struct Scene {
     pub name: &'static str,
     /// Colours of the sky at the top and at the bottom.
     pub sky: [u32; 2],
-    /// What stands before it.
+    /// Scenery in front of it.
     pub layers: Vec<Layer>,
 }
 
-/// One kind of thing, many of it. Heights are texels above the bottom, sizes are texels, colours `0xRRGGBB`.
+/// One kind of scenery, repeated. Heights are texels above the bottom, sizes are texels, colours `0xRRGGBB`.
 pub enum Layer {
     /// Round hills up to `height`, `swing` high and about `length` long.
     Hills { height: i32, swing: i32, length: i32, colour: u32 },
@@ -67,7 +67,7 @@ pub fn paint(scene: &Scene) -> Canvas {
     canvas
 }
 
-/// The colour `step` of `steps` on the way between two.
+/// Returns the colour `step` of `steps` between two.
 fn mix(colours: [u32; 2], step: i32, steps: i32) -> Texel {
     let [from, to] = colours.map(rgb);
     let mut mixed = from;
@@ -78,7 +78,7 @@ fn mix(colours: [u32; 2], step: i32, steps: i32) -> Texel {
     mixed
 }
 
-/// A number that looks random and depends on two others. Not negative.
+/// Returns a number that looks random and depends on two others. Not negative.
 fn noise(seed: i32, value: i32) -> i32 {
     let mut mixed = (seed as u32).wrapping_mul(0x9e37_79b9) ^ (value as u32).wrapping_mul(0x85eb_ca6b);
     mixed ^= mixed >> 15;
@@ -94,7 +94,7 @@ struct Brush<'a> {
 }
 
 impl Brush<'_> {
-    /// A random number from `low` to `high`.
+    /// Returns a random number from `low` to `high`.
     fn random(&self, number: i32, low: i32, high: i32) -> i32 {
         low + noise(self.seed, number) % (high - low + 1)
     }
@@ -217,13 +217,13 @@ impl Brush<'_> {
         }
     }
 
-    /// Places along the bottom with a size of each, about `gap` apart.
+    /// Returns positions along the bottom with a size of each, about `gap` apart.
     fn row(&self, size: i32, gap: i32) -> Vec<(i32, i32)> {
         let places = (0..WIDTH / gap + 2).map(|number| number * gap - gap / 2);
         places.map(|x| (x + self.random(2 * x, 0, gap / 3), size * self.random(2 * x + 1, 75, 120) / 100)).collect()
     }
 
-    /// A smooth or pointed random curve through a random height, 0 to `swing`, at every half `length`.
+    /// Returns a smooth or pointed random curve through a random height, 0 to `swing`, at every half `length`.
     fn wave(&self, x: i32, length: i32, swing: i32, smooth: bool) -> i32 {
         let half = length / 2;
         let (index, part) = (x / half, x % half);
@@ -246,14 +246,14 @@ impl Brush<'_> {
         self.block(x, low, 1, high - low, colour);
     }
 
-    /// A rectangle by its lower left corner.
+    /// Draws a rectangle by its lower left corner.
     fn block(&mut self, x: i32, low: i32, width: i32, height: i32, colour: Texel) {
         for up in low..low + height {
             (x..x + width).for_each(|x| self.canvas.set(x, HEIGHT - 1 - up, colour));
         }
     }
 
-    /// A disc, or its upper half.
+    /// Draws a disc, or its upper half.
     fn disc(&mut self, x: i32, y: i32, radius: i32, colour: Texel, half: bool) {
         let lowest = if half { 0 } else { -radius };
         for dy in lowest..=radius {
@@ -266,7 +266,7 @@ impl Brush<'_> {
     }
 }
 
-/// Lower left corners of windows in a wall.
+/// Returns the lower left corners of windows in a wall.
 fn grid(x: i32, width: i32, low: i32, high: i32, step: usize) -> impl Iterator<Item = (i32, i32)> {
     let rows = move || (low..high).step_by(step);
     (x..x + width).step_by(step).flat_map(move |column| rows().map(move |row| (column, row)))

@@ -15,7 +15,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A transparent picture.
+    /// Returns a transparent picture.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, texels: vec![[0; 4]; width * height] }
     }
@@ -27,7 +27,7 @@ impl Canvas {
         }
     }
 
-    /// Copies a whole picture to a place.
+    /// Copies a whole picture to a position.
     pub fn paste(&mut self, picture: &Canvas, x: usize, y: usize) {
         for (row, texels) in picture.texels.chunks_exact(picture.width).enumerate() {
             for (column, texel) in texels.iter().enumerate() {
@@ -37,7 +37,7 @@ impl Canvas {
     }
 }
 
-/// An opaque colour from `0xRRGGBB`.
+/// Returns an opaque colour from `0xRRGGBB`.
 pub fn rgb(colour: u32) -> Texel {
     let [_, r, g, b] = colour.to_be_bytes();
     [r, g, b, 255]

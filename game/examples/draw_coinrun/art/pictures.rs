@@ -1,11 +1,10 @@
 //! Every picture of CoinRun.
 
+use playbot_assets::coinrun::SPRITES;
+
 use super::{backdrop, canvas::Canvas, scenes, sheet, sprite_text};
 
-/// The drawings of tiles and figures.
-const SPRITES: &str = include_str!("../../../assets/coinrun/sprites.txt");
-
-/// Every picture with its file name in `assets/coinrun`.
+/// Returns every picture with its file name in `assets/coinrun`.
 ///
 /// # Errors
 ///

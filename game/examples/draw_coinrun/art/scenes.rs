@@ -1,8 +1,8 @@
-//! The backdrops: 12 of landscapes and 4 of space. Muted colours, so that what matters in a level stands out.
+//! The backdrops: 12 of landscapes and 4 of space, in muted colours, against which a level stands out.
 
 use super::backdrop::{Layer::*, Scene};
 
-/// All scenes in the order in which the game numbers them.
+/// Returns all scenes in the order in which the game numbers them.
 #[rustfmt::skip]
 pub fn all() -> Vec<Scene> {
     vec![

@@ -10,7 +10,8 @@ const COLUMNS: usize = 16;
 /// The grounds, in the order of the level's draws.
 pub const GROUNDS: [&str; 6] = ["dirt", "grass", "planet", "sand", "snow", "stone"];
 
-/// The figures: players in a row of double height, then enemies, crates and saws, then the enemies' second steps.
+/// Returns the figures: players in a row of double height, then enemies, crates and saws, then the enemies' second
+/// steps.
 pub fn figures(drawings: &Drawings) -> Result<Canvas, String> {
     let mut sheet = Canvas::new(COLUMNS * SIDE, 4 * SIDE);
     let poses = ["stand", "walk1", "walk2"];
@@ -28,7 +29,7 @@ pub fn figures(drawings: &Drawings) -> Result<Canvas, String> {
     Ok(sheet)
 }
 
-/// The tiles of one ground from top to bottom: inner ground, surface, inner lava, surface of lava, coin.
+/// Returns the tiles of one ground from top to bottom: inner ground, surface, inner lava, surface of lava, coin.
 pub fn ground(drawings: &Drawings, name: &str) -> Result<Canvas, String> {
     let names = [name, &format!("{name}_top"), "lava", "lava_top", "coin"];
     let mut strip = Canvas::new(SIDE, names.len() * SIDE);

@@ -1,4 +1,4 @@
-//! Reads drawings that are written as text; `sprites.txt` explains how.
+//! Parser of drawings that are written as text; `sprites.txt` explains the form.
 
 use std::collections::BTreeMap;
 
