@@ -1,8 +1,7 @@
 //! Size and form of the pictures that a policy reads.
 
 use bevy::prelude::*;
-use playbot_learner::{ImageShape, ObsKind};
-use serde::{Deserialize, Serialize};
+use playbot_learner::{HasExitCode, ImageShape, ObsKind, settings, settings::Range};
 use thiserror::Error;
 
 use super::{Frame, blank::BlankEpisodes, planes::edge_of_squares, stack::PictureStack};
@@ -10,41 +9,37 @@ use super::{Frame, blank::BlankEpisodes, planes::edge_of_squares, stack::Picture
 /// Largest width and height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 1024;
 
-/// Size and form of the pictures that a policy reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImageOptions {
-    /// Columns of pixels, 1 to [`MAX_SIDE`].
-    pub width: u32,
-    /// Rows of pixels, 1 to [`MAX_SIDE`].
-    pub height: u32,
-    /// How many successive pictures make one observation, oldest first. At the start of an episode the first picture
-    /// stands in for the missing ones.
-    pub stack: u32,
+settings! {
+    /// Size and form of the pictures that a policy reads.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct ImageOptions in "image", read by &[];
+
+    /// Columns of pixels.
+    width: u32 = 64, in Range::Count(MAX_SIDE as u64);
+    /// Rows of pixels.
+    height: u32 = 64, in Range::Count(MAX_SIDE as u64);
+    /// Successive pictures of one observation, oldest first. At the start of an episode the first
+    /// picture stands in for the missing ones.
+    stack: u32 = 1, in Range::Count(Self::MAX_STACK as u64);
     /// One channel of brightness instead of red, green and blue (ITU-R BT.601 weights).
-    pub grayscale: bool,
-    /// Two squares at the top left, a fifth of the picture's width each, whose grey tells the agent's velocity, as in
-    /// the first CoinRun. The game fills [`PaintedVelocity`](super::PaintedVelocity).
-    pub paint_velocity: bool,
+    grayscale: bool = false;
+    /// Paints two squares at the top left, each a fifth of the picture's width, whose grey shows
+    /// the agent's velocity, as in the first CoinRun. The game fills
+    /// [`PaintedVelocity`](super::PaintedVelocity).
+    paint_velocity: bool = false;
 }
 
-impl Default for ImageOptions {
-    fn default() -> Self {
-        Self { width: 64, height: 64, stack: 1, grayscale: false, paint_velocity: false }
-    }
-}
-
-/// Why pictures cannot be made.
+/// The reason why pictures cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum VisionError {
     /// A width, height or stack that is 0 or too large.
     #[error("{what} is {value}; it must be 1 to {most}")]
     Size {
-        /// Which size.
+        /// The name of the size.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         value: u32,
-        /// The largest it may be.
+        /// Its largest allowed value.
         most: u32,
     },
     /// The game has nothing to draw.
@@ -53,7 +48,7 @@ pub enum VisionError {
         /// Name of the game.
         game: &'static str,
     },
-    /// There is nothing to draw with.
+    /// No graphics adapter was found.
     #[error(
         "no graphics adapter was found; install a Vulkan driver (Debian's `mesa-vulkan-drivers` needs no GPU), or use \
          `observation: Raster`"
@@ -67,8 +62,10 @@ pub enum VisionError {
     NoCamera,
 }
 
+impl HasExitCode for VisionError {}
+
 impl ImageOptions {
-    /// Most pictures in a stack.
+    /// Largest number of pictures in a stack.
     pub const MAX_STACK: u32 = 16;
 
     /// Checks the sizes.
@@ -90,7 +87,7 @@ impl ImageOptions {
         Ok(())
     }
 
-    /// Rows and columns at the top left in which velocity is painted, if it is.
+    /// Returns the rows and columns at the top left in which velocity is painted, if it is.
     pub fn painted_corner(&self) -> Option<[usize; 2]> {
         let edge = |squares| edge_of_squares(squares, self.width as usize);
         self.paint_velocity.then(|| [edge(1).min(self.height as usize), edge(2)])
@@ -101,7 +98,7 @@ impl ImageOptions {
         if self.grayscale { 1 } else { 3 }
     }
 
-    /// The shape of an observation: channels are colours times stacked pictures.
+    /// Returns the shape of an observation: channels are colours times stacked pictures.
     pub fn shape(&self) -> ImageShape {
         ImageShape {
             channels: (self.colours() * self.stack) as usize,
@@ -110,13 +107,14 @@ impl ImageOptions {
         }
     }
 
-    /// The shape, for a learner.
+    /// Returns the shape, for a learner.
     pub fn obs_kind(&self) -> ObsKind {
         ObsKind::Image(self.shape())
     }
 }
 
-/// Marks an agent whose policy reads pictures of this size and form. Comes with every sensor that makes pictures.
+/// Marks an agent whose policy reads pictures of this size and form. Every sensor of pictures adds
+/// it.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]

@@ -1,102 +1,85 @@
-//! What an experiment is.
+//! Experiments and their settings.
 
 use std::path::PathBuf;
 
-use playbot_learner::{PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig};
+use playbot_learner::{
+    PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
+    settings::{Range, is_off},
+};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::checkpoint::CheckpointConfig;
 pub use super::{
     algorithm::{Algorithm, LearnerKind},
     experiment_error::ExperimentError,
 };
-use crate::split::LevelSplit;
+use crate::{eval::EvalPlan, machine::MOST_WORLDS, split::LevelSplit};
 pub use bevy_playbot::vision::ObservationKind;
 use bevy_playbot::vision::{ImageOptions, ObservationConfig};
 
-/// One experiment: game, levels, data, networks and tuning. Read from a RON file; what the file leaves out has these
-/// defaults.
-///
-/// Networks belong to what they are part of: `ppo.hidden` and `ppo.activation` (or `sac.…`) are those of actor and
-/// critic, `skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden` and `skills.gru_layers` those of the skill model. A
-/// policy that starts as a copy of the decoder has the decoder's layers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Experiment {
+settings! {
+    /// One experiment: game, levels, data, networks and tuning. Read from a RON file; keys that the file leaves out
+    /// have these defaults.
+    ///
+    /// Networks belong to their part: `ppo.hidden` and `ppo.activation` (or `sac.…`) are those of actor and critic,
+    /// `skills.hidden`, `skills.encoder_hidden`, `skills.gru_hidden` and `skills.gru_layers` those of the skill model.
+    /// A policy that starts as a copy of the decoder has the decoder's layers.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Experiment with sections;
+
     /// Name of the game.
-    pub game: String,
-    /// What agents see of it.
-    #[serde(default)]
-    pub observation: ObservationKind,
+    game: String, such as "\"coinrun\"";
+    /// Observations of the agents.
+    observation: ObservationKind = ObservationKind::default(), serde(default);
     /// Size and form of the pictures, for agents that see some.
-    #[serde(default)]
-    pub image: ImageOptions,
-    /// How the policy is made.
-    #[serde(default = "score_ppo")]
-    pub algorithm: Algorithm,
+    image: ImageOptions, keys of ImageOptions, serde(default);
+    /// Name of the algorithm: `score-ppo`, `ppo`, `score-sac`, `sac`, `spirl-ppo`, `spirl-sac`, `rlpd` or `bc`.
+    algorithm: Algorithm = score_ppo(), serde(default = "score_ppo");
     /// Levels to train on.
-    pub train: LevelSplit,
+    train: LevelSplit, such as "\"hard:0..63\"";
     /// Held-out levels to evaluate on; never trained on.
-    pub test: LevelSplit,
-    /// File or folder of demonstrations; `None` for algorithms that learn nothing from any.
-    #[serde(default, serialize_with = "plain")]
-    pub demos: Option<PathBuf>,
-    /// Learn from at most so many recorded steps: whole episodes, drawn evenly over the recordings. From all of
-    /// them if none is named.
-    #[serde(default)]
-    pub demo_steps: Option<u64>,
-    /// Learn only from recorded episodes that ended at the goal: of demonstrators that do not always get there. Episodes of
-    /// games that go on at the goal end nowhere, and are left out.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub demo_wins: bool,
-    /// Seed of everything random.
-    #[serde(default = "one")]
-    pub seed: u64,
-    /// Seeds of a study, which runs everything once with each; `seed` alone if there are none.
-    #[serde(default)]
-    pub seeds: Vec<u64>,
+    test: LevelSplit, such as "\"hard:64..127\"";
+    /// File or folder of recordings; `None` for algorithms that learn nothing from any.
+    demos: Option<PathBuf> = None, such as "\"demos/coinrun\"", serde(default, serialize_with = "plain");
+    /// Learn from at most so many recorded steps: whole episodes, drawn evenly over the recordings. `None` takes all.
+    demo_steps: Option<u64> = None, in Range::COUNT, serde(default);
+    /// Learn only from recorded episodes that ended at the goal, for demonstrators that do not always get there.
+    /// Episodes of games that go on at the goal end nowhere, and are left out.
+    demo_wins: bool = false, serde(default, skip_serializing_if = "is_off");
+    /// Random seed of everything.
+    seed: u64 = one(), serde(default = "one");
+    /// Random seeds of a study, which runs everything once with each; `seed` alone if the list is empty.
+    seeds: Vec<u64> = Vec::new(), serde(default);
     /// Environment steps to train for, over all arenas together; rounded up to whole rollouts.
-    pub steps: u64,
+    // Numbers in metrics and plots are floating-point ones.
+    steps: u64, in Range::Count(1 << 53), such as "1000000";
     /// Arenas that play at the same time.
-    #[serde(default = "default_arenas")]
-    pub arenas: u32,
-    /// Worlds the arenas are spread over; the number of threads that can simulate at the same time. Part of the
-    /// experiment, since the rows of a batch are computed together; the number of threads is not.
-    #[serde(default = "default_worlds")]
-    pub worlds: u32,
+    arenas: u32 = default_arenas(), in Range::COUNT, serde(default = "default_arenas");
+    /// Worlds the arenas are spread over. Each World plays on a thread of its own. Part of the experiment, since the
+    /// rows of a batch are computed together; the number of other threads is not.
+    worlds: u32 = default_worlds(), in Range::Count(MOST_WORLDS), serde(default = "default_worlds");
     /// The skill model.
-    #[serde(default)]
-    pub skills: SkillConfig,
+    skills: SkillConfig, keys of SkillConfig, serde(default);
     /// The learner of score-ppo, ppo and spirl-ppo.
-    #[serde(default)]
-    pub ppo: PpoConfig,
+    ppo: PpoConfig, keys of PpoConfig, serde(default);
     /// The learner of score-sac, sac, spirl-sac and rlpd.
-    #[serde(default)]
-    pub sac: SacConfig,
+    sac: SacConfig, keys of SacConfig, serde(default);
     /// The three steps of SCORE.
-    #[serde(default)]
-    pub score: ScoreConfig,
-    /// What spirl-ppo and spirl-sac add to that.
-    #[serde(default)]
-    pub spirl: SpirlConfig,
-    /// What rlpd adds to `sac`.
-    #[serde(default)]
-    pub rlpd: RlpdConfig,
+    score: ScoreConfig, keys of ScoreConfig, serde(default);
+    /// Additions of spirl-ppo and spirl-sac.
+    spirl: SpirlConfig, keys of SpirlConfig, serde(default);
+    /// Additions of rlpd to `sac`.
+    rlpd: RlpdConfig, keys of RlpdConfig, serde(default);
     /// Evaluation.
-    #[serde(default)]
-    pub eval: EvalConfig,
+    eval: EvalConfig, keys of EvalConfig, serde(default);
     /// When the state of the training is saved.
-    #[serde(default)]
-    pub checkpoints: CheckpointConfig,
-    /// What a study measures.
-    #[serde(default)]
-    pub study: StudyConfig,
-    /// What a study compares; empty in the experiment of a single run.
-    #[serde(default)]
-    pub variants: Vec<Variant>,
+    checkpoints: CheckpointConfig, keys of CheckpointConfig, serde(default);
+    /// Measurements of a study.
+    study: StudyConfig, keys of StudyConfig, serde(default);
+    /// Variants that a study compares; empty in the experiment of a single run.
+    variants: Vec<Variant> = Vec::new(), serde(default);
 }
 
-/// A path as text, as files have it, and not as `Some(text)`.
+/// Writes a path as text, as files have it, and not as `Some(text)`.
 fn plain<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
     match path {
         Some(path) => path.serialize(serializer),
@@ -120,35 +103,36 @@ fn default_worlds() -> u32 {
     2
 }
 
-/// How policies are measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct EvalConfig {
-    /// Episodes on each level; every level is played equally often. More levels tell more than more episodes on the same
+settings! {
+    /// Evaluation of policies.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct EvalConfig in "eval", read by &[];
+
+    /// Episodes on each level; every level is played equally often. More levels say more than more episodes on the same
     /// ones.
-    pub episodes_per_level: u32,
+    episodes_per_level: u32 = 1, in Range::COUNT;
     /// Take the most probable action instead of drawing one.
-    pub greedy: bool,
+    greedy: bool = false;
 }
 
-impl Default for EvalConfig {
-    fn default() -> Self {
-        Self { episodes_per_level: 1, greedy: false }
-    }
+settings! {
+    /// When checkpoints are written and how many stay.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct CheckpointConfig in "checkpoints", read by &[];
+
+    /// Updates between two checkpoints; there is always one at the start and one at the end.
+    every: u64 = 10, in Range::COUNT;
+    /// How many of the latest stay; the best one stays besides.
+    keep: usize = 3, in Range::COUNT;
 }
 
-/// What a study measures.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct StudyConfig {
-    /// Success rate, over the last 100 training episodes, whose first step is looked for.
-    pub threshold: f64,
-}
+settings! {
+    /// Measurements of a study.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct StudyConfig in "study", read by &[];
 
-impl Default for StudyConfig {
-    fn default() -> Self {
-        Self { threshold: 0.8 }
-    }
+    /// Success rate over the last 100 training episodes, whose first step is looked for.
+    threshold: f64 = 0.8, in Range::SHARE;
 }
 
 /// One side of a comparison: the experiment with some of its values changed.
@@ -157,24 +141,36 @@ impl Default for StudyConfig {
 pub struct Variant {
     /// Its name in tables and folders: letters, digits, `-`, `_` and `.`.
     pub name: String,
-    /// What it changes, as `key=value`, in the manner of `--set`.
+    /// Its changes, as `key=value`, in the manner of `--set`.
     #[serde(default)]
     pub set: Vec<String>,
 }
 
 impl Experiment {
-    /// What agents see.
+    /// Returns the kind of observations with their settings.
     pub fn observation_config(&self) -> ObservationConfig {
         ObservationConfig { kind: self.observation, image: self.image }
     }
 
-    /// The experiment of a single run: without what only a study reads.
+    /// Returns the plan of an evaluation on these levels, for a player with the experiment's observation.
+    pub fn eval_plan(&self, split: &LevelSplit, threads: usize) -> EvalPlan {
+        EvalPlan {
+            split: split.clone(),
+            observation_config: self.observation_config(),
+            episodes_per_level: self.eval.episodes_per_level,
+            seed: self.seed,
+            arenas: self.arenas,
+            worlds: self.worlds,
+            threads,
+        }
+    }
+
+    /// Returns the experiment of a single run, without the settings of a study.
     pub fn without_study(&self) -> Self {
         Self { seeds: Vec::new(), variants: Vec::new(), ..self.clone() }
     }
 
-    /// The settings of PPO as the learner gets them: a learning rate that falls does so over the whole training, unless
-    /// the experiment says otherwise.
+    /// Returns the settings of PPO for the learner: a falling learning rate falls over the whole training by default.
     pub fn ppo_config(&self) -> PpoConfig {
         let mut config = self.ppo.clone();
         let changes = config.anneal_lr || self.score.kl_coef_end.is_some();
@@ -184,7 +180,7 @@ impl Experiment {
         config
     }
 
-    /// Ticks of one rollout.
+    /// Returns the ticks of one rollout.
     pub fn rollout_steps(&self) -> usize {
         match self.algorithm.learner() {
             LearnerKind::Ppo => self.ppo.num_steps,
@@ -192,23 +188,23 @@ impl Experiment {
         }
     }
 
-    /// Environment steps of one rollout.
+    /// Returns the environment steps of one rollout.
     pub fn steps_per_update(&self) -> u64 {
         u64::from(self.arenas).saturating_mul(self.rollout_steps() as u64)
     }
 
-    /// Rollouts, and so updates, of the whole training.
+    /// Returns the rollouts, and so updates, of the whole training.
     pub fn updates(&self) -> u64 {
         self.steps.div_ceil(self.steps_per_update())
     }
 
-    /// Environment steps that are trained: [`steps`](Self::steps), rounded up to whole rollouts.
+    /// Returns the environment steps of the training: [`steps`](Self::steps), rounded up to whole rollouts.
     pub fn whole_steps(&self) -> u64 {
-        // A rollout of no steps is no experiment that can be run, and no reason to fail here.
+        // `check` refuses rollouts of no steps; this function must not fail.
         self.steps.checked_next_multiple_of(self.steps_per_update()).unwrap_or(self.steps)
     }
 
-    /// The experiment as RON, all defaults filled in.
+    /// Writes the experiment as RON, all defaults filled in.
     ///
     /// # Errors
     ///

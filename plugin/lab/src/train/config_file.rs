@@ -1,34 +1,35 @@
-//! Reading an experiment from a RON file, with errors one can act on.
+//! Experiment files in RON.
 //!
-//! `base: ["coinrun-ppo", "mine.ron"]` at the top of a file names what it is built on: presets by name, files by their
-//! path from the file's own folder. Each is laid over the ones before it, and the file's own keys over all of them, key by
-//! key; a list is one value. A base may have a base of its own. How many there may be is limited, and how long a file may be,
-//! so that nobody waits for a file that was made to take forever.
+//! `base: ["coinrun-ppo", "mine.ron"]` at the top of a file names its bases: presets by name, files by their path from
+//! the file's own folder. Each overrides the ones before it, and the file's own keys override all of them, key by key;
+//! a list is one value. A base may have a base of its own. The number of bases and the length of a file are limited,
+//! which keeps hostile files from taking forever.
 
 use std::path::{Path, PathBuf};
 
 use super::{
     config::{Experiment, ExperimentError},
-    config_keys::{Keys, Origin},
-    presets::Preset,
+    config_error::Origin,
+    config_keys::Keys,
+    presets::find_preset,
 };
 use crate::text_file::read_text_file;
 
 pub use super::config_error::ConfigError;
 
-/// Files below one another, at most.
+/// Largest depth of bases.
 const MAX_DEPTH: usize = 8;
 
-/// Files and presets that an experiment is built on, at most, each as often as it is named.
+/// Largest number of bases of an experiment, each counted as often as it is named.
 const MAX_BASES: usize = 64;
 
-/// Bytes of a file, at most. The longest experiments have a few thousand.
+/// Largest size of a file in bytes. The longest experiments have a few thousand.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// The files that are being read for one experiment.
 #[derive(Default)]
 struct Reading {
-    /// Those that are built on the one at hand, the outermost first.
+    /// Files that have the current one as a base, the outermost first.
     users: Vec<PathBuf>,
     /// Files and presets read so far, beside the experiment itself.
     bases: usize,
@@ -52,7 +53,7 @@ pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Ex
     parse_experiment_with(&read_experiment_text(path)?, path, sets)
 }
 
-/// As [`read_experiment_with`], from a text; `path` as for [`parse_experiment`].
+/// Reads an experiment as [`read_experiment_with`] does, from a text; `path` as for [`parse_experiment`].
 ///
 /// # Errors
 ///
@@ -72,11 +73,11 @@ pub fn parse_experiment_with<S: AsRef<str>>(text: &str, path: &Path, sets: &[S])
     }
 }
 
-/// An error that was found out later than when the experiment was read, such as when it met its game, with the place of
-/// the key to blame. Text, path and sets are those that the experiment was read from.
+/// Adds the position of the wrong key to an error that was found after reading, such as one about the game. Text, path
+/// and sets are those that the experiment was read from.
 pub fn locate<S: AsRef<str>>(text: &str, path: &Path, sets: &[S], source: ExperimentError) -> ConfigError {
     let keys = source.keys();
-    // A set may change a whole section, and a section be to blame.
+    // A set may change a whole section, and the error may name a section.
     let sets_it = |set: &&str| {
         let name = set.split_once('=').map_or("", |(name, _)| name.trim());
         let is_within = |inner: &str, outer: &str| inner.strip_prefix(outer).is_some_and(|rest| rest.starts_with('.'));
@@ -86,7 +87,7 @@ pub fn locate<S: AsRef<str>>(text: &str, path: &Path, sets: &[S], source: Experi
     placed(&gather(text, path, &mut Reading::default()).unwrap_or_default(), sets, source, path)
 }
 
-/// An error of the sets to blame, or of the place in a file if there are none.
+/// Returns an error of these sets, or of the position in a file if there are none.
 fn placed(keys: &Keys, sets: Vec<String>, source: ExperimentError, path: &Path) -> ConfigError {
     if !sets.is_empty() {
         return ConfigError::Sets { sets, source: source.into() };
@@ -95,7 +96,7 @@ fn placed(keys: &Keys, sets: Vec<String>, source: ExperimentError, path: &Path) 
     ConfigError::Values { path: path.into(), at, source: source.into() }
 }
 
-/// Those sets without which the error would be gone, or all of them together.
+/// Returns the sets without which the error would be gone, or all of them together.
 fn blame<S: AsRef<str>>(sets: &[S], fails: impl Fn(&[&str]) -> bool) -> Vec<String> {
     let all: Vec<&str> = sets.iter().map(AsRef::as_ref).collect();
     let without = |left_out: usize| -> Vec<&str> {
@@ -105,26 +106,26 @@ fn blame<S: AsRef<str>>(sets: &[S], fails: impl Fn(&[&str]) -> bool) -> Vec<Stri
     if guilty.is_empty() { all.into_iter().map(str::to_owned).collect() } else { guilty }
 }
 
-/// Parses the text of an experiment. `path` is for messages and says where to look for files that it is built on.
+/// Parses the text of an experiment. Messages name `path`, and paths of bases start in its folder.
 ///
 /// # Errors
 ///
-/// [`ConfigError::Syntax`], also for what it is built on; [`ConfigError::Read`] if that cannot be read.
+/// [`ConfigError::Syntax`], also for its bases; [`ConfigError::Read`] if one of them cannot be read.
 pub fn parse_experiment(text: &str, path: &Path) -> Result<Experiment, ConfigError> {
     gather(text, path, &mut Reading::default())?.parse(&Origin::start_of(path))
 }
 
-/// The text of an experiment file, of at most 1 MiB.
+/// Reads the text of an experiment file, of at most 1 MiB.
 ///
 /// # Errors
 ///
-/// [`ConfigError::Read`] if there is no regular file, or a longer one, or it is no text.
+/// [`ConfigError::Read`] if there is no regular file, or it is longer, or it is not a text.
 pub fn read_experiment_text(path: &Path) -> Result<String, ConfigError> {
     read_text_file(path, MAX_BYTES).map_err(|error| ConfigError::Read { path: path.into(), source: error.into() })
 }
 
-/// The keys of a file over those of what it is built on. Each file is checked alone, so that a wrong value is found even
-/// if a later one hides it.
+/// Collects the keys of a file over those of its bases. Each file is checked alone: a wrong value is reported even if a
+/// later one overrides it.
 fn gather(text: &str, path: &Path, reading: &mut Reading) -> Result<Keys, ConfigError> {
     let start = Origin::start_of(path);
     let mut own = Keys::of_text(text, path)?;
@@ -177,7 +178,7 @@ fn gather_base(name: &str, reading: &mut Reading, origin: &Origin) -> Result<Key
         })?;
         return gather(&text, &path, reading);
     }
-    let preset = Preset::find(name)
+    let preset = find_preset(name)
         .map_err(|error| origin.error((1, 1), format!("{error}; or a file, by its path ending in .ron")))?;
     gather(preset.text, &path, reading)
 }

@@ -1,17 +1,18 @@
-//! An experiment as a list of keys with their values as text, which is how files, presets and `--set` are laid over one
-//! another: key by key, the later one wins. Types are looked at once, when the result is parsed; errors are then traced
-//! back to where the value was written.
+//! Experiments as lists of keys with their values as text. Files, presets and `--set` override one another key by key.
+//! Types are checked once, when the result is parsed; errors then lead back to the position of the value.
 
-use std::{collections::BTreeMap, path::Path, sync::LazyLock};
+use std::{collections::BTreeMap, fmt, path::Path, sync::LazyLock};
 
-use ron::{Options, error::SpannedError, extensions::Extensions};
-use serde::de::IgnoredAny;
+use ron::{Options, error::SpannedError, extensions::Extensions, value::RawValue};
+use serde::{
+    Deserialize, Deserializer,
+    de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor},
+};
 
-pub(super) use super::config_origin::Origin;
 use super::{
     config::Experiment,
-    config_error::{ConfigError, missing_key, syntax_message, type_message, unknown_key},
-    ron_keys::{fields, line_feeds, position},
+    config_error::{ConfigError, Origin},
+    known_settings::{self as known, is_section, missing_key, renamed, syntax_message, type_message, unknown_key},
 };
 
 /// A value as text.
@@ -25,42 +26,99 @@ pub(super) struct Value {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Keys(BTreeMap<String, Value>);
 
-/// More keys than any section has, or the experiment outside its sections. Those of a text with more are not looked at, which
-/// would take long.
+/// Largest number of keys in a section, or outside all sections. A text with more is refused, since reading it would
+/// take long.
 const MOST_KEYS: usize = 200;
 
-/// All keys there are, with an example of each value.
+/// All keys, each with a valid value.
 static ALL: LazyLock<Keys> = LazyLock::new(|| {
-    // With keys that are not written as long as they do nothing.
-    let least = r#"(game: "-", train: "-:0..0", test: "-:1..1", demos: "-", demo_wins: true, steps: 1, skills: (
-        augment: [Translate(1)], weight_decay: 0.1, held_out: 0.1, patience: Some(1), state_weight: 1.0, anneal_lr: true),
-        ppo: (augment: [Translate(1)]))"#;
-    let example: Experiment = reader().from_str(least).expect("every required key is there");
-    Keys::of_experiment(&example, &Origin::start_of(Path::new("example"))).expect("it was just read")
+    let origin = Origin::start_of(Path::new("example"));
+    let value = |text| Value { text, origin: origin.clone() };
+    Keys(known::all().map(|setting| (setting.path.to_owned(), value(setting.sample()))).collect())
 });
 
-/// A value may stand for `Some(value)`.
+/// Returns a reader for which a value may stand for `Some(value)`.
 fn reader() -> Options {
     Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
-/// Whether a text is one value of RON, of whatever type.
+/// Checks that a text is one value of RON, of any type.
 pub(super) fn check_syntax(text: &str) -> Result<(), SpannedError> {
     reader().from_str::<IgnoredAny>(text).map(|_| ())
 }
 
-/// What a key of older files is called now.
-pub(super) fn renamed(key: &str) -> Option<&'static str> {
-    (key == "sac.alpha_lr").then_some("sac.temperature_lr")
+/// The fields of a RON struct, with or without a name before it: each key with its value, as they are written.
+struct Fields<'a>(Vec<(&'a str, &'a str)>);
+
+impl<'de> Deserialize<'de> for Fields<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(FieldsVisitor)
+    }
+}
+
+struct FieldsVisitor;
+
+impl<'de> Visitor<'de> for FieldsVisitor {
+    type Value = Fields<'de>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a struct")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Fields<'de>, A::Error> {
+        let mut fields = Vec::new();
+        while let Some(key) = map.next_key()? {
+            let value: &'de RawValue = map.next_value()?;
+            fields.push((key, value.trim().get_ron()));
+        }
+        Ok(Fields(fields))
+    }
+
+    /// Takes `( )`, a struct without fields.
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Fields<'de>, A::Error> {
+        match seq.next_element::<IgnoredAny>()? {
+            None => Ok(Fields(Vec::new())),
+            Some(_) => Err(A::Error::custom("values without keys")),
+        }
+    }
+
+    /// Takes `()`, and a name alone, which is no struct.
+    fn visit_unit<E>(self) -> Result<Fields<'de>, E> {
+        Ok(Fields(Vec::new()))
+    }
+}
+
+/// Returns the fields of a struct; `None` if the text is something else.
+fn fields(text: &str) -> Option<Vec<(&str, &str)>> {
+    let is_map = text.trim_start().starts_with('{');
+    let Fields(fields) = reader().from_str(text).ok().filter(|_| !is_map)?;
+    (!fields.is_empty() || text.contains('(')).then_some(fields)
+}
+
+/// Returns the byte of a text at which a part of it begins.
+fn offset(text: &str, part: &str) -> usize {
+    part.as_ptr().addr().saturating_sub(text.as_ptr().addr()).min(text.len())
+}
+
+/// Returns line and column, both from 1, of a byte.
+fn position(text: &str, at: usize) -> (usize, usize) {
+    let before = text.get(..at).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (line_feeds(before) + 1, before[line_start..].chars().count() + 1)
+}
+
+/// Counts line feeds, fast enough for a file of a million of them.
+fn line_feeds(text: &str) -> usize {
+    text.bytes().filter(|byte| *byte == b'\n').count()
 }
 
 impl Keys {
-    /// All keys there are, with an example of each value.
+    /// Returns all keys, each with a valid value.
     pub(super) fn all() -> &'static Self {
         &ALL
     }
 
-    /// The keys of a RON text. They need not be complete; unknown ones are taken too.
+    /// Returns the keys of a RON text. Required keys may be missing, and unknown ones are taken too.
     ///
     /// # Errors
     ///
@@ -75,13 +133,12 @@ impl Keys {
             start.error(at, syntax_message(&error.code))
         })?;
         let mut keys = Self::default();
-        let origin =
-            |key, value| Origin::File { path: path.into(), key: position(text, key), value: position(text, value) };
-        keys.collect(text, 0, "", &origin, &|key, _| ALL.is_section(key))?;
+        let at = |part: &str| position(text, offset(text, part));
+        keys.collect(text, "", &|key, value| Origin::File { path: path.into(), key: at(key), value: at(value) })?;
         Ok(keys)
     }
 
-    /// The keys of one section, from the text `(key: value, ...)` of a `key=value`.
+    /// Returns the keys of one section, from the text `(key: value, ...)` of a `key=value`.
     ///
     /// # Errors
     ///
@@ -89,11 +146,11 @@ impl Keys {
     pub(super) fn of_set(section: &str, text: &str, origin: &Origin) -> Result<Self, ConfigError> {
         check_syntax(text).map_err(|error| origin.error((1, 1), syntax_message(&error.code)))?;
         let mut keys = Self::default();
-        keys.collect(text, 0, &format!("{section}."), &|_, _| origin.clone(), &|key, _| ALL.is_section(key))?;
+        keys.collect(text, &format!("{section}."), &|_, _| origin.clone())?;
         Ok(keys)
     }
 
-    /// Every key of an experiment; errors in a value will be said to come from `origin`.
+    /// Returns every key of an experiment; errors in a value name `origin`.
     ///
     /// # Errors
     ///
@@ -101,40 +158,32 @@ impl Keys {
     pub(super) fn of_experiment(experiment: &Experiment, origin: &Origin) -> Result<Self, ConfigError> {
         let text = experiment.to_ron().map_err(|error| origin.error((1, 1), error.to_string()))?;
         let mut keys = Self::default();
-        // This text is what tells sections from values: a section begins with its bracket, the variant of an enum with its
-        // name.
-        keys.collect(&text, 0, "", &|_, _| origin.clone(), &|_, value| value.starts_with('('))?;
+        keys.collect(&text, "", &|_, _| origin.clone())?;
         Ok(keys)
     }
 
-    /// Adds the fields of the struct at byte `at`, and those of the sections in it.
-    fn collect(
-        &mut self,
-        text: &str,
-        at: usize,
-        prefix: &str,
-        origin: &dyn Fn(usize, usize) -> Origin,
-        is_section: &dyn Fn(&str, &str) -> bool,
-    ) -> Result<(), ConfigError> {
-        let Some(fields) = fields(text, at) else {
+    /// Adds the fields of a struct, and those of the sections in it. `origin` says where a key and its value were
+    /// written.
+    fn collect(&mut self, text: &str, prefix: &str, origin: &dyn Fn(&str, &str) -> Origin) -> Result<(), ConfigError> {
+        let Some(fields) = fields(text) else {
             let message = "an experiment is a list of keys in round brackets: (key: value, ...)";
-            return Err(origin(at, at).key_error(message.to_owned()));
+            return Err(origin(text, text).key_error(message.to_owned()));
         };
         if fields.len() > MOST_KEYS {
             let message =
                 format!("{} keys in one place: no part of an experiment has as many as {MOST_KEYS}", fields.len());
-            return Err(origin(at, at).key_error(message));
+            return Err(origin(text, text).key_error(message));
         }
-        for (index, field) in fields.iter().enumerate() {
-            let key = format!("{prefix}{}", field.key);
-            let origin_here = origin(field.key_at, field.value_at);
-            if fields[..index].iter().any(|before| before.key == field.key) {
+        for (index, (name, value)) in fields.iter().enumerate() {
+            let key = format!("{prefix}{name}");
+            let origin_here = origin(name, value);
+            if fields[..index].iter().any(|(before, _)| before == name) {
                 return Err(origin_here.key_error(format!("`{key}` is there twice")));
             }
-            if is_section(&key, field.value) && self::fields(text, field.value_at).is_some() {
-                self.collect(text, field.value_at, &format!("{key}."), origin, is_section)?;
+            if is_section(&key) && self::fields(value).is_some() {
+                self.collect(value, &format!("{key}."), origin)?;
             } else {
-                self.put(key, Value { text: field.value.to_owned(), origin: origin_here });
+                self.put(key, Value { text: (*value).to_owned(), origin: origin_here });
             }
         }
         Ok(())
@@ -146,24 +195,18 @@ impl Keys {
     ///
     /// The unknown key with the nearest one that exists.
     pub(super) fn check_names(&self) -> Result<(), ConfigError> {
-        match self.0.iter().find(|(key, _)| !ALL.0.contains_key(*key)) {
+        match self.0.iter().find(|(key, _)| known::find(key).is_none()) {
             Some((key, value)) => Err(value.origin.key_error(unknown_key(key))),
             None => Ok(()),
         }
     }
 
-    /// Whether there are keys below this one.
-    pub(super) fn is_section(&self, key: &str) -> bool {
-        let prefix = format!("{key}.");
-        self.0.range(prefix.clone()..).next().is_some_and(|(key, _)| key.starts_with(&prefix))
-    }
-
-    /// The text of a value.
+    /// Returns the text of a value.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         self.0.get(key).map(|value| value.text.as_str())
     }
 
-    /// Where a key, or the first one of a section, was written: file, line and column; `None` if no file says it.
+    /// Returns file, line and column of a key, or of the first one in a section; `None` if no file has it.
     pub(super) fn place(&self, key: &str) -> Option<(&Path, (usize, usize))> {
         let section = format!("{key}.");
         let found = self.0.iter().find(|(name, _)| *name == key || name.starts_with(&section))?;
@@ -171,11 +214,6 @@ impl Keys {
             Origin::File { path, key, .. } => Some((path, *key)),
             Origin::Set(_) => None,
         }
-    }
-
-    /// Full paths of all keys, in alphabetical order.
-    pub(super) fn paths(&self) -> impl Iterator<Item = &str> {
-        self.0.keys().map(String::as_str)
     }
 
     /// Takes a value out.
@@ -192,13 +230,13 @@ impl Keys {
         self.0.insert(key, value);
     }
 
-    /// These values, and those of `later` over them.
+    /// Overrides these values by those of `later`.
     pub(super) fn overlaid(mut self, later: &Self) -> Self {
         self.0.extend(later.0.iter().map(|(key, value)| (key.clone(), value.clone())));
         self
     }
 
-    /// The experiment; what is left out gets its default. `whole` is where errors of no single value lie.
+    /// Parses the experiment; missing keys get their defaults. Errors of no single value name `whole`.
     ///
     /// # Errors
     ///
@@ -208,7 +246,7 @@ impl Keys {
         reader().from_str(&text).map_err(|error| self.explain(&error, &lines, whole))
     }
 
-    /// One RON text. Every value begins on a line of its own, which is returned with its key.
+    /// Joins the values to one RON text. Every value begins on a line of its own, which is returned with its key.
     fn join(&self) -> (String, Vec<(usize, &str)>) {
         let (mut text, mut lines, mut open) = (String::from("("), Vec::new(), Vec::new());
         let mut line = 1;
@@ -234,20 +272,20 @@ impl Keys {
             return whole.error((1, 1), missing_key(field));
         }
         let of = |at: ron::error::Position| lines.iter().rposition(|(line, _)| *line <= at.line);
-        // The reader says from where to where it was; of what it refused at once only the end lies in the value.
+        // The reader gives a span. Of a value that it refused at once, only the end lies in the value.
         let ron::error::Span { start, end } = error.span;
         let at = if of(start) == of(end) { start } else { end };
         let Some((key, line)) = of(end).map(|index| (lines[index].1, lines[index].0)) else {
             return whole.error((1, 1), error.code.to_string());
         };
         let value = &self.0[key];
-        let message = type_message(&error.code, key, &value.text, || self.valid_names(key));
+        let message = type_message(&error.code, key, &value.text, || Self::valid_names(key));
         let within = (1..=value.text.lines().count()).contains(&(at.line + 1 - line));
         value.origin.error(if within { (at.line + 1 - line, at.col) } else { (1, 1) }, message)
     }
 
-    /// The names of which this key takes one, if it is of that kind: those that the reader says when it gets another.
-    fn valid_names(&self, key: &str) -> Option<&'static [&'static str]> {
+    /// Returns the names that this key takes, if it takes names: those that the reader lists when it gets another.
+    pub(super) fn valid_names(key: &str) -> Option<&'static [&'static str]> {
         let mut wrong = Self::all().clone();
         let origin = Origin::Set(String::new());
         wrong.put(key.to_owned(), Value { text: "no_such_name".to_owned(), origin });
@@ -255,5 +293,53 @@ impl Keys {
             Err(SpannedError { code: ron::Error::NoSuchEnumVariant { expected, .. }, .. }) => Some(expected),
             _ => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_every_kind_come_out_as_written() {
+        let text = r##"// a comment, with ( and "
+        Experiment( /* and /* another ) */ one */ a: 1, b : -0.5e-3 , c: "x, ) \" y", d: r#"raw " )"#,
+            e: [1, (2, 3)], f: /* before */ Some(Relu), g: ')', h: { "k": (z: 1) }, i: (x: 1, y: (w: 2)), // last )
+            j: Named(x: "//"), k: '"',
+        )"##;
+        let expected = [
+            ("a", "1"),
+            ("b", "-0.5e-3"),
+            ("c", r#""x, ) \" y""#),
+            ("d", r##"r#"raw " )"#"##),
+            ("e", "[1, (2, 3)]"),
+            ("f", "Some(Relu)"),
+            ("g", "')'"),
+            ("h", r#"{ "k": (z: 1) }"#),
+            ("i", "(x: 1, y: (w: 2))"),
+            ("j", r#"Named(x: "//")"#),
+            ("k", "'\"'"),
+        ];
+        assert_eq!(fields(text), Some(expected.to_vec()));
+        assert_eq!(fields("()"), Some(Vec::new()));
+        assert_eq!(fields("( )"), Some(Vec::new()));
+        let extended = "#![enable(implicit_some)]\n#![enable(unwrap_newtypes)] // on\n(a: 1)";
+        assert_eq!(fields(extended), Some(vec![("a", "1")]));
+    }
+
+    #[test]
+    fn a_text_without_keys_is_no_struct() {
+        for text in ["3", "[1]", "[]", "(1, 2)", "\"a: 1\"", "Relu", "Some(3)", "{\"a\": 1}", ""] {
+            assert_eq!(fields(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn positions_count_from_one_in_characters() {
+        let text = "(\n  ä: 1,\n  b: 2)";
+        let fields = fields(text).expect("a struct");
+        let at = |part: &str| position(text, offset(text, part));
+        assert_eq!(at(fields[0].1), (2, 6));
+        assert_eq!(at(fields[1].0), (3, 3));
     }
 }

@@ -1,23 +1,47 @@
-//! `--set key=value`: an experiment with single values changed.
+//! Changes of single settings by `--set key=value`.
+
+use playbot_learner::settings::Reader;
 
 use super::{
     config::Experiment,
-    config_error::{ConfigError, no_value, unknown_key},
-    config_keys::{Keys, Origin, Value, check_syntax, renamed},
+    config_error::{ConfigError, Origin},
+    config_keys::{Keys, Value, check_syntax},
+    known_settings::{self as known, is_section, no_value, renamed, unknown_key},
 };
 
 impl Experiment {
-    /// This experiment with each `key=value` put into it, in order. A key in a section has its path, such as
+    /// Returns this experiment with each `key=value` put into it, in order. A key in a section has its path, such as
     /// `ppo.lr=0.0003`; values are written as in a file, and texts may lack their quotes: `train=hard:0..31`. A whole
     /// section is changed key by key: `ppo=(lr: 0.0003, epochs: 4)`.
     ///
-    /// Whether the values go together is for [`check`](Self::check) to say.
+    /// [`check`](Self::check) then finds values that contradict one another.
     ///
     /// # Errors
     ///
-    /// [`ConfigError::Set`] with the text that does not fit: no `=`, an unknown key, or a value of the wrong type.
+    /// [`ConfigError::Set`] with the wrong text: no `=`, an unknown key, or a value of the wrong type.
     pub fn with_set<S: AsRef<str>>(&self, sets: &[S]) -> Result<Self, ConfigError> {
         sets.iter().try_fold(self.clone(), |experiment, set| put(&experiment, set.as_ref()))
+    }
+
+    /// Returns whether the algorithm reads this key, or some key in this section. A key that another one turns off,
+    /// such as `score.kl_coef` without `score.kl`, counts as read.
+    pub fn reads(&self, key: &str) -> bool {
+        let key = renamed(key).unwrap_or(key);
+        let is_asked = |path: &str| path.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        let mut asked = known::all().filter(|setting| is_asked(setting.path)).peekable();
+        asked.peek().is_none() || asked.any(|setting| self.is_among(setting.readers))
+    }
+
+    fn is_among(&self, readers: &[Reader]) -> bool {
+        let is_this = |reader: &Reader| {
+            reader.algorithm == self.algorithm.name() && reader.switch.is_none_or(|switch| self.is_on(switch))
+        };
+        readers.is_empty() || readers.iter().any(is_this)
+    }
+
+    fn is_on(&self, switch: &str) -> bool {
+        let origin = Origin::Set(String::new());
+        Keys::of_experiment(self, &origin).is_ok_and(|keys| keys.text(switch) == Some("true"))
     }
 }
 
@@ -32,23 +56,23 @@ fn put(experiment: &Experiment, set: &str) -> Result<Experiment, ConfigError> {
         return Err(refuse("`base` names what a file is built on: write it into an experiment file".to_owned()));
     }
     let mut keys = Keys::of_experiment(experiment, &origin)?;
-    if Keys::all().is_section(key) && text.starts_with('(') {
+    if is_section(key) && text.starts_with('(') {
         let section = Keys::of_set(key, text, &origin)?;
         section.check_names()?;
         return keys.overlaid(&section).parse(&origin);
     }
-    let Some(example) = Keys::all().text(key) else {
+    let Some(setting) = known::find(key) else {
         return Err(refuse(unknown_key(key)));
     };
     if text == "None" {
-        // Text may lack its quotes, but a key that can do without a value has none.
+        // A text may lack its quotes, but `None` takes the value of an optional key away.
         let mut without = keys.clone();
         without.put(key.to_owned(), Value { text: text.to_owned(), origin: origin.clone() });
         if let Ok(experiment) = without.parse(&origin) {
             return Ok(experiment);
         }
     }
-    let text = if example.starts_with('"') && !text.starts_with('"') {
+    let text = if setting.sample().starts_with('"') && !text.starts_with('"') {
         ron::to_string(text).map_err(|error| refuse(error.to_string()))?
     } else {
         text.to_owned()
@@ -79,6 +103,19 @@ mod tests {
 
     fn error(set: &str) -> String {
         experiment().with_set(&[set]).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn every_setting_of_the_tables_can_be_set_and_has_the_default_of_its_row() {
+        let text = r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", steps: 1000)"#;
+        let least = parse_experiment(text, Path::new("x.ron")).expect("valid");
+        for setting in known::all() {
+            let with = |value: String| least.with_set(&[format!("{}={value}", setting.path)]).expect(setting.path);
+            with(setting.sample());
+            if let Some(default) = setting.default {
+                assert_eq!(with(default()), least, "{}", setting.path);
+            }
+        }
     }
 
     #[test]
@@ -203,12 +240,60 @@ mod tests {
             ("train=hard", "`hard` is not a range of levels"),
             ("algorithm=score", "unknown algorithm `score`"),
             ("base=[]", "experiment file"),
-            // Nothing that would reach beyond the value.
+            // A text must not reach beyond the value.
             ("ppo.lr=0.1, gamma: 0.9", "is not a value"),
             ("ppo.lr=0.1), score: (kl: false", "is not a value"),
         ] {
             let text = error(set);
             assert!(text.starts_with(&format!("`{set}`: ")) && text.contains(words), "{text}");
         }
+    }
+
+    /// Returns those of the keys that an experiment reads.
+    fn read(settings: &str, keys: &[&'static str]) -> Vec<&'static str> {
+        let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", demos: "d", steps: 10, {settings})"#);
+        let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
+        keys.iter().copied().filter(|key| experiment.reads(key)).collect()
+    }
+
+    #[test]
+    fn sections_of_other_algorithms_are_not_read() {
+        let keys = ["steps", "ppo.lr", "sac", "skills.latent", "score.kl", "spirl.kl_coef", "rlpd.critics"];
+        let of = |algorithm: &str| read(&format!("algorithm: {algorithm:?}"), &keys);
+        assert_eq!(of("ppo"), ["steps", "ppo.lr"]);
+        assert_eq!(of("score-ppo"), ["steps", "ppo.lr", "skills.latent", "score.kl"]);
+        assert_eq!(of("score-sac"), ["steps", "sac", "skills.latent", "score.kl"]);
+        assert_eq!(of("spirl-ppo"), ["steps", "ppo.lr", "skills.latent", "spirl.kl_coef"]);
+        assert_eq!(of("spirl-sac"), ["steps", "sac", "skills.latent", "spirl.kl_coef"]);
+        assert_eq!(of("rlpd"), ["steps", "sac", "rlpd.critics"]);
+        assert_eq!(of("bc"), ["steps", "skills.latent"]);
+    }
+
+    #[test]
+    fn nor_is_what_an_algorithm_has_in_their_place() {
+        let keys = [
+            "sac.critics",
+            "sac.layer_norm",
+            "sac.entropy",
+            "sac.tau",
+            "ppo.ent_coef",
+            "ppo.lr",
+            "score.kl_coef",
+            "score.horizon",
+        ];
+        let of = |settings: &str| read(settings, &keys);
+        assert_eq!(of(r#"algorithm: "rlpd""#), ["sac.entropy", "sac.tau"]);
+        assert_eq!(of(r#"algorithm: "sac""#), ["sac.critics", "sac.layer_norm", "sac.entropy", "sac.tau"]);
+        assert_eq!(of(r#"algorithm: "spirl-ppo""#), ["ppo.lr", "score.horizon"]);
+        let learns = "spirl: (learn_decoder: true)";
+        assert_eq!(
+            of(&format!(r#"algorithm: "spirl-ppo", {learns}"#)),
+            ["ppo.ent_coef", "ppo.lr", "score.kl_coef", "score.horizon"]
+        );
+        assert_eq!(of(r#"algorithm: "spirl-sac""#), ["sac.critics", "sac.layer_norm", "sac.tau", "score.horizon"]);
+        let both =
+            ["sac.critics", "sac.layer_norm", "sac.tau", "ppo.ent_coef", "ppo.lr", "score.kl_coef", "score.horizon"];
+        assert_eq!(of(&format!(r#"algorithm: "spirl-sac", {learns}"#)), both);
+        assert_eq!(of(r#"algorithm: "bc""#), ["score.horizon"]);
     }
 }

@@ -1,17 +1,20 @@
-//! Checks of an experiment that single values cannot do.
+//! Checks of an experiment.
 
 use std::path::Path;
 
-use playbot_learner::brief_number;
+use playbot_learner::settings::Settings;
 
 use super::{
     Algorithm,
     config::{Experiment, LearnerKind},
-    experiment_error::{ExperimentError, refuse, settings},
+    experiment_error::{ExperimentError, out_of_range, refuse, settings},
 };
 
+/// Most steps of one rollout, over all arenas.
+const MOST_ROWS: u64 = 1 << 40;
+
 impl Experiment {
-    /// Checks what single values cannot say.
+    /// Checks the ranges of all settings and the relations between them.
     ///
     /// # Errors
     ///
@@ -20,31 +23,9 @@ impl Experiment {
         if self.train.overlaps(&self.test) {
             return Err(ExperimentError::Overlap { train: self.train.clone(), test: self.test.clone() });
         }
-        if self.arenas == 0 {
-            return refuse("arenas", 0, "must be at least 1: somebody has to play");
-        }
-        if self.worlds == 0 {
-            return refuse("worlds", 0, "must be at least 1: the arenas must be somewhere");
-        }
-        if self.steps == 0 {
-            return refuse("steps", 0, "must be at least 1");
-        }
-        if self.demo_steps == Some(0) {
-            return refuse("demo_steps", 0, "must be at least 1; `None` takes all");
-        }
-        if self.eval.episodes_per_level == 0 {
-            return refuse("eval.episodes_per_level", 0, "must be at least 1");
-        }
-        if self.checkpoints.every == 0 {
-            return refuse("checkpoints.every", 0, "must be at least 1, a number of updates");
-        }
-        if self.checkpoints.keep == 0 {
-            return refuse("checkpoints.keep", 0, "must be at least 1: the latest checkpoint stays");
-        }
-        if !(0.0..=1.0).contains(&self.study.threshold) {
-            let threshold = brief_number(self.study.threshold);
-            return refuse("study.threshold", threshold, "a success rate lies between 0 and 1");
-        }
+        let own =
+            [self.check_ranges(), self.eval.check_ranges(), self.checkpoints.check_ranges(), self.study.check_ranges()];
+        own.into_iter().collect::<Result<(), _>>().map_err(out_of_range)?;
         let of_image =
             |error| ExperimentError::Settings { key: Some("image".to_owned()), words: format!("`image`: {error}") };
         self.image.check().map_err(of_image)?;
@@ -54,7 +35,7 @@ impl Experiment {
         self.ppo_config().validate().map_err(settings)?;
         self.spirl.validate().map_err(settings)?;
         self.rlpd.validate().map_err(settings)?;
-        self.check_limits()?;
+        self.check_rollout()?;
         if self.algorithm.learns_from_demos() {
             self.recordings()?;
         }
@@ -69,7 +50,7 @@ impl Experiment {
         self.check_batches()
     }
 
-    /// The demonstrations.
+    /// Returns the path of the recordings.
     ///
     /// # Errors
     ///
@@ -78,7 +59,7 @@ impl Experiment {
         self.demos.as_deref().ok_or(ExperimentError::NoDemos)
     }
 
-    /// Found out here, since the learner only says so once its skills are learned.
+    /// Checks the normalisers here, since the learner would refuse them only after its skills are learned.
     fn check_normalisers(&self) -> Result<(), ExperimentError> {
         if self.skills.norm_obs && self.observation_config().is_image() {
             return refuse("skills.norm_obs", true, "is for vectors; the pixels of images are divided by 255 instead");
@@ -105,7 +86,7 @@ impl Experiment {
         Ok(())
     }
 
-    /// A penalty that falls is one of SCORE-PPO, and of the decoder of SPiRL that goes on learning.
+    /// Checks that only SCORE-PPO, or a decoder of SPiRL that goes on learning, has a falling penalty.
     fn check_end_of_penalty(&self) -> Result<(), ExperimentError> {
         let Some(end) = self.score.kl_coef_end else { return Ok(()) };
         let why = match self.algorithm {
@@ -127,14 +108,29 @@ impl Experiment {
             let why = format!("must divide `arenas` = {arenas}; {} does", nearest_divisor(arenas, worlds));
             return refuse("worlds", worlds, why);
         }
-        // A decoder that goes on learning does so by PPO, whatever learns the skills above it.
+        // A decoder that goes on learning does so by PPO, even if SAC learns the skills above it.
         match self.algorithm.learner() {
             LearnerKind::Sac if !(self.algorithm == Algorithm::SpirlSac && self.spirl.learn_decoder) => Ok(()),
             _ => self.check_minibatches(arenas),
         }
     }
 
-    /// PPO splits a rollout into minibatches.
+    /// Checks that a rollout comes to an end.
+    fn check_rollout(&self) -> Result<(), ExperimentError> {
+        let rows = u64::from(self.arenas).checked_mul(self.rollout_steps() as u64);
+        if rows.is_some_and(|rows| rows <= MOST_ROWS) {
+            return Ok(());
+        }
+        let key = match self.algorithm.learner() {
+            LearnerKind::Ppo => "ppo.num_steps",
+            LearnerKind::Sac => "sac.num_steps",
+        };
+        let why =
+            format!("with `arenas` = {} that is more than {MOST_ROWS} steps before anything is learned", self.arenas);
+        refuse(key, self.rollout_steps(), why)
+    }
+
+    /// Checks that PPO can split a rollout into minibatches.
     fn check_minibatches(&self, arenas: u64) -> Result<(), ExperimentError> {
         let (batch, minibatches) = (arenas * self.ppo.num_steps as u64, self.ppo.minibatches as u64);
         if !batch.is_multiple_of(minibatches) {
@@ -146,7 +142,7 @@ impl Experiment {
     }
 }
 
-/// The divisor of `n` nearest to `wanted`, the larger one of two.
+/// Returns the divisor of `n` nearest to `wanted`, the larger one of two.
 fn nearest_divisor(n: u64, wanted: u64) -> u64 {
     let distance = |divisor: &u64| (divisor.abs_diff(wanted), u64::MAX - divisor);
     let small = (1..).take_while(|d| d * d <= n).filter(|d| n.is_multiple_of(*d));
@@ -235,7 +231,7 @@ mod tests {
     fn nobody_plays_nowhere() {
         // Not with the learning rate that cannot fall over no updates.
         let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("nobody");
-        assert_eq!(text, "`arenas` is 0: must be at least 1: somebody has to play");
+        assert_eq!(text, "`arenas` is 0: must be at least 1");
         let text = check(r#"algorithm: "ppo", worlds: 0"#).expect_err("nowhere");
         assert!(text.starts_with("`worlds` is 0"), "{text}");
     }
@@ -275,5 +271,29 @@ mod tests {
         assert_eq!(nearest_divisor(64, 3), 4, "2 and 4 are equally near");
         assert_eq!(nearest_divisor(60, 0), 1);
         assert_eq!(nearest_divisor(7, 1000), 7);
+    }
+
+    #[test]
+    fn what_would_never_end_or_run_away_is_refused() {
+        let ppo = |changes: &str| format!(r#"algorithm: "ppo", {changes}"#);
+        for (changes, key) in [
+            ("ppo: (epochs: 18446744073709551615)", "ppo.epochs"),
+            ("ppo: (num_steps: 18446744073709551615)", "ppo.num_steps"),
+            ("ppo: (num_steps: 4611686018427387904, minibatches: 3)", "ppo.num_steps"),
+            ("arenas: 100000, worlds: 100000, ppo: (num_steps: 8)", "worlds"),
+            ("arenas: 100000, worlds: 100000, ppo: (num_steps: 1000000000)", "worlds"),
+            ("ppo: (ent_coef: -1)", "ppo.ent_coef"),
+            ("ppo: (adam_eps: 1e308)", "ppo.adam_eps"),
+            ("ppo: (max_grad_norm: 1e308)", "ppo.max_grad_norm"),
+            ("sac: (updates_per_step: 1e300)", "sac.updates_per_step"),
+            ("skills: (epochs: 18446744073709551615)", "skills.epochs"),
+            ("score: (kl_coef: 1e308)", "score.kl_coef"),
+        ] {
+            let text = check(&ppo(changes)).expect_err(changes);
+            assert!(text.starts_with(&format!("`{key}` ")), "{changes}: {text}");
+        }
+        let long = check(&ppo("sac: (updates_per_step: 1e300)")).expect_err("far too many");
+        assert_eq!(long, "`sac.updates_per_step` must lie in 0..10000, but is 1e300");
+        assert_eq!(check(&ppo("ppo: (max_grad_norm: 1e9, ent_coef: 0, epochs: 100)")), Ok(()));
     }
 }

@@ -1,4 +1,4 @@
-//! Whether an experiment fits its game: levels, actions and observations.
+//! Checks that an experiment fits its game: levels, actions and observations.
 
 use playbot_learner::{ActionSpace, Augmentation};
 
@@ -10,7 +10,8 @@ use super::{
 use crate::{game::Game, held_out::HeldOut, sensors::GameSensors, split::LevelSplit};
 
 impl Experiment {
-    /// Checks what goes with the game's levels, actions and observations, before hours are spent on skills.
+    /// Checks the settings that depend on the game's levels, actions and observations, before hours are spent on
+    /// skills.
     ///
     /// # Errors
     ///
@@ -20,7 +21,8 @@ impl Experiment {
         self.check_agent(game)
     }
 
-    /// Checks what goes with the game's actions and observations: all that matters where no level is played.
+    /// Checks the settings that depend on the game's actions and observations: all that matters if no level is
+    /// played.
     ///
     /// # Errors
     ///
@@ -30,8 +32,8 @@ impl Experiment {
         self.check_observation(game)
     }
 
-    /// Checks that the game has the modes, and that no held-out level is trained on, be it by another name
-    /// ([`Game::family`], [`Game::fingerprint`]).
+    /// Checks that the game has the modes, and that no held-out level is trained on, under any name
+    /// ([`LevelTools::family`](crate::game::LevelTools::family), [`Game::fingerprint`]).
     ///
     /// # Errors
     ///
@@ -66,15 +68,14 @@ impl Experiment {
         check_mode("test", &self.test, game)
     }
 
-    /// Whether the observations can be changed as `skills.augment` and `ppo.augment` say, and told of as `skills.state_weight`
-    /// does.
+    /// Checks that the observations support `skills.augment`, `ppo.augment` and `skills.state_weight`.
     fn check_observation(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         let kind = self.observation_config().obs_kind(game);
         self.check_painted_velocity()?;
         if self.algorithm.needs_skills() {
             self.skills.check_observation(kind).map_err(settings)?;
             if self.skills.tells_states() && game.observation().is_empty() {
-                let why = "the game fills no vector that could be told of its pictures; leave it out";
+                let why = "the game has no vector that its pictures could predict; leave it out";
                 return refuse("skills.state_weight", self.skills.state_weight, why);
             }
         }
@@ -84,7 +85,7 @@ impl Experiment {
         }
     }
 
-    /// Painted velocity is no part of the scene: changed with it, it would tell another velocity.
+    /// Checks that augmentation leaves painted velocity alone: a changed one would be another velocity.
     fn check_painted_velocity(&self) -> Result<(), ExperimentError> {
         let config = self.observation_config();
         let Some([rows, columns]) = config.image.painted_corner().filter(|_| config.is_image()) else { return Ok(()) };
@@ -100,7 +101,7 @@ impl Experiment {
         Ok(())
     }
 
-    /// Checks what goes with the game's actions.
+    /// Checks the settings that depend on the game's actions.
     ///
     /// # Errors
     ///

@@ -1,171 +1,116 @@
 //! Settings of PPO.
 
-use crate::error::brief_number;
 use crate::nn::{Activation, CnnKind};
 use crate::norm::{RewardNormalizer, RewardReset};
-use crate::{Augmentation, LearnError, ObsKind, TimeLimit};
-use serde::{Deserialize, Serialize};
+use crate::settings::{Range, Reader, Settings};
+use crate::{Augmentation, LearnError, ObsKind, SettingError, TimeLimit, settings};
 
-/// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
-#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-#[serde(deny_unknown_fields, default)]
-pub struct PpoConfig {
+/// The algorithms that learn by PPO.
+const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER];
+
+/// Those of them whose policy is over actions.
+const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
+
+settings! {
+    /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
+    #[derive(Clone, PartialEq, Debug)]
+    pub struct PpoConfig in "ppo", read by PPO;
+
     /// Learning rate of Adam.
-    pub lr: f64,
-    /// Whether the learning rate falls linearly to 0 over `total_updates`.
-    pub anneal_lr: bool,
-    /// Updates of the whole run; needed only by `anneal_lr` and by SCORE's `kl_coef_end`.
-    pub total_updates: Option<u64>,
+    lr: f64 = 5e-4, in Range::RATE;
+    /// True if the learning rate decreases linearly to 0 over `ppo.total_updates`.
+    anneal_lr: bool = false;
+    /// Updates of the whole run. Only `ppo.anneal_lr` and `score.kl_coef_end` need it. An experiment sets it to the
+    /// length of its run.
+    total_updates: Option<u64> = None;
     /// Steps per environment in a rollout.
-    pub num_steps: usize,
+    num_steps: usize = 256, in Range::COUNT;
     /// Parts into which a rollout is shuffled.
-    pub minibatches: usize,
+    minibatches: usize = 8, in Range::COUNT;
     /// Passes over a rollout.
-    pub epochs: usize,
+    epochs: usize = 3, in Range::PASSES;
     /// Discount γ.
-    pub gamma: f64,
+    gamma: f64 = 0.999, in Range::SHARE;
     /// λ of the generalised advantage estimate.
-    pub lambda: f64,
+    lambda: f64 = 0.95, in Range::SHARE;
     /// Bound of the probability ratio's distance from 1, and of the value's change if that is clipped.
-    pub clip: f64,
-    /// Whether the value loss is clipped too.
-    pub clip_value_loss: bool,
+    clip: f64 = 0.2, in Range::Positive(1e6);
+    /// True if the value loss is clipped too.
+    clip_value_loss: bool = true;
     /// Weight of the value loss.
-    pub vf_coef: f64,
+    vf_coef: f64 = 0.5, in Range::WEIGHT;
     /// Weight of the entropy bonus.
-    pub ent_coef: f64,
+    ent_coef: f64 = 0.01, in Range::WEIGHT, by OVER_ACTIONS;
     /// Bound of the gradient's Euclidean norm over all parameters.
-    pub max_grad_norm: f64,
-    /// Whether advantages are normalised within each minibatch.
-    pub norm_adv: bool,
-    /// What a step that ran into the time limit leads to.
-    pub time_limit: TimeLimit,
-    /// Whether rewards are divided by the running deviation of the discounted return.
-    pub norm_reward: bool,
-    /// Discount of that return; γ if not given.
-    pub reward_gamma: Option<f64>,
-    /// When the end of an episode resets that return.
-    pub reward_reset: RewardReset,
-    /// Whether actor and critic see observations through a normaliser of their own, which goes on learning. Not together
-    /// with a copied decoder, which reads raw ones or, by [`SkillConfig::norm_obs`](crate::SkillConfig::norm_obs), those of
-    /// a frozen normaliser that actor and critic then read through too; and not for images, whose pixels are divided by
-    /// 255.
-    pub norm_obs: bool,
+    max_grad_norm: f64 = 0.5, in Range::RATE;
+    /// True if advantages are normalised within each minibatch.
+    norm_adv: bool = true;
+    /// Treatment of a step that reached the time limit.
+    time_limit: TimeLimit = TimeLimit::Bootstrap;
+    /// True if rewards are divided by the running deviation of the discounted return.
+    norm_reward: bool = true;
+    /// Discount of that return; `ppo.gamma` if `None`.
+    reward_gamma: Option<f64> = None, in Range::SHARE;
+    /// The time at which the end of an episode resets that return.
+    reward_reset: RewardReset = RewardReset::AfterStep;
+    /// True if actor and critic normalise observations by running statistics of their own. It cannot be combined with
+    /// a copied decoder, whose observations are raw or, by `skills.norm_obs`, normalised by frozen statistics. Not
+    /// for images, whose pixels are divided by 255.
+    norm_obs: bool = false;
     /// Hidden layers of actor and critic. A copied decoder brings its own.
-    pub hidden: Vec<usize>,
+    hidden: Vec<usize> = vec![200, 200], in Range::COUNT;
     /// The function after each hidden layer.
-    pub activation: Activation,
-    /// The convolutions over images, which actor and critic share. A copied decoder brings its own. Not used for vectors.
-    pub cnn: CnnKind,
+    activation: Activation = Activation::Relu;
+    /// The convolutions over images, which actor and critic share. A copied decoder brings its own. Not used for
+    /// vectors.
+    cnn: CnnKind = CnnKind::default(), in Range::COUNT;
     /// ε of Adam.
-    pub adam_eps: f64,
+    adam_eps: f64 = 1e-5, in Range::Positive(1.0);
     /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.
-    pub weight_decay: f64,
-    /// Updates in which only the critic learns: a critic that knows nothing yet would drive a policy that starts as a copy of
-    /// the decoder away from it. Adam begins anew when the policy does. A weight of the penalty that falls does so from the first
-    /// update on.
-    pub critic_warmup: u64,
-    /// Changes of images that actor and critic shall not mind (Raileanu et al. 2021, "Automatic data augmentation for
-    /// generalization in reinforcement learning", DrAC); all of them at once, and none if empty.
-    pub augment: Vec<Augmentation>,
-    /// Weight of what they mind, the divergence of the actor and the squared error of the critic.
-    pub augment_coef: f64,
-    /// Whether the critic's loss trains the convolutions over images, too, or reads what they make for the policy. It never
-    /// does while the critic warms up.
-    pub critic_trains_cnn: bool,
-}
-
-impl Default for PpoConfig {
-    fn default() -> Self {
-        Self {
-            lr: 5e-4,
-            anneal_lr: false,
-            total_updates: None,
-            num_steps: 256,
-            minibatches: 8,
-            epochs: 3,
-            gamma: 0.999,
-            lambda: 0.95,
-            clip: 0.2,
-            clip_value_loss: true,
-            vf_coef: 0.5,
-            ent_coef: 0.01,
-            max_grad_norm: 0.5,
-            norm_adv: true,
-            time_limit: TimeLimit::Bootstrap,
-            norm_reward: true,
-            reward_gamma: None,
-            reward_reset: RewardReset::AfterStep,
-            norm_obs: false,
-            hidden: vec![200, 200],
-            activation: Activation::Relu,
-            cnn: CnnKind::default(),
-            adam_eps: 1e-5,
-            weight_decay: 0.0,
-            critic_warmup: 0,
-            augment: Vec::new(),
-            augment_coef: 0.1,
-            critic_trains_cnn: true,
-        }
-    }
+    weight_decay: f64 = 0.0, in Range::Weight(1e30);
+    /// Updates in which only the critic learns. An untrained critic would drive a policy that starts as a copy of the
+    /// decoder away from it. Adam begins anew when the policy begins to learn. A decreasing weight of the penalty
+    /// decreases from the first update on.
+    critic_warmup: u64 = 0;
+    /// Image augmentations to which actor and critic become insensitive (Raileanu et al. 2021, "Automatic data
+    /// augmentation for generalization in reinforcement learning", DrAC). All of them apply at once.
+    augment: Vec<Augmentation> = Vec::new(), such as "[Translate(1)]";
+    /// Weight of the augmentation loss: the divergence of the actor and the squared error of the critic under
+    /// `ppo.augment`.
+    augment_coef: f64 = 0.1, in Range::WEIGHT;
+    /// True if the critic's loss trains the convolutions over images too, instead of only reading the policy's
+    /// features. It never does while the critic warms up.
+    critic_trains_cnn: bool = true;
 }
 
 impl PpoConfig {
-    /// `Ok` if these settings can work.
+    /// Checks that these settings are possible.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names the first setting that cannot.
+    /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
-        let bad = |text: String| Err(LearnError::Config(text));
-        let counts = [
-            ("num_steps", self.num_steps),
-            ("minibatches", self.minibatches),
-            ("epochs", self.epochs),
-            ("hidden", self.hidden.iter().copied().min().unwrap_or(1)),
-            ("cnn", self.cnn.smallest()),
-        ];
-        if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
-            return bad(format!("ppo {name} must be at least 1"));
-        }
-        let positive =
-            [("lr", self.lr), ("clip", self.clip), ("max_grad_norm", self.max_grad_norm), ("adam_eps", self.adam_eps)];
-        if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
-            return bad(format!("ppo {name} must be positive, not {}", brief_number(*x)));
-        }
-        let reward_gamma = self.reward_gamma.unwrap_or(self.gamma);
-        let shares = [("gamma", self.gamma), ("lambda", self.lambda), ("reward_gamma", reward_gamma)];
-        if let Some((name, x)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
-            return bad(format!("ppo {name} must lie in 0..1, not {}", brief_number(*x)));
-        }
-        let weights = [("vf_coef", self.vf_coef), ("ent_coef", self.ent_coef)];
-        if let Some((name, x)) = weights.iter().find(|(_, x)| !x.is_finite()) {
-            return bad(format!("ppo {name} must be finite, not {x}"));
-        }
-        let at_least_0 = [("weight_decay", self.weight_decay), ("augment_coef", self.augment_coef)];
-        if let Some((name, x)) = at_least_0.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
-            return bad(format!("ppo {name} must not be negative, but is {}", brief_number(*x)));
-        }
+        self.check_ranges()?;
         if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
-            return bad("ppo anneal_lr needs total_updates".into());
+            return Err(SettingError::new("ppo.anneal_lr", "needs `ppo.total_updates`").into());
         }
         Ok(())
     }
 
-    /// `Ok` if such observations can be changed as these settings say.
+    /// Checks that the augmentations apply to such observations.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names the first change that they cannot take.
+    /// [`LearnError::Setting`] names the first augmentation that does not apply.
     pub fn check_observation(&self, observation: &ObsKind) -> Result<(), LearnError> {
-        self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo augment", observation))
+        self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo.augment", observation))
     }
 
-    /// The normaliser of rewards that these settings describe.
+    /// Returns the normaliser of rewards that these settings describe.
     pub(super) fn reward_normalizer(&self) -> RewardNormalizer {
         let gamma = self.reward_gamma.unwrap_or(self.gamma);
         RewardNormalizer { reset: self.reward_reset, ..RewardNormalizer::new(gamma) }
     }
 
-    /// The learning rate of update number `update`, from 0.
+    /// Returns the learning rate of update number `update`, from 0.
     pub fn lr_at(&self, update: u64) -> f64 {
         match self.total_updates.filter(|_| self.anneal_lr) {
             Some(total) => self.lr * (1.0 - update as f64 / total as f64).max(0.0),

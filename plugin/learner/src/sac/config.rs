@@ -2,10 +2,11 @@
 
 use crate::error::brief_number;
 use crate::nn::Activation;
-use crate::{ActionSpace, LearnError, TimeLimit};
+use crate::settings::{Range, Reader, Settings};
+use crate::{ActionSpace, LearnError, SettingError, TimeLimit, settings};
 use serde::{Deserialize, Serialize};
 
-/// How much entropy is worth: the temperature of the soft value, α in the papers.
+/// The temperature of the soft value, α in the papers: the weight of entropy.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
 #[serde(deny_unknown_fields)]
 pub enum EntropyCoef {
@@ -20,7 +21,7 @@ pub enum EntropyCoef {
         #[serde(default)]
         target_scale: Option<f64>,
     },
-    /// Always this.
+    /// This constant.
     Fixed(f64),
 }
 
@@ -28,165 +29,113 @@ fn one() -> f64 {
     1.0
 }
 
-/// Hyperparameters of SAC. The defaults follow the paper's Table 4 for its mazes and, where that says nothing, the
-/// released code; but the temperature is tuned, as there, instead of the table's constant 0.2.
-#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-#[serde(deny_unknown_fields, default)]
-pub struct SacConfig {
-    /// Learning rate of the actor's Adam.
-    pub actor_lr: f64,
-    /// Learning rate of the critics' Adam (the released code has 1e-3).
-    pub critic_lr: f64,
-    /// Learning rate of the temperature's Adam.
-    // Its name was that of the papers, where SCORE has an α of its own.
-    #[serde(alias = "alpha_lr")]
-    pub temperature_lr: f64,
-    /// Transitions in a gradient step, drawn with replacement.
-    pub batch: usize,
-    /// Transitions that are kept, the newest. Each takes 2 · (obs_dim + latent) + action width + 2 numbers of 4 bytes, and
-    /// 2 more where critics count ticks, 1 where skills are chosen.
-    pub buffer: usize,
-    /// Transitions before the first gradient step.
-    pub learning_starts: u64,
-    /// Gradient steps that only the critics take, before the actor and the temperature begin. A copied policy is not led away
-    /// by critics that know nothing yet.
-    pub critic_warmup: u64,
-    /// Whether actions are random, whatever the observation, until then: uniform (discrete) or nearly uniform in
-    /// [-1, 1] (continuous). A policy that starts as a copy of the decoder plays itself instead.
-    pub random_start: bool,
-    /// Ticks of each environment between updates, what is played in between being one rollout.
-    pub num_steps: usize,
-    /// Gradient steps per new transition. What is left of a whole step is carried over to the next update.
-    pub updates_per_step: f64,
-    /// Gradient steps of the critics for each round of actor updates; a round then has as many updates.
-    pub actor_every: u64,
-    /// Share of the critics that goes into their targets: target = tau · critic + (1 - tau) · target.
-    pub tau: f64,
-    /// Gradient steps for each such update of the targets.
-    pub target_every: u64,
-    /// How many critics there are.
-    pub critics: usize,
-    /// How many of them, drawn for each gradient step, a target is the least of. Where that is not all of them, the actor
-    /// follows the mean of all (Chen et al. 2021, "Randomized ensembled double Q-learning").
-    pub target_critics: usize,
-    /// Whether the critics' hidden layers are normalised, which keeps their values near what was seen.
-    pub layer_norm: bool,
-    /// Discount γ.
-    pub gamma: f64,
-    /// How much entropy is worth.
-    pub entropy: EntropyCoef,
-    /// Bounds of ln σ, for continuous actions.
-    pub log_std: (f64, f64),
-    /// What a step that ran into the time limit leads to.
-    pub time_limit: TimeLimit,
-    /// Whether actor and critics see observations through a normaliser of their own, which goes on learning. Not together
-    /// with a copied decoder or one with [`SkillConfig::norm_obs`](crate::SkillConfig::norm_obs), whose frozen normaliser
-    /// actor and critics read through too.
-    pub norm_obs: bool,
-    /// Whether rewards are divided by the running deviation of the discounted return.
-    pub norm_reward: bool,
-    /// Hidden layers of actor and critics. A copied decoder brings its own.
-    pub hidden: Vec<usize>,
-    /// The function after each hidden layer.
-    pub activation: Activation,
-    /// ε of Adam.
-    pub adam_eps: f64,
-}
+/// The algorithms that learn by SAC.
+const SAC: &[Reader] = &[Reader::SCORE_SAC, Reader::SAC, Reader::SPIRL_SAC, Reader::RLPD];
 
-impl Default for SacConfig {
-    fn default() -> Self {
-        Self {
-            actor_lr: 3e-4,
-            critic_lr: 3e-4,
-            temperature_lr: 3e-4,
-            batch: 256,
-            buffer: 1_000_000,
-            learning_starts: 5000,
-            critic_warmup: 0,
-            random_start: true,
-            num_steps: 16,
-            updates_per_step: 1.0,
-            actor_every: 2,
-            tau: 0.005,
-            target_every: 1,
-            critics: 2,
-            target_critics: 2,
-            layer_norm: false,
-            gamma: 0.99,
-            entropy: EntropyCoef::Auto { initial: 1.0, target_scale: None },
-            log_std: (-5.0, 2.0),
-            time_limit: TimeLimit::Bootstrap,
-            norm_obs: false,
-            norm_reward: false,
-            hidden: vec![200, 200],
-            activation: Activation::Relu,
-            adam_eps: 1e-8,
-        }
-    }
+/// Those of them that set their critics here.
+const NOT_RLPD: &[Reader] = &[Reader::SCORE_SAC, Reader::SAC, Reader::SPIRL_SAC];
+
+/// Those of them whose policy is over actions.
+const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_SAC, Reader::SAC, Reader::RLPD];
+
+settings! {
+    /// Hyperparameters of SAC. The defaults follow the paper's Table 4 for its mazes and, where that is silent, the
+    /// released code; but the temperature is tuned, as there, instead of the table's constant 0.2.
+    #[derive(Clone, PartialEq, Debug)]
+    pub struct SacConfig in "sac", read by SAC;
+
+    /// Learning rate of the actor's Adam.
+    actor_lr: f64 = 3e-4, in Range::RATE;
+    /// Learning rate of the critics' Adam (the released code has 1e-3).
+    critic_lr: f64 = 3e-4, in Range::RATE;
+    /// Learning rate of the temperature's Adam.
+    // The field's name was that of the papers, where SCORE has an α of its own.
+    temperature_lr once "alpha_lr": f64 = 3e-4, in Range::RATE;
+    /// Transitions in a gradient step, drawn with replacement.
+    batch: usize = 256, in Range::COUNT;
+    /// Capacity in transitions; the newest are kept. Each takes 2 · (obs_dim + latent) + action width + 2 numbers of
+    /// 4 bytes, and 2 more if critics count ticks, 1 if skills are the actions.
+    buffer: usize = 1_000_000, in Range::COUNT;
+    /// Transitions before the first gradient step.
+    learning_starts: u64 = 5000;
+    /// Gradient steps of the critics alone, before the actor and the temperature begin. Untrained critics would
+    /// mislead a copied policy.
+    critic_warmup: u64 = 0;
+    /// True if actions are random, whatever the observation, until `sac.learning_starts`: uniform (discrete) or
+    /// nearly uniform in [-1, 1] (continuous). A policy that starts as a copy of the decoder plays itself instead.
+    random_start: bool = true, by OVER_ACTIONS;
+    /// Ticks of each environment between updates; they make one rollout.
+    num_steps: usize = 16, in Range::COUNT;
+    /// Gradient steps per new transition. The fraction of a step is carried over to the next update.
+    updates_per_step: f64 = 1.0, in Range::Positive(1e4);
+    /// Gradient steps of the critics for each round of actor updates; a round then has as many updates.
+    actor_every: u64 = 2, in Range::COUNT;
+    /// Share of the critics that goes into their targets: target = tau · critic + (1 - tau) · target.
+    tau: f64 = 0.005, in Range::Positive(1.0);
+    /// Gradient steps for each such update of the targets.
+    target_every: u64 = 1, in Range::COUNT;
+    /// Number of critics.
+    critics: usize = 2, in Range::COUNT, by NOT_RLPD;
+    /// Number of critics, drawn for each gradient step, whose least value is the target. With fewer than
+    /// `sac.critics`, the actor follows the mean of all (Chen et al. 2021, "Randomized ensembled double Q-learning").
+    target_critics: usize = 2, in Range::COUNT, by NOT_RLPD;
+    /// True if the critics' hidden layers are normalised, which keeps their values near the observed ones.
+    layer_norm: bool = false, by NOT_RLPD;
+    /// Discount γ.
+    gamma: f64 = 0.99, in Range::SHARE;
+    /// Weight of entropy: a temperature, `Fixed` or tuned by `Auto`.
+    entropy: EntropyCoef = EntropyCoef::Auto { initial: 1.0, target_scale: None },
+        within "`initial` above 0, `Fixed` not negative, at most 1000000; `target_scale` within ±1000000", by OVER_ACTIONS;
+    /// Bounds of ln σ, for continuous actions.
+    log_std: (f64, f64) = (-5.0, 2.0), within "two ascending numbers within ±20";
+    /// Treatment of a step that reached the time limit.
+    time_limit: TimeLimit = TimeLimit::Bootstrap;
+    /// True if actor and critics normalise observations by running statistics of their own. It cannot be combined
+    /// with a copied decoder or with `skills.norm_obs`, whose frozen statistics actor and critics use too.
+    norm_obs: bool = false;
+    /// True if rewards are divided by the running deviation of the discounted return.
+    norm_reward: bool = false;
+    /// Hidden layers of actor and critics. A copied decoder brings its own.
+    hidden: Vec<usize> = vec![200, 200], in Range::COUNT;
+    /// The function after each hidden layer.
+    activation: Activation = Activation::Relu;
+    /// ε of Adam.
+    adam_eps: f64 = 1e-8, in Range::Positive(1.0);
 }
 
 impl SacConfig {
-    /// `Ok` if these settings can work.
+    /// Checks that these settings are possible.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names the first setting that cannot.
+    /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
-        let bad = |text: String| Err(LearnError::Config(text));
-        let counts = [
-            ("batch", self.batch as u64),
-            ("buffer", self.buffer as u64),
-            ("num_steps", self.num_steps as u64),
-            ("actor_every", self.actor_every),
-            ("target_every", self.target_every),
-            ("critics", self.critics as u64),
-            ("target_critics", self.target_critics as u64),
-            ("hidden", self.hidden.iter().copied().min().unwrap_or(1) as u64),
-        ];
-        if let Some((name, _)) = counts.iter().find(|(_, n)| *n == 0) {
-            return bad(format!("sac {name} must be at least 1"));
-        }
-        if self.target_critics > self.critics {
-            return bad(format!(
-                "sac target_critics must be at most critics = {}, not {}",
-                self.critics, self.target_critics
-            ));
-        }
-        let positive = [
-            ("actor_lr", self.actor_lr),
-            ("critic_lr", self.critic_lr),
-            ("temperature_lr", self.temperature_lr),
-            ("updates_per_step", self.updates_per_step),
-            ("tau", self.tau),
-            ("adam_eps", self.adam_eps),
-        ];
-        if let Some((name, x)) = positive.iter().find(|(_, x)| !(*x > 0.0 && x.is_finite())) {
-            return bad(format!("sac {name} must be positive, not {}", brief_number(*x)));
-        }
-        let shares = [("gamma", self.gamma), ("tau", self.tau)];
-        if let Some((name, x)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
-            return bad(format!("sac {name} must lie in 0..1, not {}", brief_number(*x)));
-        }
+        self.check_ranges()?;
+        check_target_critics("sac.target_critics", self.target_critics, self.critics)?;
         let (low, high) = self.log_std;
         if !(low < high && low.abs() <= 20.0 && high.abs() <= 20.0) {
             let (low, high) = (brief_number(low), brief_number(high));
-            return bad(format!("sac log_std must be two ascending numbers within ±20, not {low} and {high}"));
+            let why = format!("must be two ascending numbers within ±20, not {low} and {high}");
+            return Err(SettingError::new("sac.log_std", why).into());
         }
+        Ok(self.check_entropy()?)
+    }
+
+    fn check_entropy(&self) -> Result<(), SettingError> {
+        let within = |name: &str, range: Range, number: f64| {
+            let named = |fault: SettingError| SettingError { why: format!("{name}{}", fault.why), ..fault };
+            range.check("sac.entropy", &number).map_err(named)
+        };
         match self.entropy {
-            EntropyCoef::Auto { initial, .. } if !(initial > 0.0 && initial.is_finite()) => {
-                bad(format!("sac entropy initial must be positive, not {}", brief_number(initial)))
+            EntropyCoef::Auto { initial, target_scale } => {
+                within("initial ", Range::Positive(1e6), initial)?;
+                within("target_scale ", Range::Within(-1e6, 1e6), target_scale.unwrap_or(0.0))
             }
-            EntropyCoef::Auto { target_scale: Some(scale), .. } if !scale.is_finite() => {
-                bad(format!("sac entropy target_scale must be finite, not {scale}"))
-            }
-            EntropyCoef::Fixed(temperature) if !(temperature >= 0.0 && temperature.is_finite()) => {
-                bad(format!("sac entropy must not be negative, but is {}", brief_number(temperature)))
-            }
-            _ => Ok(()),
+            EntropyCoef::Fixed(temperature) => within("", Range::WEIGHT, temperature),
         }
     }
 
-    /// The entropy in nats that the temperature is tuned for: -scale · dim (continuous) or scale · ln K (discrete); `None` if it
-    /// is fixed.
+    /// Returns the target entropy of the temperature in nats: -scale · dim (continuous) or scale · ln K (discrete);
+    /// `None` if it is fixed.
     pub fn target_entropy(&self, space: ActionSpace) -> Option<f64> {
         let EntropyCoef::Auto { target_scale, .. } = self.entropy else { return None };
         Some(match space {
@@ -194,4 +143,12 @@ impl SacConfig {
             ActionSpace::Discrete(choices) => target_scale.unwrap_or(0.89) * (choices as f64).ln(),
         })
     }
+}
+
+/// Checks that there are as many critics as a target needs.
+pub(super) fn check_target_critics(path: &'static str, targets: usize, critics: usize) -> Result<(), SettingError> {
+    if targets <= critics {
+        return Ok(());
+    }
+    Err(SettingError::new(path, format!("must be at most critics = {critics}, not {targets}")))
 }

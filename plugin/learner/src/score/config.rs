@@ -1,11 +1,11 @@
 //! Settings of SCORE.
 
-use crate::error::brief_number;
+use crate::settings::{Range, Reader, Settings};
 use crate::skill::SkillDraw;
-use crate::{ActionSpace, LearnError};
+use crate::{ActionSpace, LearnError, SettingError, settings};
 use serde::{Deserialize, Serialize};
 
-/// Which divergence is penalised.
+/// The penalised divergence.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum KlDirection {
     /// KL(decoder ‖ policy), the paper's.
@@ -14,18 +14,18 @@ pub enum KlDirection {
     PolicyDecoder,
 }
 
-/// The weight of each row's divergence, α in the paper: how sure the decoder is of an action.
+/// The weight of each row's divergence, α in the paper: the decoder's confidence in an action.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfidenceKind {
-    /// [`Self::OwnSample`] for discrete actions, as in the paper, and [`Self::BoundedDensity`] for continuous ones, where
-    /// that would tell nothing. Where a policy of d dimensions still is the decoder the latter is 2^(-d/2) on average, so that
-    /// the penalty weighs less than with the former.
+    /// [`Self::OwnSample`] for discrete actions, as in the paper, and [`Self::BoundedDensity`] for continuous ones,
+    /// where the former carries no information. For a policy of d dimensions that still is the decoder, the latter is
+    /// 2^(-d/2) on average, so the penalty weighs less than with the former.
     Auto,
     /// Always 1.
     Off,
-    /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous. The latter
-    /// scatters around (1 + 1/d)^(-d/2) for d dimensions in every state, since a Gaussian is equally sure of its own draws
-    /// everywhere: the other kinds tell there how far an action that was taken is from what the decoder would do.
+    /// For an action drawn from the decoder: its probability, or exp(-½ mean squared z-score) if continuous. The
+    /// latter scatters around (1 + 1/d)^(-d/2) for d dimensions in every state, since a Gaussian is equally confident
+    /// of its own draws everywhere. The other kinds measure how far the action taken is from the decoder's.
     OwnSample,
     /// The same for the action of the rollout.
     PolicyAction,
@@ -37,7 +37,7 @@ pub enum ConfidenceKind {
 }
 
 impl ConfidenceKind {
-    /// What [`Self::Auto`] stands for with such actions; any other kind itself.
+    /// Returns the kind that [`Self::Auto`] stands for with such actions; any other kind unchanged.
     #[must_use]
     pub fn resolved(self, is_continuous: bool) -> Self {
         match (self, is_continuous) {
@@ -48,7 +48,7 @@ impl ConfidenceKind {
     }
 }
 
-/// How the divergences of a minibatch become one number, which times kl_coef is added to the loss.
+/// The reduction of a minibatch's divergences to one number, which times kl_coef is added to the loss.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum PenaltyForm {
     /// mean(α KL), not divided by the sum of α.
@@ -56,7 +56,8 @@ pub enum PenaltyForm {
     Mean,
     /// The released code's for mazes: -w · clamp(Σ KL(policy ‖ decoder), ±100), where w is the sum over rows and
     /// dimensions of the decoder's one-dimensional densities at the rollout's actions. The sign is as released: it
-    /// rewards the divergence. Its kl_coef is 0.001. `kl_direction` and `confidence` are not used. Continuous actions only.
+    /// rewards the divergence. Its kl_coef is 0.001. `kl_direction` and `confidence` are not used. Continuous actions
+    /// only.
     LegacyD4rl,
     /// The released code's for CoinRun: Σ p(a) clamp(KL(policy ‖ decoder), ±100), where p(a) is the decoder's
     /// probability of the rollout's action. Its kl_coef is 1e-8. `kl_direction` and `confidence` are not used. Discrete
@@ -64,7 +65,7 @@ pub enum PenaltyForm {
     LegacyCoinrun,
 }
 
-/// Where skills come from.
+/// The source of skills.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PriorKind {
     /// The skill model's prior p(z | s).
@@ -73,106 +74,86 @@ pub enum PriorKind {
     StandardNormal,
 }
 
-/// Hyperparameters of SCORE. The defaults follow the paper's text.
-#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-#[serde(deny_unknown_fields, default)]
-pub struct ScoreConfig {
-    /// Whether policy and critic read the skill z.
-    pub condition: bool,
-    /// Whether the policy starts as a copy of the decoder. Needs `condition`.
-    pub init_from_decoder: bool,
-    /// Whether leaving the decoder is penalised.
-    pub kl: bool,
-    /// Weight of the penalty. The paper gives none.
-    pub kl_coef: f64,
-    /// Where PPO takes `kl_coef` to, linearly over the whole run; it stays where it is if `None`. The decoder holds the
-    /// hesitation of its demonstrators, which a policy that has learned needs no more.
-    pub kl_coef_end: Option<f64>,
-    /// Which divergence is penalised.
-    pub kl_direction: KlDirection,
-    /// The weight of each row, α in the paper.
-    #[serde(rename = "alpha")]
-    pub confidence: ConfidenceKind,
-    /// How the rows are put together.
-    pub penalty: PenaltyForm,
-    /// Whether skills are drawn or are the prior's mean.
-    pub skill_draw: SkillDraw,
-    /// Steps for which a skill is held (the paper's T).
-    pub horizon: usize,
-    /// Where skills come from.
-    pub prior: PriorKind,
-    /// Whether critics count the ticks that are left of a skill: what (s, z) is worth depends on them. Needs `condition`.
-    /// Off by default, as in the paper: neither on levels of CoinRun that were never seen nor on AntMaze Medium were its policies
-    /// clearly better.
-    pub critic_clock: bool,
-}
+/// The algorithms whose policy over actions is tied to a decoder.
+const TIED: &[Reader] = &[Reader::SCORE_PPO, Reader::SCORE_SAC, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
 
-impl Default for ScoreConfig {
-    fn default() -> Self {
-        Self {
-            condition: true,
-            init_from_decoder: true,
-            kl: true,
-            kl_coef: 0.1,
-            kl_coef_end: None,
-            kl_direction: KlDirection::DecoderPolicy,
-            confidence: ConfidenceKind::Auto,
-            penalty: PenaltyForm::Mean,
-            skill_draw: SkillDraw::Sample,
-            horizon: 8,
-            prior: PriorKind::Learned,
-            critic_clock: false,
-        }
-    }
+/// Those that are trained with skills.
+const TRAINED: &[Reader] = &[Reader::SCORE_PPO, Reader::SCORE_SAC, Reader::SPIRL_PPO, Reader::SPIRL_SAC];
+
+settings! {
+    /// Hyperparameters of SCORE. The defaults follow the paper's text.
+    #[derive(Clone, PartialEq, Debug)]
+    pub struct ScoreConfig in "score", read by TIED;
+
+    /// True if policy and critic read the skill z.
+    condition: bool = true;
+    /// True if the policy starts as a copy of the decoder. Needs `score.condition`.
+    init_from_decoder: bool = true;
+    /// True if leaving the decoder is penalised.
+    kl: bool = true;
+    /// Weight of the penalty. The paper gives none.
+    kl_coef: f64 = 0.1, in Range::WEIGHT;
+    /// Weight of the penalty at the end of the run, which PPO approaches linearly; `None` keeps `score.kl_coef`. The
+    /// decoder holds the hesitation of its demonstrators, which a trained policy no longer needs.
+    kl_coef_end: Option<f64> = None, in Range::WEIGHT;
+    /// The penalised divergence.
+    kl_direction: KlDirection = KlDirection::DecoderPolicy;
+    /// Weight of each row of the penalty, α in the paper.
+    confidence as "alpha": ConfidenceKind = ConfidenceKind::Auto;
+    /// The reduction over rows.
+    penalty: PenaltyForm = PenaltyForm::Mean;
+    /// Draw skills at random, or use the prior's mean.
+    skill_draw: SkillDraw = SkillDraw::Sample, by Reader::WITH_SKILLS;
+    /// Ticks for which one skill is used (the paper's T).
+    horizon: usize = 8, in Range::COUNT, by Reader::WITH_SKILLS;
+    /// The source of skills.
+    prior: PriorKind = PriorKind::Learned, by TRAINED;
+    /// True if critics read the remaining ticks of a skill, on which the value of (s, z) depends. Needs
+    /// `score.condition`. Off by default, as in the paper: its policies were not clearly better on unseen levels of
+    /// CoinRun or on AntMaze Medium.
+    critic_clock: bool = false;
 }
 
 impl ScoreConfig {
-    /// `Ok` if these settings can work.
+    /// Checks that these settings are possible.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names the first setting that cannot.
+    /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
-        let bad = |text: String| Err(LearnError::Config(text));
-        if self.init_from_decoder && !self.condition {
-            return bad("score init_from_decoder needs condition: the decoder reads the skill".into());
+        let needs_condition = [
+            ("score.init_from_decoder", self.init_from_decoder, "the decoder reads the skill"),
+            ("score.critic_clock", self.critic_clock, "a critic that reads no skill has no use for its ticks"),
+        ];
+        if let Some(&(path, _, why)) = needs_condition.iter().find(|(_, on, _)| *on && !self.condition) {
+            return Err(SettingError::new(path, format!("needs `score.condition`: {why}")).into());
         }
-        if self.critic_clock && !self.condition {
-            return bad("score critic_clock needs condition: who reads no skill has no use for its ticks".into());
-        }
-        if self.horizon == 0 {
-            return bad("score horizon must be at least 1".into());
-        }
-        let coefs = [("kl_coef", self.kl_coef), ("kl_coef_end", self.kl_coef_end.unwrap_or(0.0))];
-        if let Some((name, x)) = coefs.iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
-            return bad(format!("score {name} must not be negative, but is {}", brief_number(*x)));
-        }
-        Ok(())
+        Ok(self.check_ranges()?)
     }
 
-    /// `Ok` if the penalty can be computed for actions of `space`.
+    /// Checks that the penalty can be computed for actions of `space`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if it is a legacy form for the other kind of actions.
+    /// [`LearnError::Setting`] if it is a legacy form for the other kind of actions.
     pub fn check_space(&self, space: ActionSpace) -> Result<(), LearnError> {
         match (self.penalty, space) {
             (PenaltyForm::LegacyD4rl, ActionSpace::Discrete(_)) => {
-                Err(LearnError::Config("score penalty LegacyD4rl is for continuous actions only".to_owned()))
+                Err(SettingError::new("score.penalty", "LegacyD4rl is for continuous actions only").into())
             }
             (PenaltyForm::LegacyCoinrun, ActionSpace::Continuous(_)) => {
-                Err(LearnError::Config("score penalty LegacyCoinrun is for discrete actions only".to_owned()))
+                Err(SettingError::new("score.penalty", "LegacyCoinrun is for discrete actions only").into())
             }
             _ => Ok(()),
         }
     }
 
-    /// The settings of update number `update`, from 0, of `total`: with the weight that the penalty has come to.
+    /// Returns the settings of update number `update`, from 0, of `total`, with the present weight of the penalty.
     pub(crate) fn at(&self, update: u64, total: Option<u64>) -> Self {
         let share = total.map_or(0.0, |total| (update as f64 / total.max(1) as f64).min(1.0));
         let end = self.kl_coef_end.unwrap_or(self.kl_coef);
         Self { kl_coef: self.kl_coef + share * (end - self.kl_coef), ..self.clone() }
     }
 
-    /// The divergence that the penalty measures.
+    /// Returns the divergence that the penalty measures.
     pub fn direction(&self) -> KlDirection {
         match self.penalty {
             PenaltyForm::Mean => self.kl_direction,

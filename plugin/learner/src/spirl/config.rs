@@ -1,50 +1,35 @@
 //! Settings of SPiRL.
 
-use crate::LearnError;
-use crate::error::brief_number;
-use serde::{Deserialize, Serialize};
+use crate::settings::{Range, Reader, Settings};
+use crate::{LearnError, settings};
 
-/// Hyperparameters of SPiRL beside those of the learner of skills, PPO or SAC, and the ticks for which a skill is held
-/// ([`ScoreConfig::horizon`](crate::ScoreConfig::horizon)).
-#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-#[serde(deny_unknown_fields, default)]
-pub struct SpirlConfig {
-    /// How much leaving the prior costs, per nat of KL(π(z | s) ‖ p(z | s)); at the start if it is tuned.
-    pub kl_coef: f64,
-    /// The divergence in nats per skill that `kl_coef` is tuned for; `None` leaves it as it is.
-    pub target_kl: Option<f64>,
-    /// Whether the decoder goes on learning below the skills, by SCORE-PPO with the settings of `ppo` and `score`; else it is
-    /// frozen.
-    pub learn_decoder: bool,
-}
+settings! {
+    /// Hyperparameters of SPiRL beside those of the learner of skills, PPO or SAC, and the skill interval
+    /// ([`ScoreConfig::horizon`](crate::ScoreConfig::horizon)).
+    #[derive(Clone, PartialEq, Debug)]
+    pub struct SpirlConfig in "spirl", read by &[Reader::SPIRL_PPO, Reader::SPIRL_SAC];
 
-impl Default for SpirlConfig {
-    fn default() -> Self {
-        Self { kl_coef: 0.1, target_kl: Some(1.0), learn_decoder: false }
-    }
+    /// Cost of leaving the prior, per nat of KL(π(z | s) ‖ p(z | s)); at the start if it is tuned.
+    kl_coef: f64 = 0.1, in Range::Positive(1e6);
+    /// Divergence in nats per skill that `spirl.kl_coef` is tuned for; `None` keeps it constant.
+    target_kl: Option<f64> = Some(1.0), in Range::Positive(1e6);
+    /// True if the decoder continues to learn below the skills, by SCORE-PPO with the settings of `ppo` and `score`.
+    /// It is frozen otherwise.
+    learn_decoder: bool = false;
 }
 
 impl SpirlConfig {
-    /// `Ok` if these settings can work.
+    /// Checks that these settings are possible.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names the first setting that cannot.
+    /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
-        let bad = |text: String| Err(LearnError::Config(text));
-        if !(self.kl_coef > 0.0 && self.kl_coef.is_finite()) {
-            return bad(format!("spirl kl_coef must be positive, not {}", brief_number(self.kl_coef)));
-        }
-        match self.target_kl {
-            Some(target) if !(target > 0.0 && target.is_finite()) => {
-                let target = brief_number(target);
-                bad(format!("spirl target_kl must be positive, not {target}; `None` leaves kl_coef as it is"))
-            }
-            _ => Ok(()),
-        }
+        Ok(self.check_ranges()?)
     }
 
-    /// The weight after an update whose policy was `kl` nats from the prior: twice or half of it where that is far from the
-    /// target (the adaptive penalty of Schulman et al. 2017, "Proximal policy optimization algorithms"), within bounds.
+    /// Returns the weight after an update whose policy was `kl` nats from the prior. It is doubled or halved if that
+    /// is far from the target (the adaptive penalty of Schulman et al. 2017, "Proximal policy optimization
+    /// algorithms"), within bounds.
     pub(super) fn tuned(&self, kl_coef: f64, kl: f64) -> f64 {
         const FAR: f64 = 1.5;
         const BOUNDS: (f64, f64) = (1e-6, 1e3);

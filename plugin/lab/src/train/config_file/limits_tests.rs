@@ -1,4 +1,4 @@
-//! Files that were made to take forever.
+//! Files made to take forever.
 
 use std::{
     fs,
@@ -14,7 +14,7 @@ fn write(folder: &Path, name: &str, text: &str) {
     fs::write(folder.join(name), text).expect("writable");
 }
 
-/// Why a file is no experiment, which is said soon.
+/// Returns the error of an invalid experiment file, which must come soon.
 fn refused(path: &Path) -> String {
     let begun = Instant::now();
     let error = read_experiment(path).expect_err("must be refused").to_string();
@@ -51,7 +51,7 @@ fn a_file_that_is_too_long_is_refused_with_its_name_and_the_limit() {
     write(folder.path(), "top.ron", &GOOD.replace("game:", "base: [\"long.ron\"],\n game:"));
     for name in ["long.ron", "top.ron"] {
         let error = refused(&folder.path().join(name));
-        assert!(error.contains("long.ron") && error.contains("may have more than 1048576"), "{error}");
+        assert!(error.contains("long.ron") && error.contains("has at most 1048576"), "{error}");
     }
     write(folder.path(), "long.ron", &long((1 << 20) - GOOD.len() - 10));
     assert_eq!(read_experiment(&folder.path().join("top.ron")).expect("not too long").steps, 1000);
@@ -64,7 +64,7 @@ fn a_hundred_thousand_keys_are_refused_as_soon_as_they_are_counted() {
     write(folder.path(), "keys.ron", &format!("({keys})"));
     let error = refused(&folder.path().join("keys.ron"));
     assert!(error.contains("keys.ron:1:1: 100000 keys in one place"), "{error}");
-    // Where a file is long, the places of its keys are counted in long texts.
+    // In a long file, positions of keys are counted in long texts.
     let steps = format!("steps: {}1000", "\n".repeat(900_000));
     let values = good_with_every_key().replace("steps: 1000", &steps);
     write(folder.path(), "lines.ron", &values);
@@ -73,7 +73,7 @@ fn a_hundred_thousand_keys_are_refused_as_soon_as_they_are_counted() {
     assert!(begun.elapsed() < Duration::from_secs(1), "it took {:?}", begun.elapsed());
 }
 
-/// An experiment with all keys, all of which come after `steps`.
+/// Returns an experiment with all keys, all of which come after `steps`.
 fn good_with_every_key() -> String {
     let text = parse_experiment(GOOD, Path::new("x.ron")).expect("sound").to_ron().expect("RON");
     let rest = text.replacen("steps: 1000,", "", 1);
@@ -93,7 +93,7 @@ fn what_is_no_regular_file_is_refused_and_not_waited_for() {
         write(folder.path(), "top.ron", &GOOD.replace("game:", &format!("base: [\"{name}\"],\n game:")));
         for file in [name, "top.ron"] {
             let error = refused(&folder.path().join(file));
-            assert!(error.contains(name) && error.contains("it is no regular file"), "{error}");
+            assert!(error.contains(name) && error.contains("not a regular file"), "{error}");
         }
     }
 }

@@ -129,7 +129,7 @@ fn presets_lie_below_one_another_and_below_the_file() {
     assert_eq!((experiment.arenas, experiment.ppo.num_steps), (1, 2048), "the later preset's");
     assert_eq!(experiment.ppo.ent_coef, 0.0, "the later preset's");
     assert_eq!(experiment.eval.episodes_per_level, 1, "the default");
-    // The file gives the default of a value that a preset changes: it is the file's all the same.
+    // The file gives the default of a value that a preset changes: the file's value still applies.
     let experiment = good(&text.replace("gamma: 0.99", "lr: 0.0005"));
     assert_eq!((experiment.ppo.lr, experiment.ppo.gamma), (0.0005, 0.99));
 }
@@ -176,7 +176,7 @@ fn files_can_be_built_on_files_and_errors_name_the_right_one() {
     let experiment = read("top.ron").expect("valid");
     assert_eq!((experiment.ppo.lr, experiment.ppo.gamma, experiment.steps), (0.1, 0.5, 1000));
 
-    // A wrong value is found in the file that has it, even where another one hides it.
+    // A wrong value is reported in its own file, even if another file overrides it.
     write("middle.ron", "(base: [\"good.ron\"],\n ppo: (gamma: \"high\"))");
     let text = read("top.ron").expect_err("wrong").to_string();
     assert!(text.contains("middle.ron:2:") && text.contains("`ppo.gamma` must be a number"), "{text}");
