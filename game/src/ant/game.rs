@@ -1,11 +1,14 @@
-//! The open floor for the trainer, the evaluation and the replay.
+//! The open floor as a game for training, evaluation and replay.
 
 use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{Picture, VisionSystems};
-use playbot_lab::floor_plan::FloorPlan;
 use playbot_lab::prelude::*;
+use playbot_lab::{
+    floor_plan::FloorPlan,
+    game::{InputTools, LevelTools, PictureTools, StateTools},
+};
 
 use super::{
     picture::AntPicturePlugin,
@@ -19,7 +22,7 @@ use crate::ant::view::VIEW;
 /// Control steps per second.
 pub const ANT_HZ: f64 = 10.0;
 
-/// Names of an action's numbers, in order.
+/// Returns the names of an action's numbers, in order.
 pub fn action_names() -> Vec<String> {
     let joints = joint_names();
     ACTUATED.iter().map(|&joint| joints[joint].clone()).collect()
@@ -52,14 +55,6 @@ impl Game for Ant {
         ActionSpace::Continuous(JOINTS)
     }
 
-    fn action_names(&self) -> Vec<String> {
-        action_names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        Some(key_bindings())
-    }
-
     fn observation(&self) -> ObservationSpace {
         (**SPACE).clone()
     }
@@ -68,25 +63,35 @@ impl Game for Ant {
         app.add_plugins(AntPlugin { task: Task::named(mode).expect("callers check the mode against `modes`") });
     }
 
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let agent = Agent::new(index, self.actions());
+        world.spawn((agent, VectorSensor::from_space(SPACE.clone()), Walker::default())).id()
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { levels: self, state: self, pictures: self, input: self, ..GameTools::default() }
+    }
+}
+
+impl LevelTools for Ant {
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Task::named(mode)?.floor_plan(level)
+    }
+}
+
+impl StateTools for Ant {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<Walker>(agent).map(Walker::place)
+    }
+}
+
+impl PictureTools for Ant {
     fn picture(&self) -> Option<Picture> {
         Some(Picture { width: VIEW, least_height: 0.0 })
     }
 
     fn build_picture(&self, app: &mut App) {
         app.add_plugins(AntPicturePlugin);
-    }
-
-    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        Task::named(mode)?.floor_plan(level)
-    }
-
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<Walker>(agent).map(Walker::place)
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        let agent = Agent::new(index, self.actions());
-        world.spawn((agent, VectorSensor::from_space(SPACE.clone()), Walker::default())).id()
     }
 
     fn has_space_view(&self) -> bool {
@@ -99,6 +104,16 @@ impl Game for Ant {
     }
 }
 
+impl InputTools for Ant {
+    fn action_names(&self) -> Vec<String> {
+        action_names()
+    }
+
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        Some(key_bindings())
+    }
+}
+
 /// The tick of the ant, in `FixedUpdate`. Add what your game adds before or after it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AntSystems;
@@ -106,7 +121,7 @@ pub struct AntSystems;
 /// Adds ants on an open floor.
 #[derive(Clone, Copy, Debug)]
 pub struct AntPlugin {
-    /// What is asked of them.
+    /// The task of the ants.
     pub task: Task,
 }
 

@@ -1,4 +1,4 @@
-//! AntMaze for the trainer, the evaluation and the replay.
+//! AntMaze as a game for training, evaluation and replay.
 
 use std::sync::{Arc, LazyLock};
 
@@ -11,7 +11,7 @@ use playbot_lab::{
     detectors::{FarGoal, GoalIgnored, ThroughWall},
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
-    game::{level_designs, read_level_designs},
+    game::{BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, StateTools, TestTools, TrainTools},
     inspect::{InspectError, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
@@ -78,26 +78,6 @@ impl Game for AntMaze {
         &Map::NAMES
     }
 
-    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
-        if is_level_files(mode) {
-            read_level_designs(self, mode)?;
-            return Ok(());
-        }
-        read_mode::<AntMazeMode>(mode).map(drop)
-    }
-
-    fn family(&self, mode: &str) -> String {
-        let Ok(mode) = mode.parse::<AntMazeMode>() else { return mode.to_owned() };
-        mode.map.family().unwrap_or_else(|| mode.to_string())
-    }
-
-    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
-        if is_level_files(mode) {
-            return level_designs(self, mode).ok()?.hash(level);
-        }
-        mode.parse::<AntMazeMode>().ok()?.map.fingerprint(level)
-    }
-
     fn tick_hz(&self) -> f64 {
         ANT_HZ
     }
@@ -106,49 +86,57 @@ impl Game for AntMaze {
         ActionSpace::Continuous(JOINTS)
     }
 
-    fn action_names(&self) -> Vec<String> {
-        action_names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        Some(key_bindings())
-    }
-
     fn observation(&self) -> ObservationSpace {
         (**SPACE).clone()
     }
 
     fn build(&self, app: &mut App, mode: &str) {
-        // Drawn levels bring their rules.
+        // Levels from files bring their rules.
         let is_drawn = is_level_files(mode);
         let mode = if is_drawn { Ok(AntMazeMode::on(Map::Random(MazeSpec::default()))) } else { mode.parse() };
         let mode = mode.expect("callers check the mode with `check_mode`");
         app.add_plugins(AntMazePlugin { mode });
     }
 
-    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
-        level_text::parse(text)
-    }
-
-    fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: VIEW, least_height: 0.0 })
-    }
-
-    fn build_picture(&self, app: &mut App) {
-        app.add_plugins(AntMazePicturePlugin);
-    }
-
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         spawn_agent(world, index)
     }
 
-    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        Some(level_of(self, mode, level).ok()?.floor_plan())
+    fn tools(&self) -> GameTools<'_> {
+        GameTools {
+            levels: self,
+            state: self,
+            pictures: self,
+            input: self,
+            bots: self,
+            tests: self,
+            training: self,
+            benchmarks: self,
+            ..GameTools::default()
+        }
+    }
+}
+
+impl LevelTools for AntMaze {
+    fn check_options(&self, mode: &str) -> Option<Result<(), ModeError>> {
+        Some(read_mode::<AntMazeMode>(mode).map(drop))
     }
 
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        let [x, y, ..] = world.get::<MazeAnt>(agent)?.0.state().qpos;
-        Some(Vec2::new(x, y))
+    fn family(&self, mode: &str) -> String {
+        let Ok(mode) = mode.parse::<AntMazeMode>() else { return mode.to_owned() };
+        mode.map.family().unwrap_or_else(|| mode.to_string())
+    }
+
+    fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
+        mode.parse::<AntMazeMode>().ok()?.map.fingerprint(level)
+    }
+
+    fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
+        Some(level_text::parse(text))
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Some(level_of(self, mode, level).ok()?.floor_plan())
     }
 
     fn prove(&self, mode: &str, level: u64) -> LevelProof {
@@ -156,41 +144,28 @@ impl Game for AntMaze {
         level.map_or(LevelProof::Unknown, |level| prove(&level.maze, level.start, level.goal))
     }
 
-    fn detectors(&self) -> Vec<Box<dyn Detector>> {
-        // Tiles: the goal reaches half a metre, and walls are as thick as a tile.
-        let (ignored, far) = (GoalIgnored::within(0.11), FarGoal::beyond(0.2));
-        let walls = ThroughWall::deeper_than(0.3);
-        vec![Box::new(ignored), Box::new(far), Box::new(walls), Box::<AgainstRules>::default()]
-    }
-
-    fn defects(&self) -> Vec<DefectKind> {
-        defects::defects()
-    }
-
-    fn demonstrator(&self) -> Option<&'static str> {
-        Some("waypoints")
-    }
-
-    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
-        world.entity_mut(agent).insert(DemonstratorBot::new(noise));
-    }
-
-    fn experiment(&self) -> Option<ExperimentText> {
-        let text = include_str!("../../assets/experiments/antmaze.ron");
-        Some(ExperimentText { origin: "assets/experiments/antmaze.ron".into(), text: text.into() })
-    }
-
-    fn benchmarks(&self) -> Vec<Benchmark> {
-        let vector = Benchmark::simulate("vector", "medium");
-        let training = Benchmark::train("vector", "medium");
-        vec![vector, training, Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster)]
-    }
-
-    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+    fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
         let axes =
             "x goes along the columns and y down the rows; plots and windows have y up, so that row 0 is at the bottom";
         let source = MazeSource { map: Map::antmaze, level: shown_level, drawn: shown_drawn, axes };
-        show_level::show(self, request, &source)
+        Some(show_level::show(self, request, &source))
+    }
+}
+
+impl StateTools for AntMaze {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        let [x, y, ..] = world.get::<MazeAnt>(agent)?.0.state().qpos;
+        Some(Vec2::new(x, y))
+    }
+}
+
+impl PictureTools for AntMaze {
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW, least_height: 0.0 })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(AntMazePicturePlugin);
     }
 
     fn has_space_view(&self) -> bool {
@@ -203,14 +178,62 @@ impl Game for AntMaze {
     }
 }
 
-/// A level of a mode, as it is played.
+impl InputTools for AntMaze {
+    fn action_names(&self) -> Vec<String> {
+        action_names()
+    }
+
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        Some(key_bindings())
+    }
+}
+
+impl BotTools for AntMaze {
+    fn demonstrator(&self) -> Option<&'static str> {
+        Some("waypoints")
+    }
+
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        world.entity_mut(agent).insert(DemonstratorBot::new(noise));
+    }
+}
+
+impl TestTools for AntMaze {
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        // In tiles: the goal's radius is half a metre, and walls are as thick as a tile.
+        let (ignored, far) = (GoalIgnored::within(0.11), FarGoal::beyond(0.2));
+        let walls = ThroughWall::deeper_than(0.3);
+        vec![Box::new(ignored), Box::new(far), Box::new(walls), Box::<AgainstRules>::default()]
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        defects::defects()
+    }
+}
+
+impl TrainTools for AntMaze {
+    fn experiment(&self) -> Option<ExperimentText> {
+        let file = playbot_assets::experiments::ANTMAZE;
+        Some(ExperimentText { origin: file.path.into(), text: file.text.into() })
+    }
+}
+
+impl BenchmarkTools for AntMaze {
+    fn benchmarks(&self) -> Option<Vec<Benchmark>> {
+        let vector = Benchmark::simulate("vector", "medium");
+        let training = Benchmark::train("vector", "medium");
+        Some(vec![vector, training, Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster)])
+    }
+}
+
+/// Returns a level of a mode, with its metadata.
 fn shown_level(game: &dyn Game, mode: &str, seed: u64) -> Result<ShownMaze, InspectError> {
     game.check_mode(mode)?;
     let level = level_of(game, mode, seed).map_err(InspectError::Usage)?;
     shown(&level)
 }
 
-/// The level of a file.
+/// Returns the level of a file, with its metadata.
 fn shown_drawn(designs: &LevelDesigns) -> Result<ShownMaze, InspectError> {
     let level = designs.get::<AntMazeLevel>(0).map_err(InspectError::Usage)?;
     shown(&level)

@@ -1,4 +1,4 @@
-//! CoinRun for the trainer, the evaluation and the replay.
+//! CoinRun as a game for training, evaluation and replay.
 
 use std::sync::{Arc, LazyLock};
 
@@ -11,6 +11,9 @@ use playbot_lab::{
     detector::Detector,
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
+    game::{
+        BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, StateTools, TestTools, TraceTools, TrainTools,
+    },
     inspect::{InspectError, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelTextError, is_level_files},
     proof::LevelProof,
@@ -34,14 +37,14 @@ use super::{
 /// CoinRun under its name `coinrun`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CoinRun {
-    /// Whether its Worlds carry rapier colliders. Training does without: nothing there asks for them.
+    /// Adds rapier colliders to its Worlds. Training needs none.
     pub physics: bool,
 }
 
-/// The action "right and jump", which a player without eyes does best to hold.
+/// The action "right and jump", the best constant action.
 const RIGHT_JUMP: u32 = 8;
 
-/// The action with these directions, each -1, 0 or 1.
+/// Returns the action with these directions, each -1, 0 or 1.
 fn directed(sideways: i8, upwards: i8) -> u32 {
     (3 * (sideways + 1) + (upwards + 1)).unsigned_abs().into()
 }
@@ -75,10 +78,6 @@ impl Game for CoinRun {
         &["easy", "hard"]
     }
 
-    fn last_level(&self) -> Option<u64> {
-        Some(u32::MAX.into())
-    }
-
     fn tick_hz(&self) -> f64 {
         15.0
     }
@@ -87,6 +86,96 @@ impl Game for CoinRun {
         ActionSpace::Discrete(usize::from(ACTIONS))
     }
 
+    fn observation(&self) -> ObservationSpace {
+        (**SPACE).clone()
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        // Levels from files have no difficulty.
+        let is_drawn = is_level_files(mode);
+        let mode = if is_drawn { Ok(Mode::Hard) } else { mode.parse() };
+        let mode = mode.expect("callers check the mode with `check_mode`");
+        app.add_plugins(CoinRunPlugin { mode, physics: self.physics });
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        spawn_agent(world, index)
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools {
+            levels: self,
+            state: self,
+            trace: self,
+            pictures: self,
+            input: self,
+            bots: self,
+            tests: self,
+            training: self,
+            benchmarks: self,
+            ..GameTools::default()
+        }
+    }
+}
+
+impl LevelTools for CoinRun {
+    fn last_level(&self) -> Option<u64> {
+        Some(u32::MAX.into())
+    }
+
+    fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
+        Some(level_text::parse(text))
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Some(level_of(self, mode, level).ok()?.floor_plan())
+    }
+
+    fn prove(&self, mode: &str, level: u64) -> LevelProof {
+        level_of(self, mode, level).map_or(LevelProof::Unknown, prove)
+    }
+
+    fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
+        Some(show_level::show(self, request))
+    }
+}
+
+impl StateTools for CoinRun {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<PlayerBody>(agent).map(|body| Vec2::new(body.0.x, body.0.y))
+    }
+
+    fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {
+        world.get::<LastOutcome>(agent)?.0?.cause()
+    }
+
+    fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
+        prove_from(world, agent)
+    }
+}
+
+impl TraceTools for CoinRun {
+    fn columns(&self) -> Option<Vec<String>> {
+        Some(["x", "y", "vx", "vy"].map(str::to_owned).to_vec())
+    }
+
+    fn row(&self, world: &World, agent: Entity) -> Vec<f32> {
+        let body = world.get::<PlayerBody>(agent).map(|body| body.0).unwrap_or_default();
+        vec![body.x, body.y, body.vx, body.vy]
+    }
+}
+
+impl PictureTools for CoinRun {
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW, least_height: 0.0 })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(CoinRunPicturePlugin);
+    }
+}
+
+impl InputTools for CoinRun {
     fn action_names(&self) -> Vec<String> {
         let names = ["left+down", "left", "left+jump", "down", "none", "jump", "right+down", "right", "right+jump"];
         let unused = ["D", "A", "W", "S", "Q", "E"].map(|key| format!("none ({key})"));
@@ -100,63 +189,9 @@ impl Game for CoinRun {
         let help = "arrow keys or A, D and S run and drop, Up, W or Space jumps";
         Some(KeyBindings::new([sideways, upwards], |at| ActionValue::Discrete(directed(at[0], at[1])), help))
     }
+}
 
-    fn observation(&self) -> ObservationSpace {
-        (**SPACE).clone()
-    }
-
-    fn build(&self, app: &mut App, mode: &str) {
-        // What is drawn has no difficulty.
-        let is_drawn = is_level_files(mode);
-        let mode = if is_drawn { Ok(Mode::Hard) } else { mode.parse() };
-        let mode = mode.expect("callers check the mode with `check_mode`");
-        app.add_plugins(CoinRunPlugin { mode, physics: self.physics });
-    }
-
-    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
-        level_text::parse(text)
-    }
-
-    fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: VIEW, least_height: 0.0 })
-    }
-
-    fn build_picture(&self, app: &mut App) {
-        app.add_plugins(CoinRunPicturePlugin);
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        spawn_agent(world, index)
-    }
-
-    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        Some(level_of(self, mode, level).ok()?.floor_plan())
-    }
-
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<PlayerBody>(agent).map(|body| Vec2::new(body.0.x, body.0.y))
-    }
-
-    fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {
-        world.get::<LastOutcome>(agent)?.0?.cause()
-    }
-
-    fn prove(&self, mode: &str, level: u64) -> LevelProof {
-        level_of(self, mode, level).map_or(LevelProof::Unknown, prove)
-    }
-
-    fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
-        prove_from(world, agent)
-    }
-
-    fn detectors(&self) -> Vec<Box<dyn Detector>> {
-        detectors::detectors()
-    }
-
-    fn defects(&self) -> Vec<DefectKind> {
-        defects::defects()
-    }
-
+impl BotTools for CoinRun {
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
         vec![("right-jump", BlindBot::Constant(ActionValue::Discrete(RIGHT_JUMP))), ("random", BlindBot::Uniform)]
     }
@@ -168,13 +203,27 @@ impl Game for CoinRun {
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
+}
 
-    fn experiment(&self) -> Option<ExperimentText> {
-        let text = include_str!("../../assets/experiments/coinrun.ron");
-        Some(ExperimentText { origin: "assets/experiments/coinrun.ron".into(), text: text.into() })
+impl TestTools for CoinRun {
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        detectors::detectors()
     }
 
-    fn benchmarks(&self) -> Vec<Benchmark> {
+    fn defects(&self) -> Vec<DefectKind> {
+        defects::defects()
+    }
+}
+
+impl TrainTools for CoinRun {
+    fn experiment(&self) -> Option<ExperimentText> {
+        let file = playbot_assets::experiments::COINRUN;
+        Some(ExperimentText { origin: file.path.into(), text: file.text.into() })
+    }
+}
+
+impl BenchmarkTools for CoinRun {
+    fn benchmarks(&self) -> Option<Vec<Benchmark>> {
         let mut all = vec![
             Benchmark::simulate("vector", "hard"),
             Benchmark::simulate("physics", "hard"),
@@ -185,23 +234,10 @@ impl Game for CoinRun {
         if cfg!(feature = "camera") {
             all.push(Benchmark::simulate("camera", "hard").seeing(ObservationKind::Camera));
         }
-        all
+        Some(all)
     }
 
     fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
         (benchmark.case == "physics").then_some(&CoinRun { physics: true })
-    }
-
-    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        show_level::show(self, request)
-    }
-
-    fn trace_columns(&self) -> Vec<String> {
-        ["x", "y", "vx", "vy"].map(str::to_owned).to_vec()
-    }
-
-    fn trace_row(&self, world: &World, agent: Entity) -> Vec<f32> {
-        let body = world.get::<PlayerBody>(agent).map(|body| body.0).unwrap_or_default();
-        vec![body.x, body.y, body.vx, body.vy]
     }
 }

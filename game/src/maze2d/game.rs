@@ -1,4 +1,4 @@
-//! Maze2D for the trainer, the evaluation and the replay.
+//! Maze2D as a game for training, evaluation and replay.
 
 use std::sync::{Arc, LazyLock};
 
@@ -12,7 +12,9 @@ use playbot_lab::{
     detectors::{FarGoal, GoalIgnored, ThroughWall},
     experiment_text::ExperimentText,
     floor_plan::FloorPlan,
-    game::{level_designs, read_level_designs},
+    game::{
+        BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, StateTools, TestTools, TraceTools, TrainTools,
+    },
     inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
     mode::ModeError,
@@ -47,8 +49,7 @@ use crate::{
 /// Maze2D under its name `maze2d`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Maze2d {
-    /// Whether arenas have a rapier context even where the contact does not need it. Training does without: nothing there
-    /// asks for them.
+    /// Adds a rapier context to arenas even where the contact does not need it. Training needs none.
     pub physics: bool,
 }
 
@@ -84,26 +85,6 @@ impl Game for Maze2d {
         &Maze2dMode::NAMES
     }
 
-    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
-        if is_level_files(mode) {
-            read_level_designs(self, mode)?;
-            return Ok(());
-        }
-        read_mode::<Maze2dMode>(mode).map(drop)
-    }
-
-    fn family(&self, mode: &str) -> String {
-        let Ok(mode) = mode.parse::<Maze2dMode>() else { return mode.to_owned() };
-        mode.map.family().unwrap_or_else(|| mode.to_string())
-    }
-
-    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
-        if is_level_files(mode) {
-            return level_designs(self, mode).ok()?.hash(level);
-        }
-        mode.parse::<Maze2dMode>().ok()?.map.fingerprint(level)
-    }
-
     fn tick_hz(&self) -> f64 {
         100.0
     }
@@ -112,6 +93,95 @@ impl Game for Maze2d {
         ActionSpace::Continuous(AXES)
     }
 
+    fn observation(&self) -> ObservationSpace {
+        (**SPACE).clone()
+    }
+
+    fn build(&self, app: &mut App, mode: &str) {
+        // Levels from files bring their rules.
+        let is_drawn = is_level_files(mode);
+        let mode = if is_drawn { Ok(Maze2dMode::new(Map::Random(MazeSpec::default()))) } else { mode.parse() };
+        let mode = mode.expect("callers check the mode with `check_mode`");
+        app.add_plugins(Maze2dPlugin { mode, physics: self.physics });
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        spawn_agent(world, index)
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools {
+            levels: self,
+            state: self,
+            trace: self,
+            pictures: self,
+            input: self,
+            bots: self,
+            tests: self,
+            training: self,
+            benchmarks: self,
+            ..GameTools::default()
+        }
+    }
+}
+
+impl LevelTools for Maze2d {
+    fn check_options(&self, mode: &str) -> Option<Result<(), ModeError>> {
+        Some(read_mode::<Maze2dMode>(mode).map(drop))
+    }
+
+    fn family(&self, mode: &str) -> String {
+        let Ok(mode) = mode.parse::<Maze2dMode>() else { return mode.to_owned() };
+        mode.map.family().unwrap_or_else(|| mode.to_string())
+    }
+
+    fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
+        mode.parse::<Maze2dMode>().ok()?.map.fingerprint(level)
+    }
+
+    fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
+        Some(level_text::parse(text))
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        Some(level_of(self, mode, level).ok()?.0.floor_plan())
+    }
+
+    fn prove(&self, mode: &str, level: u64) -> LevelProof {
+        let level = level_of(self, mode, level);
+        level.map_or(LevelProof::Unknown, |(level, _)| prove(&level.maze, level.start_cell, level.goal_cell))
+    }
+
+    fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
+        let axes = "x goes down the rows and y along the columns; plots have x to the right and y up, a quarter turn from here";
+        let source = MazeSource { map: Map::maze2d, level: shown_level, drawn: shown_drawn, axes };
+        Some(show_level::show(self, request, &source))
+    }
+}
+
+impl StateTools for Maze2d {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<MazeBall>(agent).map(|ball| point(ball.0.position))
+    }
+}
+
+impl TraceTools for Maze2d {
+    fn run(&self, request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>> {
+        Some(trace::run(self, request, print))
+    }
+}
+
+impl PictureTools for Maze2d {
+    fn picture(&self) -> Option<Picture> {
+        Some(Picture { width: VIEW, least_height: VIEW })
+    }
+
+    fn build_picture(&self, app: &mut App) {
+        app.add_plugins(Maze2dPicturePlugin);
+    }
+}
+
+impl InputTools for Maze2d {
     fn action_names(&self) -> Vec<String> {
         vec!["push x (down the rows)".to_owned(), "push y (along the columns)".to_owned()]
     }
@@ -123,58 +193,9 @@ impl Game for Maze2d {
         let push = |at: &[i8]| ActionValue::Continuous(at.iter().map(|&axis| axis.into()).collect());
         Some(KeyBindings::new([rows, columns], push, "arrow keys or W, A, S and D push the ball"))
     }
+}
 
-    fn observation(&self) -> ObservationSpace {
-        (**SPACE).clone()
-    }
-
-    fn build(&self, app: &mut App, mode: &str) {
-        // Drawn levels bring their rules.
-        let is_drawn = is_level_files(mode);
-        let mode = if is_drawn { Ok(Maze2dMode::new(Map::Random(MazeSpec::default()))) } else { mode.parse() };
-        let mode = mode.expect("callers check the mode with `check_mode`");
-        app.add_plugins(Maze2dPlugin { mode, physics: self.physics });
-    }
-
-    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
-        level_text::parse(text)
-    }
-
-    fn picture(&self) -> Option<Picture> {
-        Some(Picture { width: VIEW, least_height: VIEW })
-    }
-
-    fn build_picture(&self, app: &mut App) {
-        app.add_plugins(Maze2dPicturePlugin);
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        spawn_agent(world, index)
-    }
-
-    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
-        Some(level_of(self, mode, level).ok()?.0.floor_plan())
-    }
-
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<MazeBall>(agent).map(|ball| point(ball.0.position))
-    }
-
-    fn prove(&self, mode: &str, level: u64) -> LevelProof {
-        let level = level_of(self, mode, level);
-        level.map_or(LevelProof::Unknown, |(level, _)| prove(&level.maze, level.start_cell, level.goal_cell))
-    }
-
-    fn detectors(&self) -> Vec<Box<dyn Detector>> {
-        // Tiles: the goal reaches half a metre, and walls are as thick as a tile.
-        let (ignored, far) = (GoalIgnored::within(0.45), FarGoal::beyond(0.6));
-        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3)), Box::new(AgainstRules)]
-    }
-
-    fn defects(&self) -> Vec<DefectKind> {
-        defects::defects()
-    }
-
+impl BotTools for Maze2d {
     fn demonstrator(&self) -> Option<&'static str> {
         Some("waypoints")
     }
@@ -182,14 +203,30 @@ impl Game for Maze2d {
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         world.entity_mut(agent).insert(DemonstratorBot::new(noise));
     }
+}
 
-    fn experiment(&self) -> Option<ExperimentText> {
-        let text = include_str!("../../assets/experiments/maze2d.ron");
-        Some(ExperimentText { origin: "assets/experiments/maze2d.ron".into(), text: text.into() })
+impl TestTools for Maze2d {
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        // In tiles: the goal's radius is half a metre, and walls are as thick as a tile.
+        let (ignored, far) = (GoalIgnored::within(0.45), FarGoal::beyond(0.6));
+        vec![Box::new(ignored), Box::new(far), Box::new(ThroughWall::deeper_than(0.3)), Box::new(AgainstRules)]
     }
 
-    fn benchmarks(&self) -> Vec<Benchmark> {
-        vec![
+    fn defects(&self) -> Vec<DefectKind> {
+        defects::defects()
+    }
+}
+
+impl TrainTools for Maze2d {
+    fn experiment(&self) -> Option<ExperimentText> {
+        let file = playbot_assets::experiments::MAZE2D;
+        Some(ExperimentText { origin: file.path.into(), text: file.text.into() })
+    }
+}
+
+impl BenchmarkTools for Maze2d {
+    fn benchmarks(&self) -> Option<Vec<Benchmark>> {
+        Some(vec![
             Benchmark::simulate("vector", "medium"),
             Benchmark::simulate("physics", "medium"),
             Benchmark::simulate("rapier", "medium+contact=rapier"),
@@ -199,7 +236,7 @@ impl Game for Maze2d {
             Benchmark::simulate("placed", "medium"),
             Benchmark::simulate("raster", "medium").seeing(ObservationKind::Raster),
             Benchmark::train("vector", "medium"),
-        ]
+        ])
     }
 
     fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
@@ -211,26 +248,16 @@ impl Game for Maze2d {
             _ => None,
         }
     }
-
-    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
-        let axes = "x goes down the rows and y along the columns; plots have x to the right and y up, a quarter turn from here";
-        let source = MazeSource { map: Map::maze2d, level: shown_level, drawn: shown_drawn, axes };
-        show_level::show(self, request, &source)
-    }
-
-    fn trace(&self, request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>> {
-        Some(trace::run(self, request, print))
-    }
 }
 
-/// A level of a mode, as it is played.
+/// Returns a level of a mode, with its metadata.
 fn shown_level(game: &dyn Game, mode: &str, seed: u64) -> Result<ShownMaze, InspectError> {
     game.check_mode(mode)?;
     let (level, rules) = level_of(game, mode, seed).map_err(InspectError::Usage)?;
     shown(&level, &rules)
 }
 
-/// The level of a file.
+/// Returns the level of a file, with its metadata.
 fn shown_drawn(designs: &LevelDesigns) -> Result<ShownMaze, InspectError> {
     let (level, rules) = drawn(designs, 0).map_err(InspectError::Usage)?;
     shown(&level, &rules)

@@ -1,14 +1,13 @@
-//! Knowing the map: which of the cells around are walls.
+//! Map of the cells around an agent, as an observation.
 
 use bevy_playbot::prelude::Observation;
 
 use super::{Sighted, Told};
 
-/// How many cells the map reaches to each side: in a maze of 9 × 9 cells all that are free, from all but the outermost of
-/// them.
+/// Cells of the map to each side: in a maze of 9 × 9 cells all free ones, from all but the outermost of them.
 pub const REACH: i32 = 5;
 
-/// Agents are told what [`Sighted`] ones are, and which of the 11 × 11 cells around them are walls.
+/// Adds the observations of [`Sighted`], and the walls among the 11 × 11 cells around the agent.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mapped;
 
@@ -19,14 +18,14 @@ impl Told for Mapped {
     }
 }
 
-/// How far the cells of the map lie to the east and to the north of the agent's own: rows from north to south, each from
-/// west to east, as on a map.
+/// Returns the offsets of the map's cells to the east and to the north of the agent's own: rows from north to south,
+/// each from west to east, as on a map.
 fn around() -> impl Iterator<Item = [i32; 2]> {
     (-REACH..=REACH).rev().flat_map(|north| (-REACH..=REACH).map(move |east| [east, north]))
 }
 
-/// Adds the map to an observation: 1 for walls, and for what lies outside, 0 for free cells. `is_wall` tells it of the cell
-/// so far to the east and to the north.
+/// Adds the map to an observation: 1 for walls and for the outside, 0 for free cells. `is_wall` is called with each
+/// offset to the east and to the north.
 pub fn push_map(observation: &mut Observation, is_wall: impl Fn([i32; 2]) -> bool) {
     observation.vector.extend(around().map(|cell| f32::from(u8::from(is_wall(cell)))));
 }

@@ -1,9 +1,11 @@
-//! Maze games for agents that know where they are: the same games, with more added to what an agent is told.
+//! Maze games with more observations: the same games, whose agents see goal, walls, a map, or their position in finer
+//! detail.
 //!
-//! In the originals an agent knows its own state only. That will do on one map, which can be learned by heart; in a maze
-//! that nobody has seen it leaves nothing but wandering about. [`Sighted`] agents see the way to the goal and the walls in
-//! sight; they still have to look into dead ends, and what remembers nothing stays there. [`Mapped`] agents also know the
-//! cells around them. [`Placed`] agents are told nothing new: they only tell places better apart, which helps on large maps.
+//! In the originals an agent observes its own state only. That is enough on one map, which can be learned by heart. In
+//! an unknown maze it leaves nothing but wandering about. [`Sighted`] agents observe the direction of the goal and the
+//! distances of walls. They still have to look into dead ends, where a policy without memory stays. [`Mapped`] agents
+//! also observe the cells around them. [`Placed`] agents get no new information: positional encoding only separates
+//! positions better, which helps on large maps.
 
 pub mod mapped;
 pub mod placed;

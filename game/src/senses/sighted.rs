@@ -1,10 +1,10 @@
-//! Seeing: the way to the goal, and the distance of the walls around.
+//! Direction of the goal, and distances of the walls around, as observations.
 
 use bevy_playbot::prelude::Observation;
 
 use super::Told;
 
-/// Agents are told the way to the goal and the distance of the walls around.
+/// Adds the direction of the goal and the distances of the walls around.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sighted;
 
@@ -16,8 +16,8 @@ impl Told for Sighted {
     }
 }
 
-/// The eight ways that rays go, with what a step of 1 m leads to the east and to the north: east, then on by eighths of
-/// a turn to the left. North is up in the game's own picture.
+/// The eight directions of rays, with the components of a step of 1 m to the east and to the north: east, then on by
+/// eighths of a turn to the left. North is up in the game's own picture.
 pub const WAYS: [(&str, [f64; 2]); 8] = {
     const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
     [
@@ -32,8 +32,9 @@ pub const WAYS: [(&str, [f64; 2]); 8] = {
     ]
 };
 
-/// Adds the goal and the rays to an observation, in the order of the names: the way to the goal along x and y, then the
-/// distance of the nearest wall along each of [`WAYS`], all in metres. `wall` tells it for one way, east and north.
+/// Adds the goal and the rays to an observation, in the order of the names. First comes the offset of the goal along x
+/// and y, then the distance of the nearest wall along each of [`WAYS`], all in metres. `wall` is called with each
+/// direction, east and north.
 pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
     observation.vector.extend(to_goal);
     observation.vector.extend(WAYS.map(|(_, way)| wall(way)));

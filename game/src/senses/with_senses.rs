@@ -1,18 +1,8 @@
 //! A game whose agents are told more than the game tells them.
 
-use bevy::{app::PluginGroupBuilder, prelude::*};
-use bevy_playbot::{headless_plugins::HeadlessPlugins, vision::Picture};
+use bevy::prelude::*;
 use playbot_lab::prelude::*;
-use playbot_lab::{
-    benchmark::Benchmark,
-    defect::DefectKind,
-    detector::Detector,
-    floor_plan::FloorPlan,
-    inspect::{InspectError, LevelRequest, LevelView},
-    level_files::{LevelDesign, LevelTextError},
-    mode::ModeError,
-    proof::LevelProof,
-};
+use playbot_lab::{benchmark::Benchmark, game::BenchmarkTools};
 
 /// What agents are told beside what a game tells them: the same in every game that has it.
 pub trait Told: Copy + Send + Sync + 'static {
@@ -33,53 +23,34 @@ pub trait Senses<G>: Told {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithSenses<G, S>(pub G, pub S);
 
-/// Methods of the inner game that are this game's too.
-macro_rules! as_without_senses {
-    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
-        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
-            self.0.$name($($argument),*)
-        })*
-    };
+/// No measurements: speed is measured beside the game without these senses.
+struct Unmeasured;
+
+impl BenchmarkTools for Unmeasured {
+    fn benchmarks(&self) -> Option<Vec<Benchmark>> {
+        Some(Vec::new())
+    }
 }
 
 impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
-    as_without_senses! {
-        fn version() -> u32;
-        fn modes() -> &'static [&'static str];
-        fn check_mode(mode: &str) -> Result<(), ModeError>;
-        fn family(mode: &str) -> String;
-        fn last_level() -> Option<u64>;
-        fn fingerprint(mode: &str, level: u64) -> Option<u64>;
-        fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
-        fn tick_hz() -> f64;
-        fn placement() -> TickPlacement;
-        fn headless_plugins(usual: HeadlessPlugins) -> PluginGroupBuilder;
-        fn arenas_per_world() -> Option<u32>;
-        fn problem() -> Option<String>;
-        fn actions() -> ActionSpace;
-        fn action_names() -> Vec<String>;
-        fn key_bindings() -> Option<KeyBindings>;
-        fn picture() -> Option<Picture>;
-        fn has_camera() -> bool;
-        fn build_picture(app: &mut App);
-        fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
-        fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
-        fn end_cause(world: &World, agent: Entity) -> Option<&'static str>;
-        fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
-        fn prove(mode: &str, level: u64) -> LevelProof;
-        fn prove_from(world: &World, agent: Entity) -> LevelProof;
-        fn detectors() -> Vec<Box<dyn Detector>>;
-        fn defects() -> Vec<DefectKind>;
-        fn blind_bots() -> Vec<(&'static str, BlindBot)>;
-        fn demonstrator() -> Option<&'static str>;
-        fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);
-        fn show_level(request: &LevelRequest) -> Result<LevelView, InspectError>;
-        fn has_space_view() -> bool;
-        fn build_space_view(app: &mut App);
-    }
-
     fn name(&self) -> &'static str {
         S::NAME
+    }
+
+    fn version(&self) -> u32 {
+        self.0.version()
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        self.0.modes()
+    }
+
+    fn tick_hz(&self) -> f64 {
+        self.0.tick_hz()
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.0.actions()
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -97,9 +68,10 @@ impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
         agent
     }
 
-    fn benchmarks(&self) -> Vec<Benchmark> {
-        // Measured beside the game that sees less.
-        Vec::new()
+    fn tools(&self) -> GameTools<'_> {
+        // Traces and experiments of the inner game are written for it by name.
+        let GameTools { trace, training, .. } = GameTools::default();
+        GameTools { trace, training, benchmarks: &Unmeasured, ..self.0.tools() }
     }
 }
 
@@ -107,7 +79,7 @@ impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
 mod tests {
     use crate::{
         antmaze::{AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
-        maze2d::{Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
+        maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
     };
     use playbot_lab::game::Game;
 
@@ -130,5 +102,19 @@ mod tests {
             different.dedup();
             assert_eq!((names.len(), different.len()), (all, all), "{}", game.name());
         }
+    }
+
+    #[test]
+    fn tools_are_those_of_the_inner_game_without_what_is_written_for_it_by_name() {
+        let (game, with_rays) = (Maze2d::default(), Maze2dWithRays::default());
+        let (inner, outer) = (game.tools(), with_rays.tools());
+        let mode = "random+size=7x7";
+        assert!(game.check_mode(mode).is_ok() && with_rays.check_mode(mode).is_ok());
+        assert_eq!(game.fingerprint(mode, 3), with_rays.fingerprint(mode, 3));
+        assert_eq!(inner.bots.demonstrator(), outer.bots.demonstrator());
+        assert_eq!(inner.levels.floor_plan(mode, 3), outer.levels.floor_plan(mode, 3));
+        assert!(inner.training.experiment().is_some() && outer.training.experiment().is_none());
+        assert!(inner.benchmarks.benchmarks().is_some_and(|all| !all.is_empty()));
+        assert!(outer.benchmarks.benchmarks().is_some_and(|all| all.is_empty()));
     }
 }

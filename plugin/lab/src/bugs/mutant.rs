@@ -2,24 +2,12 @@
 
 use std::{ops::Deref, sync::Arc};
 
-use bevy::{app::PluginGroupBuilder, prelude::*};
-use bevy_playbot::{
-    action::ActionSpace, bot::BlindBot, demo::file::DemoHeader, headless_plugins::HeadlessPlugins,
-    key_bindings::KeyBindings, observation::ObservationSpace, placement::TickPlacement, policy_file::GameCard,
-    vision::Picture,
-};
+use bevy::prelude::*;
+use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
 
 use crate::{
-    benchmark::Benchmark,
     defect::{ChangeRules, DefectKind, Plant},
-    detector::Detector,
-    experiment_text::ExperimentText,
-    floor_plan::FloorPlan,
-    game::Game,
-    inspect::{InspectError, LevelRequest, LevelView, Print, TraceRequest},
-    level_files::{LevelDesign, LevelTextError},
-    mode::ModeError,
-    proof::LevelProof,
+    game::{Game, GameTools},
 };
 
 /// A defect of rules, in one of its variants.
@@ -81,71 +69,30 @@ impl<G> Mutant<G> {
     }
 }
 
-/// Methods of the sound game that are this game's too.
-macro_rules! as_sound {
-    ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
-        $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
-            self.game.$name($($argument),*)
-        })*
-    };
-}
-
+/// Its tools are those of the game: defects are in the rules alone.
 impl<G: Deref<Target: Game> + Send + Sync> Game for Mutant<G> {
-    as_sound! {
-        fn name() -> &'static str;
-        fn version() -> u32;
-        fn modes() -> &'static [&'static str];
-        fn check_mode(mode: &str) -> Result<(), ModeError>;
-        fn family(mode: &str) -> String;
-        fn last_level() -> Option<u64>;
-        fn fingerprint(mode: &str, level: u64) -> Option<u64>;
-        fn parse_level(text: &str) -> Result<LevelDesign, LevelTextError>;
-        fn tick_hz() -> f64;
-        fn placement() -> TickPlacement;
-        fn headless_plugins(usual: HeadlessPlugins) -> PluginGroupBuilder;
-        fn arenas_per_world() -> Option<u32>;
-        fn problem() -> Option<String>;
-        fn actions() -> ActionSpace;
-        fn action_names() -> Vec<String>;
-        fn key_bindings() -> Option<KeyBindings>;
-        fn observation() -> ObservationSpace;
-        fn picture() -> Option<Picture>;
-        fn has_camera() -> bool;
-        fn build_picture(app: &mut App);
-        fn spawn_agent(world: &mut World, index: u32) -> Entity;
-        fn floor_plan(mode: &str, level: u64) -> Option<FloorPlan>;
-        fn whereabouts(world: &World, agent: Entity) -> Option<Vec2>;
-        fn end_cause(world: &World, agent: Entity) -> Option<&'static str>;
-        fn explore_cell(world: &World, agent: Entity) -> Option<Vec<i32>>;
-        fn prove(mode: &str, level: u64) -> LevelProof;
-        fn prove_from(world: &World, agent: Entity) -> LevelProof;
-        fn detectors() -> Vec<Box<dyn Detector>>;
-        fn defects() -> Vec<DefectKind>;
-        fn blind_bots() -> Vec<(&'static str, BlindBot)>;
-        fn demonstrator() -> Option<&'static str>;
-        fn attach_demonstrator(world: &mut World, agent: Entity, noise: f64);
-        fn experiment() -> Option<ExperimentText>;
-        fn benchmarks() -> Vec<Benchmark>;
-        fn show_level(request: &LevelRequest) -> Result<LevelView, InspectError>;
-        fn trace_columns() -> Vec<String>;
-        fn trace_row(world: &World, agent: Entity) -> Vec<f32>;
-        fn trace(request: &TraceRequest, print: Print) -> Option<Result<Option<String>, InspectError>>;
-        fn has_space_view() -> bool;
-        fn build_space_view(app: &mut App);
-        fn demo_header(mode: &str) -> DemoHeader;
+    fn name(&self) -> &'static str {
+        self.game.name()
     }
 
-    fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
-        self.game.benchmarked(benchmark)
+    fn version(&self) -> u32 {
+        self.game.version()
     }
 
-    fn card(&self) -> GameCard<'_> {
-        self.game.card()
+    fn modes(&self) -> &'static [&'static str] {
+        self.game.modes()
     }
 
-    fn built_anew(&self) -> Option<Arc<dyn Game>> {
-        let game = self.game.built_anew()?;
-        Some(Arc::new(Mutant { game, rules: self.rules.clone() }))
+    fn tick_hz(&self) -> f64 {
+        self.game.tick_hz()
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.game.actions()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        self.game.observation()
     }
 
     fn build(&self, app: &mut App, mode: &str) {
@@ -153,6 +100,19 @@ impl<G: Deref<Target: Game> + Send + Sync> Game for Mutant<G> {
         if let Some(PlantedRules { plant, variant }) = &self.rules {
             plant(app, *variant);
         }
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        self.game.spawn_agent(world, index)
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        self.game.tools()
+    }
+
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        let game = self.game.built_anew()?;
+        Some(Arc::new(Mutant { game, rules: self.rules.clone() }))
     }
 }
 

@@ -8,7 +8,12 @@ use super::{
     demonstrator::ForeignBot, factory::SystemFactory, input::Input, install::ForeignPlugin, paths::ObservedPath,
     place::ForeignPlace, restart_kind::Restart, runtime::Sensor,
 };
-use crate::{defect::DefectKind, detector::Detector, floor_plan::FloorPlan, game::Game};
+use crate::{
+    defect::DefectKind,
+    detector::Detector,
+    floor_plan::FloorPlan,
+    game::{BotTools, Game, GameTools, HostTools, InputTools, LevelTools, PictureTools, StateTools, TestTools},
+};
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
@@ -21,17 +26,17 @@ use bevy_playbot::{
     renewal::Renewal,
 };
 
-/// A game that knows nothing of this plugin, with what an agent does, sees and gets there: see the
+/// A game without this plugin, with the actions, observations and rewards of its agent: see the
 /// [module](crate::foreign).
 ///
-/// Its player and its resources are global, so that each World has one arena with one agent, however many arenas an
-/// experiment asks for: there are more Worlds instead. Its mode is called `default`.
+/// Its player and its resources are global, so each World has one arena with one agent. An experiment with more arenas
+/// gets more Worlds. Its mode is called `default`.
 #[derive(Clone)]
 pub struct ForeignGame {
     pub(super) description: Arc<Description>,
 }
 
-/// What a builder has been told.
+/// The settings of the builder.
 #[derive(Clone)]
 pub(super) struct Description {
     pub(super) name: &'static str,
@@ -41,33 +46,33 @@ pub(super) struct Description {
     pub(super) levels: Option<u64>,
     pub(super) input: Input,
     pub(super) act: Option<SystemFactory<()>>,
-    /// What is done to an agent when it is spawned.
+    /// Functions that prepare an agent when it is spawned.
     pub(super) agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
     /// Names of the values that `observe` returns.
     pub(super) names: Vec<String>,
     pub(super) observe: Option<SystemFactory<Vec<f32>>>,
     pub(super) paths: Vec<String>,
     pub(super) has_camera: bool,
-    /// Where the agent is on the plan of its level.
+    /// Position of the agent on the plan of its level.
     pub(super) place: Option<SystemFactory<Vec2>>,
     /// The plan of a level.
     pub(super) plan: Option<Arc<dyn Fn(u64) -> FloorPlan + Send + Sync>>,
-    /// With whether it pays the growth of its value.
+    /// Reward systems; the flag says whether the growth of the value is paid.
     pub(super) rewards: Vec<(SystemFactory<f32>, bool)>,
     pub(super) end: Option<SystemFactory<Option<EpisodeEnd>>>,
     /// Ticks after which an episode is truncated.
     pub(super) limit: Option<u32>,
     pub(super) restart: Restart,
     pub(super) ready: Option<SystemFactory<bool>>,
-    /// Frames that a level may take to be ready.
+    /// Frames that a level may take to load.
     pub(super) patience: u32,
     pub(super) level: Option<SystemFactory<()>>,
     pub(super) demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
     pub(super) hash: Option<SystemFactory<u64>>,
     pub(super) plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
-    /// What makes the game's own detectors.
+    /// Factories of the game's own detectors.
     pub(super) detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
-    /// What can be planted into it.
+    /// Defects that can be planted into it.
     pub(super) defects: Vec<DefectKind>,
 }
 
@@ -80,7 +85,7 @@ impl Description {
         }
     }
 
-    /// Name of the system that observes, for messages.
+    /// Returns the name of the system that observes, for messages.
     pub(super) fn sensor_name(&self) -> &'static str {
         self.observe.as_ref().map_or("of the paths", SystemFactory::name)
     }
@@ -92,19 +97,19 @@ impl Description {
 }
 
 impl ForeignGame {
-    /// The number of levels, if the game has said it.
+    /// Returns the number of levels, if the game declares it.
     pub fn level_count(&self) -> Option<u64> {
         self.description.levels
     }
 
-    /// The level that is played when this one is asked for.
+    /// Returns the level that is played for this number.
     pub(super) fn level_of(&self, level: u64) -> u64 {
         self.level_count().map_or(level, |levels| level % levels.max(1))
     }
 }
 
-/// Why nothing is seen of a game whose agents are told no numbers. `has_feature` says whether this crate can look through
-/// cameras.
+/// Returns the reason why a game without vector observations cannot be observed. `has_feature` says whether this crate
+/// is built with cameras.
 fn nothing_seen(name: &str, has_camera: bool, has_feature: bool) -> Option<String> {
     match (has_camera, has_feature) {
         (true, true) => None,
@@ -135,14 +140,55 @@ impl Game for ForeignGame {
         self.description.hz
     }
 
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        matches!(self.description.restart, Restart::Rebuild).then(|| Arc::new(self.clone()) as Arc<dyn Game>)
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.description.input.space()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        self.description.observation()
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        app.add_plugins(ForeignPlugin(self.clone()));
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let sensor = VectorSensor::new(self.description.observation().names);
+        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
+        if let Some(input) = self.description.input.pressed() {
+            agent.insert(input);
+        }
+        self.description.agent.iter().for_each(|equip| equip(&mut agent));
+        agent.id()
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools {
+            host: self,
+            levels: self,
+            state: self,
+            pictures: self,
+            input: self,
+            bots: self,
+            tests: self,
+            ..GameTools::default()
+        }
+    }
+}
+
+impl HostTools for ForeignGame {
     fn placement(&self) -> TickPlacement {
         TickPlacement::Frame
     }
 
-    fn headless_plugins(&self, usual: HeadlessPlugins) -> PluginGroupBuilder {
+    fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
         match &self.description.plugins {
-            Some(change) => change(usual),
-            None => usual.build(),
+            Some(change) => change(plugins),
+            None => plugins.build(),
         }
     }
 
@@ -150,11 +196,7 @@ impl Game for ForeignGame {
         Some(1)
     }
 
-    fn built_anew(&self) -> Option<Arc<dyn Game>> {
-        matches!(self.description.restart, Restart::Rebuild).then(|| Arc::new(self.clone()) as Arc<dyn Game>)
-    }
-
-    fn problem(&self) -> Option<String> {
+    fn unplayable(&self) -> Option<String> {
         let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
         if let Some(problem) = input.problem() {
             return Some(format!("the game `{name}` {problem}"));
@@ -176,11 +218,27 @@ impl Game for ForeignGame {
         let is_sound = self.description.hz.is_finite() && self.description.hz > 0.0;
         (!is_sound).then(|| format!("`.hz` of the game `{name}` is {}, not a number of frames", self.description.hz))
     }
+}
 
-    fn actions(&self) -> ActionSpace {
-        self.description.input.space()
+impl LevelTools for ForeignGame {
+    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
+        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
     }
+}
 
+impl StateTools for ForeignGame {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<ForeignPlace>(agent).map(|place| place.0)
+    }
+}
+
+impl PictureTools for ForeignGame {
+    fn has_camera(&self) -> bool {
+        self.description.has_camera
+    }
+}
+
+impl InputTools for ForeignGame {
     fn action_names(&self) -> Vec<String> {
         self.description.input.names()
     }
@@ -188,45 +246,9 @@ impl Game for ForeignGame {
     fn key_bindings(&self) -> Option<KeyBindings> {
         self.description.input.bindings()
     }
+}
 
-    fn observation(&self) -> ObservationSpace {
-        self.description.observation()
-    }
-
-    fn has_camera(&self) -> bool {
-        self.description.has_camera
-    }
-
-    fn build(&self, app: &mut App, _mode: &str) {
-        app.add_plugins(ForeignPlugin(self.clone()));
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        let sensor = VectorSensor::new(self.description.observation().names);
-        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
-        if let Some(input) = self.description.input.pressed() {
-            agent.insert(input);
-        }
-        self.description.agent.iter().for_each(|equip| equip(&mut agent));
-        agent.id()
-    }
-
-    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
-        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
-    }
-
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<ForeignPlace>(agent).map(|place| place.0)
-    }
-
-    fn detectors(&self) -> Vec<Box<dyn Detector>> {
-        self.description.detectors.iter().map(|make| make()).collect()
-    }
-
-    fn defects(&self) -> Vec<DefectKind> {
-        self.description.defects.clone()
-    }
-
+impl BotTools for ForeignGame {
     fn demonstrator(&self) -> Option<&'static str> {
         self.description.demonstrator.as_ref().map(|(name, _)| *name)
     }
@@ -237,11 +259,21 @@ impl Game for ForeignGame {
     }
 }
 
+impl TestTools for ForeignGame {
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        self.description.detectors.iter().map(|make| make()).collect()
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        self.description.defects.clone()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A game with actions, and nothing else yet.
+    /// A game with actions, and no observation yet.
     fn deaf() -> ForeignGame {
         ForeignGame::new("mole", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]])
     }
@@ -249,7 +281,7 @@ mod tests {
     #[test]
     fn a_camera_stays_said_and_names_the_feature_that_it_needs() {
         let problem = deaf().camera().problem();
-        assert!(deaf().camera().has_camera());
+        assert!(deaf().camera().tools().pictures.has_camera());
         assert_eq!(problem.is_none(), cfg!(feature = "camera"), "{problem:?}");
         let missing = nothing_seen("mole", true, false).expect("cannot look");
         assert!(missing.contains("`mole`") && missing.contains("the feature `camera` of `playbot_lab`"), "{missing}");
