@@ -1,13 +1,13 @@
-//! Saving arenas in the middle of their episodes.
+//! Saved arenas in the middle of their episodes.
 //!
-//! A game is not asked to store its state: since it is deterministic, the level and the actions so far bring it back.
+//! Games do not store their state: they are deterministic, so level and past actions restore it.
 
 use bevy::prelude::*;
 use playbot_learner::{Actions, RngState};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::collect::Collector;
+use super::collect::{ActionLog, Collector};
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
@@ -21,28 +21,10 @@ use bevy_playbot::{
     streams::AgentStreams,
 };
 
-/// Actions of the running episode.
-#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
-#[reflect(opaque)]
-#[reflect(Component, Clone, Debug, PartialEq)]
-pub struct ActionLog(Vec<ActionValue>);
-
-impl ActionLog {
-    /// Notes the action of this tick; the log is empty again after the last tick of an episode.
-    pub(crate) fn note(&mut self, episode: &Episode, action: &ActionValue) {
-        if episode.tick <= 1 || episode.end().is_some() {
-            self.0.clear();
-        }
-        if episode.end().is_none() {
-            self.0.push(action.clone());
-        }
-    }
-}
-
-/// What brings one arena back.
+/// Saved state of one arena.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArenaState {
-    /// Level of the running episode; `None` between two episodes.
+    /// Level of the current episode; `None` between two episodes.
     level: Option<u64>,
     actions: Actions,
     state_hash: u64,
@@ -51,20 +33,20 @@ pub struct ArenaState {
     streams: [RngState; 3],
 }
 
-/// An arena could not be brought back.
+/// Failure to restore an arena.
 #[derive(Debug, Error)]
 pub enum RestoreError {
     /// The game broke its contract while the arenas were replayed.
     #[error(transparent)]
     Fault(#[from] Fault),
-    /// The replayed arena is not the saved one.
+    /// The replayed arena differs from the saved one.
     #[error(
-        "arena {0} did not replay to its saved state: the checkpoint was made with other rules of the game, or the game \
-         keeps something that a new World does not have: resources that a restart does not reset, the time that has passed \
-         (`Time`), a `Local` of a system, a `static`, a random generator that is not seeded from the level, or the order in \
-         which entities are stored; `playbot doctor` names it, unless it hides in a `Local`, a `static`, an asset, a type \
-         that does not derive `Reflect` or a field with `#[reflect(ignore)]`: of those it sees only what agents notice. \
-         For what a foreign game cannot set back there is `Restart::Rebuild`, which builds the World anew for each episode"
+        "arena {0} did not replay to its saved state: the game's rules have changed since the checkpoint, or the game keeps \
+         state from one episode to the next. Look for resources that a restart does not reset, elapsed time (`Time`), a \
+         `Local` of a system, a `static`, a random generator that is not seeded from the level, or the order of stored \
+         entities. `playbot doctor` names such state. In a `Local`, a `static`, an asset, a type without `Reflect` or a \
+         field with `#[reflect(ignore)]`, it sees only the effects on agents. If a foreign game cannot reset its state, use \
+         `Restart::Rebuild`, which builds a new World for each episode"
     )]
     Diverged(usize),
     /// The checkpoint has another number of arenas.
@@ -75,7 +57,7 @@ pub enum RestoreError {
         /// Arenas of the experiment.
         wanted: usize,
     },
-    /// A generator state cannot be read, or an action is none of the game's.
+    /// Unreadable generator state, or an action outside the game's space.
     #[error(transparent)]
     Stream(#[from] playbot_learner::LearnError),
 }
@@ -102,7 +84,7 @@ pub fn save_arenas(collector: &mut Collector) -> Vec<ArenaState> {
 fn collect_actions(space: &ActionSpace, log: &[ActionValue]) -> Actions {
     let mut actions = Actions::empty(space);
     for action in log {
-        // The log holds what the agent did, and that was checked against its space.
+        // The log holds the agent's action, which was checked against its space.
         if let Err(error) = actions.push(action) {
             tracing::error!("an action is missing from the checkpoint: {error}");
         }
@@ -123,7 +105,7 @@ pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result
     let world = collector.world_mut();
     for (&agent, state) in agents.iter().zip(saved) {
         if let Some(agent) = world.get::<Agent>(agent) {
-            // A game is promised actions of its own space, whatever a file says.
+            // A game gets only actions of its own space, even from a damaged file.
             agent.actions.check(&state.actions)?;
         }
     }
@@ -150,7 +132,7 @@ pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result
     Ok(())
 }
 
-/// Plays the saved actions; an arena that has reached its tick stands still.
+/// Plays the saved actions; arenas at their saved tick stand still.
 fn replay(world: &mut World, agents: &[Entity], saved: &[ArenaState]) -> Result<(), Fault> {
     let longest = saved.iter().map(|state| state.actions.len()).max().unwrap_or(0);
     for tick in 0..longest {

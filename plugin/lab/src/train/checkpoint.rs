@@ -1,9 +1,9 @@
-//! The checkpoints of a run: how one is written, which are kept, which is the last and which the best.
+//! Checkpoints of a run: their files, their retention, the last and the best.
 //!
 //! ```text
 //! checkpoints/step-000000081920/learner.safetensors   weights, moments, normalisers, generators
 //! checkpoints/step-000000081920/arenas.json           level queues and running episodes
-//! checkpoints/step-000000081920/summary.json          how good the policy was
+//! checkpoints/step-000000081920/summary.json          return and success rate of the policy
 //! ```
 //!
 //! A folder called `step-…` is whole: it is filled under another name first.
@@ -11,40 +11,23 @@
 use std::{
     fs, io,
     path::{Path, PathBuf},
+    str::FromStr,
 };
 
+use bevy_playbot::unknown_name::UnknownName;
 use playbot_learner::disk;
 use serde::{Deserialize, Serialize};
 
-pub use super::checkpoint_choice::CheckpointChoice;
-use super::{
-    run_dir::{RunError, io_error},
-    sealed_file::{read_sealed, write_sealed},
-};
+use super::run_error::{RunError, io_error};
+use crate::sealed_file::{read_sealed, write_sealed};
 
 const PREFIX: &str = "step-";
 const SUMMARY: &str = "summary.json";
 const UNFINISHED: &str = "unfinished";
-/// What a checkpoint is called while it is deleted, so that no half one is taken for whole.
+/// Name of a checkpoint while it is deleted, which keeps a partial one from passing as whole.
 const REMOVED: &str = "removed";
 
-/// When checkpoints are written and how many stay.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CheckpointConfig {
-    /// Updates between two checkpoints; there is always one at the start and one at the end.
-    pub every: u64,
-    /// How many of the latest stay; the best one stays besides.
-    pub keep: usize,
-}
-
-impl Default for CheckpointConfig {
-    fn default() -> Self {
-        Self { every: 10, keep: 3 }
-    }
-}
-
-/// How good the policy of a checkpoint was in training.
+/// Training results of a checkpoint's policy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CheckpointSummary {
     /// Environment steps done.
@@ -60,24 +43,50 @@ pub struct CheckpointSummary {
 pub struct Checkpoint {
     /// Its folder.
     pub path: PathBuf,
-    /// How good it was.
+    /// Its training results.
     pub summary: CheckpointSummary,
 }
 
 impl Checkpoint {
-    /// The learner's file.
+    /// Returns the path of the learner's file.
     pub fn learner_file(&self) -> PathBuf {
         self.path.join("learner.safetensors")
     }
 
-    /// The file of the arenas.
+    /// Returns the path of the arenas' file.
     pub fn arenas_file(&self) -> PathBuf {
         self.path.join("arenas.json")
     }
 }
 
-/// All whole checkpoints of the run in folder `run`, the oldest first. One whose summary cannot be read is passed over
-/// with a warning, which says what the last whole one is.
+/// The checkpoint of a run to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CheckpointChoice {
+    /// The latest.
+    #[default]
+    Last,
+    /// The one with the highest return in training.
+    Best,
+    /// The one at this step.
+    Step(u64),
+}
+
+impl FromStr for CheckpointChoice {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        match name {
+            "last" => Ok(Self::Last),
+            "best" => Ok(Self::Best),
+            step => step.parse().map(Self::Step).map_err(|_| {
+                UnknownName::new("checkpoint", name, &["last", "best", "the number of environment steps of one"])
+            }),
+        }
+    }
+}
+
+/// Lists all whole checkpoints of the run in folder `run`, the oldest first. Those with an unreadable summary are
+/// skipped with a warning, which names the last whole one.
 ///
 /// # Errors
 ///
@@ -93,8 +102,8 @@ pub fn list(run: &Path) -> Result<Vec<Checkpoint>, RunError> {
         let path = entry.map_err(io_error("read", &folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if name.strip_prefix(PREFIX).is_some_and(|step| step.parse::<u64>().is_ok()) {
-            match read_summary(&path.join(SUMMARY)) {
-                Ok(summary) => checkpoints.push(Checkpoint { path, summary }),
+            match read_sealed(&path.join(SUMMARY)) {
+                Ok((summary, _)) => checkpoints.push(Checkpoint { path, summary }),
                 Err(error) => damaged.push(error),
             }
         }
@@ -105,18 +114,18 @@ pub fn list(run: &Path) -> Result<Vec<Checkpoint>, RunError> {
     Ok(checkpoints)
 }
 
-/// What is left beside a damaged checkpoint.
+/// Describes the last whole checkpoint beside a damaged one.
 fn last_whole(checkpoints: &[Checkpoint]) -> String {
-    checkpoints.last().map_or("no whole one is left".to_owned(), |checkpoint| {
+    checkpoints.last().map_or("no whole checkpoint is left".to_owned(), |checkpoint| {
         format!("the last whole one is that of step {}", checkpoint.summary.step)
     })
 }
 
-/// The checkpoint that is meant, out of those of [`list`].
+/// Returns the requested checkpoint out of those of [`list`].
 ///
 /// # Errors
 ///
-/// [`RunError::NoCheckpoint`] if there is none, or none at that step.
+/// [`RunError::NoCheckpoint`] if the run has no checkpoint, or none at that step.
 pub fn choose(run: &Path, choice: CheckpointChoice) -> Result<Checkpoint, RunError> {
     let mut all = list(run)?;
     let index = match choice {
@@ -131,12 +140,12 @@ pub fn choose(run: &Path, choice: CheckpointChoice) -> Result<Checkpoint, RunErr
     }
 }
 
-/// Writes a checkpoint: `fill` puts the large files into the folder it is given. Then only the last `keep` and the best
-/// stay.
+/// Writes a checkpoint: `fill` writes the large files into the folder that it is given. Afterwards only the last
+/// `keep` and the best stay.
 ///
 /// # Errors
 ///
-/// [`RunError`]; all earlier checkpoints are still there then.
+/// [`RunError`]; all earlier checkpoints still exist then.
 pub(super) fn write(
     run: &Path,
     summary: CheckpointSummary,
@@ -148,9 +157,9 @@ pub(super) fn write(
     let path = folder.join(format!("{PREFIX}{:012}", summary.step));
     remove_if_there(&fresh.path)?;
     disk::create_dir_all(&fresh.path).map_err(io_error("create", &fresh.path))?;
-    let filled = fill(&fresh).and_then(|()| write_sealed(&fresh.path.join(SUMMARY), &summary));
+    let filled = fill(&fresh).and_then(|()| Ok(write_sealed(&fresh.path.join(SUMMARY), &summary)?));
     if filled.is_err() {
-        // Gives back the space; the first error is the one to report.
+        // Frees the space; the first error is reported.
         let _ = remove_if_there(&fresh.path);
         return filled;
     }
@@ -159,7 +168,7 @@ pub(super) fn write(
     prune(run, keep)
 }
 
-/// Takes the checkpoints after `step` out of the list: a training that had to go back so far could not read them.
+/// Renames the checkpoints after `step`, so they are not listed: they were unreadable when training resumed.
 pub(super) fn set_aside_after(run: &Path, step: u64) -> Result<(), RunError> {
     for checkpoint in list(run)?.iter().filter(|checkpoint| checkpoint.summary.step > step) {
         put_aside(&checkpoint.path)?;
@@ -167,12 +176,12 @@ pub(super) fn set_aside_after(run: &Path, step: u64) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Removes the halves of checkpoints that a process left which was killed while it wrote or removed one.
+/// Removes partial checkpoints of a process that was killed while it wrote or removed one.
 pub(super) fn remove_halves(run: &Path) -> Result<(), RunError> {
     [UNFINISHED, REMOVED].iter().try_for_each(|half| remove_if_there(&folder(run).join(half)))
 }
 
-/// Moves a checkpoint, if there is one, where no one looks for it but a person.
+/// Renames a checkpoint, if it exists, to a name that is not listed, for manual inspection.
 fn put_aside(path: &Path) -> Result<(), RunError> {
     if !path.exists() {
         return Ok(());
@@ -185,7 +194,7 @@ fn put_aside(path: &Path) -> Result<(), RunError> {
 
 /// Removes all but the last `keep` (at least one) and the best.
 fn prune(run: &Path, keep: usize) -> Result<(), RunError> {
-    // A process that was killed may have left it.
+    // A killed process may have left this folder.
     remove_if_there(&folder(run).join(REMOVED))?;
     let all = list(run)?;
     let best = best(&all);
@@ -200,7 +209,7 @@ fn prune(run: &Path, keep: usize) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Index of the checkpoint with the highest return, the latest of equals.
+/// Returns the index of the checkpoint with the highest return, the latest of equals.
 fn best(all: &[Checkpoint]) -> Option<usize> {
     let value = |index: &usize| all[*index].summary.episodic_return.unwrap_or(f64::NEG_INFINITY);
     (0..all.len()).max_by(|a, b| value(a).total_cmp(&value(b)))
@@ -208,10 +217,6 @@ fn best(all: &[Checkpoint]) -> Option<usize> {
 
 fn folder(run: &Path) -> PathBuf {
     run.join("checkpoints")
-}
-
-fn read_summary(path: &Path) -> Result<CheckpointSummary, RunError> {
-    read_sealed(path).map(|(summary, _)| summary)
 }
 
 fn remove_if_there(folder: &Path) -> Result<(), RunError> {
@@ -223,11 +228,12 @@ fn remove_if_there(folder: &Path) -> Result<(), RunError> {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::run_dir::write_atomically, *};
+    use super::*;
+    use crate::sealed_file::write_atomically;
 
     fn save(run: &Path, step: u64, episodic_return: f64, keep: usize) -> Result<(), RunError> {
         let summary = CheckpointSummary { step, episodic_return: Some(episodic_return), success_rate: None };
-        write(run, summary, keep, |checkpoint| write_atomically(&checkpoint.learner_file(), b"weights"))
+        write(run, summary, keep, |checkpoint| Ok(write_atomically(&checkpoint.learner_file(), b"weights")?))
     }
 
     fn steps(run: &Path) -> Vec<u64> {
@@ -282,7 +288,7 @@ mod tests {
         fs::write(list(run.path()).expect("readable")[1].path.join(SUMMARY), "{").expect("writable");
         let whole = list(run.path()).expect("readable");
         assert_eq!(last_whole(&whole), "the last whole one is that of step 10");
-        assert_eq!(last_whole(&[]), "no whole one is left");
+        assert_eq!(last_whole(&[]), "no whole checkpoint is left");
     }
 
     #[test]
@@ -296,5 +302,13 @@ mod tests {
         save(run.path(), 25, 1.5, 1).expect("writable");
         assert_eq!(steps(run.path()), [20, 25], "the best and the last of those that can be read");
         assert!(folder(run.path()).join("damaged-step-000000000030").exists());
+    }
+
+    #[test]
+    fn checkpoints_are_named_on_the_command_line() {
+        assert_eq!("last".parse(), Ok(CheckpointChoice::Last));
+        assert_eq!("best".parse(), Ok(CheckpointChoice::Best));
+        assert_eq!("4096".parse(), Ok(CheckpointChoice::Step(4096)));
+        assert!("newest".parse::<CheckpointChoice>().expect_err("no such word").to_string().contains("last, best"));
     }
 }

@@ -1,40 +1,47 @@
-//! How much memory a training needs, so that nobody finds out when the machine stands still.
+//! Memory that a training needs, checked before it starts.
 //!
-//! What is added up is a lower bound: whatever is refused here could not have worked. Address space, which `ulimit -v` limits,
-//! must have room for what threads set aside as well: whether they get by with less is a matter of chance.
+//! The sum is a lower bound: an experiment that is refused here could not have run.
 
 use playbot_learner::{ActionSpace, ImageShape, ObsKind, nn::CnnKind};
 
 use super::{
     config::{Experiment, ExperimentError, LearnerKind},
     experiment_error::refuse,
-    free_memory::{free_memory, space_left},
-    free_threads::ThreadLimit,
-    memory_of_convolutions::convolution_numbers,
-    memory_parts::{Part, Room, check_parts, product, threads_part, worlds_part},
 };
-use crate::{arrangement::Arrangement, game::Game, sensors::GameSensors};
+use crate::{
+    arrangement::Arrangement,
+    game::Game,
+    machine::{MemoryPart, ThreadLimit, check_parts, free_memory, product},
+    sensors::GameSensors,
+};
 
-/// Bytes of a number that is learned: the number, its gradient and the two moments of Adam.
+/// Resources that the machine has left.
+struct Room {
+    /// Bytes of memory.
+    memory: u64,
+    threads: ThreadLimit,
+}
+
+/// Bytes of a learned number: the number, its gradient and the two moments of Adam.
 const LEARNED: u64 = 16;
 
-/// Sizes of what the game shows and takes.
+/// Sizes of the game's observations and actions.
 struct Sizes {
     image: Option<ImageShape>,
     /// Bytes of an observation.
     observation: u64,
     /// Numbers of an observation that a layer reads; 0 for images, which are read by convolutions.
     inputs: u64,
-    /// Numbers that stand for an action, and those that say how it is drawn.
+    /// Numbers of an action, and numbers of its distribution.
     action: u64,
     outputs: u64,
 }
 
 impl Sizes {
-    /// What so many networks' convolutions learn, where there are pictures.
-    fn convolutions(&self, cnn: &CnnKind, networks: u64, key: &str) -> Option<Part> {
+    /// Returns the memory of the convolutions of so many networks, where there are pictures.
+    fn convolutions(&self, cnn: &CnnKind, networks: u64, key: &str) -> Option<MemoryPart> {
         let numbers = convolution_numbers(cnn, self.image?);
-        Some(Part {
+        Some(MemoryPart {
             what: format!("convolutions of {networks} × {numbers} numbers with gradients and moments"),
             bytes: product(&[numbers, networks, LEARNED]),
             keys: key.to_owned(),
@@ -43,51 +50,46 @@ impl Sizes {
 }
 
 impl Experiment {
-    /// Checks that what a training keeps fits into the memory that is free: networks with their gradients and moments,
+    /// Checks that the data of a training fit into the free memory: networks with their gradients and moments,
     /// minibatches, rollouts, the replay buffer of SAC, and Worlds, each of which plays on a thread of its own.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Memory`] with the largest part and the keys to lower, [`ExperimentError::Value`] if there are more
-    /// Worlds than the system starts threads.
+    /// [`ExperimentError::Memory`] with the largest part and the keys to lower, [`ExperimentError::Value`] if there are
+    /// more Worlds than the system starts threads.
     pub fn check_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        self.check_memory_within(game, &Room::now())
+        self.check_memory_within(game, &Room { memory: free_memory(), threads: ThreadLimit::now() })
     }
 
-    /// [`check_memory`](Self::check_memory) of what learning skills keeps.
+    /// Checks that the data of learning skills fit into the free memory, as [`check_memory`](Self::check_memory) does.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// [`ExperimentError::Memory`] with the largest part and the keys to lower.
     pub fn check_skill_memory(&self, game: &dyn Game) -> Result<(), ExperimentError> {
-        let mut parts = self.skill_parts(&self.sizes(game));
-        check_parts(&parts, free_memory())?;
-        parts.push(threads_part(0));
-        check_parts(&parts, space_left())
+        Ok(check_parts(&self.skill_parts(&self.sizes(game)), free_memory())?)
     }
 
     fn check_memory_within(&self, game: &dyn Game, room: &Room) -> Result<(), ExperimentError> {
         let sizes = self.sizes(game);
-        // Skills are learned before, and their moments forgotten.
+        // Skills are learned before, and their moments are dropped.
         if self.algorithm.needs_skills() {
-            check_parts(&self.skill_parts(&sizes), room.free())?;
+            check_parts(&self.skill_parts(&sizes), room.memory)?;
         }
         if !self.algorithm.is_trained() {
             return Ok(());
         }
         let arrangement = Arrangement::new(game, self.arenas, self.worlds);
-        self.check_threads(arrangement, room.threads)?;
-        let mut parts = vec![worlds_part(arrangement), self.rollout_part(&sizes)];
+        let mut parts = vec![MemoryPart::of_worlds(arrangement), self.rollout_part(&sizes)];
         match self.algorithm.learner() {
             LearnerKind::Ppo => parts.extend(self.ppo_parts(&sizes)),
             LearnerKind::Sac => parts.extend(self.sac_parts(&sizes)),
         }
-        check_parts(&parts, room.free())?;
-        parts.push(threads_part(if arrangement.worlds == 1 { 0 } else { arrangement.worlds }));
-        check_parts(&parts, room.space)
+        check_parts(&parts, room.memory)?;
+        self.check_threads(arrangement, room.threads)
     }
 
-    /// Worlds play on a thread each, since they wait for one another.
+    /// Checks that each World gets a thread of its own, since Worlds wait for one another.
     fn check_threads(&self, arrangement: Arrangement, limit: ThreadLimit) -> Result<(), ExperimentError> {
         let (worlds, ThreadLimit { most, whose }) = (arrangement.worlds, limit);
         if worlds == 1 || u64::from(worlds) <= most {
@@ -95,7 +97,7 @@ impl Experiment {
         }
         let why =
             format!("{worlds} Worlds play on a thread each, and {whose} leaves room for {most} threads: lower it");
-        // Of a game that bears few arenas in a World, these decide how many Worlds there are.
+        // If a game allows few arenas in a World, the arenas decide how many Worlds there are.
         match worlds == self.worlds {
             true => refuse("worlds", worlds, why),
             false => refuse("arenas", self.arenas, why),
@@ -116,18 +118,18 @@ impl Experiment {
         Sizes { image, observation, inputs, action, outputs }
     }
 
-    fn rollout_part(&self, sizes: &Sizes) -> Part {
+    fn rollout_part(&self, sizes: &Sizes) -> MemoryPart {
         let (arenas, steps, observation) = (u64::from(self.arenas), self.rollout_steps() as u64, sizes.observation);
         let learner = self.algorithm.learner().key();
         let image = if sizes.image.is_some() { ", `image.width`, `image.height` or `image.stack`" } else { "" };
-        Part {
+        MemoryPart {
             what: format!("rollouts of {arenas} arenas × {steps} steps × {observation} bytes"),
             bytes: product(&[arenas, steps, observation]),
             keys: format!("`arenas`, `{learner}.num_steps`{image}"),
         }
     }
 
-    fn ppo_parts(&self, sizes: &Sizes) -> Vec<Part> {
+    fn ppo_parts(&self, sizes: &Sizes) -> Vec<MemoryPart> {
         let inputs = sizes.inputs.saturating_add(self.latent());
         let (actor, key) = match self.algorithm.needs_skills() && self.score.init_from_decoder {
             true => (&self.skills.hidden, "`skills.hidden` or `ppo.hidden`"),
@@ -141,7 +143,7 @@ impl Experiment {
         parts
     }
 
-    fn sac_parts(&self, sizes: &Sizes) -> [Part; 3] {
+    fn sac_parts(&self, sizes: &Sizes) -> [MemoryPart; 3] {
         let sac = match self.algorithm.trains_on_demos() {
             true => self.rlpd.over(self.sac.clone()),
             false => self.sac.clone(),
@@ -151,7 +153,7 @@ impl Experiment {
         let numbers = layers(inputs, &sac.hidden, sizes.outputs).saturating_add(product(&[critic, sac.critics as u64]));
         let transitions = (sac.buffer as u64).min(self.steps);
         let row = product(&[2, sizes.observation]).saturating_add(product(&[4, sum(&sac.hidden), sac.critics as u64]));
-        let buffer = Part {
+        let buffer = MemoryPart {
             what: format!(
                 "the slots of a replay buffer of {transitions} transitions × 2 × {} bytes",
                 sizes.observation
@@ -168,7 +170,7 @@ impl Experiment {
         [networks(numbers, key), minibatch(sac.batch as u64, row, &row_keys), buffer]
     }
 
-    fn skill_parts(&self, sizes: &Sizes) -> Vec<Part> {
+    fn skill_parts(&self, sizes: &Sizes) -> Vec<MemoryPart> {
         let skills = &self.skills;
         let (latent, gru, encoder) = (skills.latent as u64, skills.gru_hidden as u64, skills.encoder_hidden as u64);
         let first = layers(sizes.inputs.saturating_add(sizes.action), &[skills.encoder_hidden], 0);
@@ -193,32 +195,45 @@ impl Experiment {
         [networks(numbers, keys), minibatch(rows, row, row_keys)].into_iter().chain(convolutions).collect()
     }
 
-    /// Numbers of a skill that the policy reads.
+    /// Returns the numbers of a skill that the policy reads.
     fn latent(&self) -> u64 {
         if self.algorithm.needs_skills() { self.skills.latent as u64 } else { 0 }
     }
 }
 
-/// Checks that bytes of `what` fit into the memory that is free, beside the Worlds that it comes from.
-///
-/// # Errors
-///
-/// [`ExperimentError::Memory`] with the keys to lower.
-pub(crate) fn check_bytes(what: String, bytes: u64, keys: &str, worlds: Arrangement) -> Result<(), ExperimentError> {
-    check_parts(&[Part { what, bytes, keys: keys.to_owned() }, worlds_part(worlds)], free_memory())
-}
-
-fn networks(numbers: u64, keys: &str) -> Part {
+fn networks(numbers: u64, keys: &str) -> MemoryPart {
     let what = format!("networks of {numbers} numbers with gradients and moments");
-    Part { what, bytes: product(&[numbers, LEARNED]), keys: keys.to_owned() }
+    MemoryPart { what, bytes: product(&[numbers, LEARNED]), keys: keys.to_owned() }
 }
 
-fn minibatch(rows: u64, row: u64, keys: &str) -> Part {
+fn minibatch(rows: u64, row: u64, keys: &str) -> MemoryPart {
     let what = format!("minibatches of {rows} rows × {row} bytes");
-    Part { what, bytes: product(&[rows, row]), keys: keys.to_owned() }
+    MemoryPart { what, bytes: product(&[rows, row]), keys: keys.to_owned() }
 }
 
-/// Numbers of a network of dense layers.
+/// Returns the least number of weights of a convolutional network.
+fn convolution_numbers(cnn: &CnnKind, image: ImageShape) -> u64 {
+    // Pixels of a kernel and convolutions in the residual blocks of a stage of IMPALA's network, and output channels of
+    // the last convolution of the other one.
+    const KERNEL: u64 = 9;
+    const WITHIN: u64 = 4;
+    const LAST: u64 = 64;
+    match cnn {
+        CnnKind::Impala { channels, feature } => {
+            let (mut numbers, mut inputs) = (0u64, image.channels as u64);
+            let (mut height, mut width) = (image.height as u64, image.width as u64);
+            for outputs in channels.iter().map(|outputs| *outputs as u64) {
+                let first = product(&[KERNEL, inputs, outputs]);
+                numbers = numbers.saturating_add(first).saturating_add(product(&[WITHIN, KERNEL, outputs, outputs]));
+                (inputs, height, width) = (outputs, height.div_ceil(2), width.div_ceil(2));
+            }
+            numbers.saturating_add(product(&[inputs, height, width, *feature as u64]))
+        }
+        CnnKind::Nature { feature } => product(&[LAST, *feature as u64]),
+    }
+}
+
+/// Returns the numbers of a network of dense layers.
 fn layers(inputs: u64, hidden: &[usize], outputs: u64) -> u64 {
     let (mut numbers, mut width) = (0u64, inputs);
     for next in hidden.iter().map(|width| *width as u64).chain([outputs]) {

@@ -1,4 +1,4 @@
-//! The folder of a run: configuration, metrics, checkpoint.
+//! The folder of a run: configuration, metrics, checkpoints.
 //!
 //! ```text
 //! runs/<id>/experiment.ron     the experiment with all defaults filled in
@@ -7,12 +7,12 @@
 //! runs/<id>/timing.jsonl       seconds and steps per second of each update
 //! runs/<id>/tensorboard/       both, as an event file for TensorBoard
 //! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`](super::checkpoint)
-//! runs/<id>/run.lock           locked while somebody trains, see [`RunLock`]
+//! runs/<id>/run.lock           locked during training, see [`RunLock`]
 //! ```
 
 use std::path::{Path, PathBuf};
 
-use playbot_learner::{DeviceKind, SeenLevels, disk, seal_text};
+use playbot_learner::{DeviceKind, SeenLevels, seal_text};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -22,39 +22,26 @@ use super::{
     config_file::read_experiment,
     learner::TrainedLearner,
     metrics_log::MetricsLog,
-    missing_run::check_is_run,
-    passed_over::passed_over,
     progress::Progress,
-    replaced_run::ReplacedRun,
-    run_error::{FOLDER, unreadable},
-    run_lock::RunLock,
-    sealed_file::{check_text_seal, read_sealed, warn_of_no_seal, write_sealed},
-    tidy::tidy,
+    run_error::{damaged, edited, unreadable},
+    run_lock::{RunLock, check_is_run, replace_run},
     train_error::TrainError,
     trainer::{self, Trainer},
     update_report::UpdateReport,
 };
-use crate::game::Game;
-
-pub(super) use super::run_error::{damaged, io_error};
 pub use super::{
-    replaced_run::{check_new, check_replaceable, end_replacement, is_unstarted},
     run_error::{MEND, RunError},
+    run_lock::{check_new, check_replaceable, end_replacement, is_unstarted},
+};
+use crate::{
+    game::Game,
+    sealed_file::{SealedFileError, check_text_seal, read_sealed, remove_temporaries, write_atomically, write_sealed},
 };
 
-/// What a run trains.
+/// File of the run's experiment.
 const EXPERIMENT: &str = "experiment.ron";
 
-/// Writes a file under a temporary name, flushes it to the disk and renames it: the old content or the new, never half.
-///
-/// # Errors
-///
-/// [`RunError::Io`].
-pub fn write_atomically(path: &Path, content: &[u8]) -> Result<(), RunError> {
-    playbot_learner::write_atomically(path, content).map_err(io_error("write", path))
-}
-
-/// What `run.json` says.
+/// Content of `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunInfo {
     /// The algorithm.
@@ -63,23 +50,22 @@ pub struct RunInfo {
     pub seed: u64,
     /// Version of this crate.
     pub version: String,
-    /// Revision of playbot's own code, where it is known. Nobody asks which revision the game was at: its rules have a
-    /// version.
+    /// Revision of playbot's own code, if known. The game's revision is not kept, since its rules have a version.
     pub revision: String,
     /// Version of the game's rules.
     pub game_version: u32,
-    /// [Checksum](super::checksum::file_checksum) of the skill model's file, if the algorithm needs one.
+    /// [Checksum](crate::sealed_file::file_checksum) of the skill model's file, if the algorithm needs one.
     #[serde(default)]
     pub skills: Option<String>,
-    /// The levels that it sees, those of its recordings and of its skills' among them; runs of older versions do not say.
+    /// The levels that it sees, with those of its recordings and its skills; missing in older runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<SeenLevels>,
-    /// What it was started on; the usual one where a run does not say.
+    /// Device that it was started on; the default one if the run does not name it.
     #[serde(default)]
     pub device: DeviceKind,
 }
 
-/// The saved state of a training besides the learner.
+/// Saved state of training besides the learner.
 #[derive(Serialize, Deserialize)]
 struct TrainState {
     progress: Progress,
@@ -89,88 +75,81 @@ struct TrainState {
 /// An open folder of a run.
 pub struct RunDir {
     path: PathBuf,
-    /// Held by who writes.
+    /// Held while the run is open for writing.
     _lock: Option<RunLock>,
 }
 
-/// A run that exists, with what its folder says of it.
+/// An existing run, with the content of its files.
 pub struct OpenedRun {
     /// The folder.
     pub run: RunDir,
     /// Its experiment, with all defaults filled in.
     pub experiment: Experiment,
-    /// What its `run.json` says.
+    /// Content of its `run.json`.
     pub info: RunInfo,
 }
 
 impl RunDir {
-    /// Makes the folder if it is not there, locks it, and writes what the run is.
+    /// Makes the folder if it is missing, locks it, and writes the run's description.
     ///
     /// # Errors
     ///
-    /// [`RunError::Exists`] for a run unless `force`, which replaces it; what is no run is left alone with
-    /// [`RunError::NotARun`], and what is in use with [`RunError::Busy`]. [`RunError::Io`] if it cannot be written.
+    /// [`RunError::Exists`] for a run unless `force`, which replaces it; [`RunError::NotARun`] for other content;
+    /// [`RunError::Busy`] for a folder in use. [`RunError::Io`] if it cannot be written.
     pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
-        check_new(path, force)?;
-        disk::create_dir_all(path).map_err(io_error(FOLDER, path))?;
-        Self::begin(RunLock::take(path)?, experiment, info)
+        Self::begin(RunLock::of_new(path, force)?, experiment, info)
     }
 
-    /// Writes what the run is into a folder that is locked. A run that lies there is moved aside and removed once the new
-    /// one is written; it comes back if that fails.
+    /// Writes the run's description into a locked folder. An existing run is moved aside and removed once the new one
+    /// is written; it is restored if that fails.
     ///
     /// # Errors
     ///
-    /// [`RunError::NotARun`] for a folder with something else; [`RunError::Io`] if it cannot be written.
+    /// [`RunError::NotARun`] for a folder with other content; [`RunError::Io`] if it cannot be written.
     pub fn begin(lock: RunLock, experiment: &Experiment, info: &RunInfo) -> Result<Self, RunError> {
-        let path = lock.folder().to_owned();
-        check_replaceable(&path)?;
-        let run = Self { path: path.clone(), _lock: Some(lock) };
-        let aside = ReplacedRun::put_aside(&path)?;
-        let written = run.write_experiment(experiment).and_then(|()| write_sealed(&path.join("run.json"), info));
-        match written {
-            Ok(()) => aside.remove(),
-            Err(error) => {
-                aside.put_back();
-                return Err(error);
-            }
-        }
+        let run = Self { path: lock.folder().to_owned(), _lock: Some(lock) };
+        replace_run(&run.path, || {
+            run.write_experiment(experiment)?;
+            Ok(write_sealed(&run.path.join("run.json"), info)?)
+        })?;
         Ok(run)
     }
 
-    /// Opens the folder of a run that exists, to read.
+    /// Opens the folder of an existing run for reading.
     ///
     /// # Errors
     ///
-    /// [`RunError::NoRun`] if there is none; another [`RunError`] if its files are damaged.
+    /// [`RunError::NoRun`] without a run; another [`RunError`] if its files are damaged.
     pub fn open(path: &Path) -> Result<OpenedRun, RunError> {
         check_is_run(path)?;
-        check_text_seal(&path.join(EXPERIMENT))?;
-        let experiment = read_experiment(&path.join(EXPERIMENT))?;
+        let experiment_path = path.join(EXPERIMENT);
+        check_text_seal(&experiment_path).map_err(|error| with_remedy(error, edited))?;
+        let experiment = read_experiment(&experiment_path)?;
         let info_path = path.join("run.json");
-        let (info, had_seal) = read_sealed(&info_path).map_err(|error| match error {
-            RunError::Damaged { path, message } => unreadable(&path, &message),
-            other => other,
-        })?;
+        let (info, had_seal) = read_sealed(&info_path).map_err(|error| with_remedy(error, unreadable))?;
         if !had_seal {
-            warn_of_no_seal(&info_path);
+            tracing::warn!(
+                "{} was written by an older version and has no checksum: damage to it cannot be noticed",
+                info_path.display()
+            );
         }
         Ok(OpenedRun { run: Self { path: path.into(), _lock: None }, experiment, info })
     }
 
-    /// [`open`](Self::open), to go on with it.
+    /// Opens the folder of an existing run as [`open`](Self::open) does, to resume it.
     ///
     /// # Errors
     ///
     /// As for [`open`](Self::open), and [`RunError::Busy`].
     pub fn open_to_write(path: &Path) -> Result<OpenedRun, RunError> {
         end_replacement(path)?;
-        // A folder that is no run gets no lock file.
+        // Only the folder of a run gets a lock file.
         Self::open(path)?;
         Self::open_with(RunLock::take(path)?)
     }
 
-    /// [`open`](Self::open) in a folder that is locked, to go on with it. What killed processes left in it is removed.
+    /// Opens a locked folder as [`open`](Self::open) does, to resume the run. Removes the leftovers of killed
+    /// processes.
     ///
     /// # Errors
     ///
@@ -181,22 +160,22 @@ impl RunDir {
         Ok(OpenedRun { run: Self { _lock: Some(lock), ..run }, experiment, info })
     }
 
-    /// Writes the experiment anew, after its steps were raised.
+    /// Writes the experiment again, after its steps were raised.
     ///
     /// # Errors
     ///
     /// [`RunError::Io`].
     pub fn write_experiment(&self, experiment: &Experiment) -> Result<(), RunError> {
         let text = experiment.to_ron().map_err(|error| damaged(&self.path, &error))?;
-        write_atomically(&self.path.join(EXPERIMENT), seal_text(&text).as_bytes())
+        Ok(write_atomically(&self.path.join(EXPERIMENT), seal_text(&text).as_bytes())?)
     }
 
-    /// The folder.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A checkpoint of the run: the policy, its prior and all that training needs.
+    /// Returns a checkpoint of the run: the policy, its prior and the state of training.
     ///
     /// # Errors
     ///
@@ -205,7 +184,7 @@ impl RunDir {
         checkpoint::choose(&self.path, choice)
     }
 
-    /// Its metrics.
+    /// Returns the run's metrics.
     pub fn metrics_log(&self) -> MetricsLog {
         MetricsLog::new(&self.path)
     }
@@ -233,16 +212,16 @@ impl RunDir {
                 progress: trainer.progress.clone(),
                 arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
             };
-            write_sealed(&fresh.arenas_file(), &state)
+            Ok(write_sealed(&fresh.arenas_file(), &state)?)
         })
     }
 
-    /// Brings a training back from its last checkpoint, and drops metrics that were logged after it. A checkpoint that
-    /// cannot be read, say after a fault of the disk, is passed over with a warning for the one before it.
+    /// Restores the last checkpoint, and drops metrics that were logged after it. A checkpoint that cannot be read,
+    /// for instance after a disk fault, is skipped with a warning, and the one before it is used.
     ///
     /// # Errors
     ///
-    /// [`RunError`] if there is no checkpoint, none can be read, or it does not fit the game.
+    /// [`RunError`] if no checkpoint exists, none can be read, or the checkpoint does not fit the game.
     pub fn resume(
         &self,
         game: &dyn Game,
@@ -294,4 +273,76 @@ fn read_checkpoint(
 ) -> Result<(TrainedLearner, TrainState), RunError> {
     let learner = TrainedLearner::load(algorithm, &checkpoint.learner_file(), device)?;
     Ok((learner, read_sealed(&checkpoint.arenas_file())?.0))
+}
+
+/// Adds the remedy to the error of a damaged file.
+fn with_remedy(error: SealedFileError, damage: fn(PathBuf, &str) -> RunError) -> RunError {
+    match error {
+        SealedFileError::Damaged { path, message } => damage(path, &message),
+        other => other.into(),
+    }
+}
+
+/// Describes the latest checkpoints of a run that cannot be read, by step and error, before the first readable one at
+/// `step`. `None` if the last checkpoint is readable.
+fn passed_over(bad: &[(u64, RunError)], step: u64) -> Option<String> {
+    let (latest, why) = bad.first()?;
+    if bad.len() == 1 {
+        return Some(format!(
+            "the checkpoint of step {latest} cannot be read ({why}); going on from step {step} instead"
+        ));
+    }
+    let steps: Vec<String> = bad.iter().map(|(step, _)| step.to_string()).collect();
+    Some(format!(
+        "the checkpoints of the steps {} cannot be read (the first: {why}); going on from step {step} instead",
+        steps.join(", ")
+    ))
+}
+
+/// Removes the files that a process left when it was killed while it wrote into a run: temporary files and partial
+/// checkpoints. Nothing depends on success, so a failure is only a warning.
+fn tidy(lock: &RunLock) {
+    remove_temporaries(lock.folder());
+    if let Err(error) = checkpoint::remove_halves(lock.folder()) {
+        tracing::warn!("{error}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn one_sentence_says_it_of_all() {
+        let bad = |step: u64| (step, damaged(Path::new("a"), &"torn"));
+        assert_eq!(passed_over(&[], 8), None);
+        let words = passed_over(&[bad(16)], 8).expect("one");
+        assert!(words.starts_with("the checkpoint of step 16 cannot be read (a: "), "{words}");
+        assert!(words.ends_with("going on from step 8 instead"), "{words}");
+        let words = passed_over(&[bad(24), bad(16)], 8).expect("two");
+        assert!(words.starts_with("the checkpoints of the steps 24, 16 cannot be read (the first: a: "), "{words}");
+    }
+
+    #[test]
+    fn what_was_left_is_gone_and_all_else_stays() {
+        let run = tempfile::tempdir().expect("a folder");
+        let file = |name: &str| {
+            let path = run.path().join(name);
+            fs::create_dir_all(path.parent().expect("in the run")).expect("writable");
+            fs::write(&path, "half").expect("writable");
+            path
+        };
+        let left = ["metrics.jsonl.tmp12", "checkpoints/unfinished/learner.safetensors.tmp12", "checkpoints/removed/a"];
+        let kept =
+            ["metrics.jsonl", "notes.tmp", "checkpoints/step-8/a", "checkpoints/damaged-step-16/a", "mine/a.tmp12"];
+        let (left, kept) = (left.map(file), kept.map(file));
+        tidy(&RunLock::take(run.path()).expect("free"));
+        assert!(left.iter().all(|path| !path.exists()) && kept.iter().all(|path| path.exists()));
+        assert!(
+            !run.path().join("checkpoints/unfinished").exists() && !run.path().join("checkpoints/removed").exists()
+        );
+        tidy(&RunLock::take(run.path()).expect("free"));
+    }
 }

@@ -1,30 +1,31 @@
-//! What can go wrong with the folder of a run.
+//! Errors of the folder of a run.
 
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
-use playbot_learner::FileError;
+use playbot_learner::{FileError, HasExitCode};
 use thiserror::Error;
 
-use super::{config_file::ConfigError, train_error::TrainError};
+use super::{config_error::ConfigError, train_error::TrainError};
+use crate::sealed_file::SealedFileError;
 
-/// A run's folder cannot be used.
+/// Failure to use the folder of a run.
 #[derive(Debug, Error)]
 pub enum RunError {
     /// The folder exists already.
     #[error("{} exists already: choose another --run, go on with --resume, or overwrite with --force", .0.display())]
     Exists(PathBuf),
-    /// There is no run to look at or to go on with.
+    /// The folder is not a run.
     #[error("no run at {}: {advice}", path.display())]
     NoRun {
-        /// Where it was looked for.
+        /// Path of the folder.
         path: PathBuf,
-        /// What is there instead, and what to do.
+        /// The present content of the folder, and the remedy.
         advice: String,
     },
-    /// The folder to overwrite is something else.
+    /// The folder to overwrite is not a run.
     #[error("{} is not the folder of a run, so it is left alone: choose another --run", .0.display())]
     NotARun(PathBuf),
     /// Another process trains in the folder.
@@ -32,20 +33,20 @@ pub enum RunError {
         "{} is in use by another process that trains there: wait for it or stop it, or choose another folder", .0.display()
     )]
     Busy(PathBuf),
-    /// There is no such checkpoint.
+    /// The checkpoint is missing.
     #[error("{} has {}", path.display(), list_steps(steps))]
     NoCheckpoint {
         /// The folder of the run.
         path: PathBuf,
-        /// Environment steps of those that it has.
+        /// Environment steps of the existing checkpoints.
         steps: Vec<u64>,
     },
     /// The operating system refused.
     #[error("cannot {action} {}: {source}{}", path.display(), elsewhere(action))]
     Io {
-        /// What was tried.
+        /// The failed action.
         action: &'static str,
-        /// On which file.
+        /// Its file.
         path: PathBuf,
         /// The system's answer.
         source: io::Error,
@@ -55,7 +56,7 @@ pub enum RunError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The damage.
         message: String,
     },
     /// The learner's file cannot be read or written.
@@ -69,49 +70,69 @@ pub enum RunError {
     Train(#[from] TrainError),
 }
 
-/// What to do about a run that says no longer what it is.
+impl HasExitCode for RunError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { .. } => 2,
+            Self::Learner(error) => error.exit_code(),
+            Self::Train(error) => error.exit_code(),
+            _ => 3,
+        }
+    }
+}
+
+impl From<SealedFileError> for RunError {
+    fn from(error: SealedFileError) -> Self {
+        match error {
+            SealedFileError::Io { action, path, source } => Self::Io { action, path, source },
+            SealedFileError::Damaged { path, message } => Self::Damaged { path, message },
+        }
+    }
+}
+
+/// Remedy for a run whose description is damaged.
 pub const MEND: &str = "bring it back from a copy, or train the run anew with --force";
 
-/// What is wrong with the experiment that a run has saved.
+/// Converts an error of a run's saved experiment to text.
 fn of_run(error: &ConfigError) -> String {
     format!("{error}; the file is part of a run: {MEND}")
 }
 
-/// What is made where the folder of a run is made; nothing is lost yet if that fails.
+/// Action of making the run's folder; a failure here loses nothing.
 pub(super) const FOLDER: &str = "create the folder";
 
 fn elsewhere(action: &str) -> &'static str {
-    if action == FOLDER { "; make room or rights there, or name another folder" } else { "" }
+    if action == FOLDER { "; make room or grant write access there, or name another folder" } else { "" }
 }
 
 fn list_steps(steps: &[u64]) -> String {
     if steps.is_empty() {
-        return "no checkpoint: wait until its training has saved one, bring back what it had from a copy, or start it again \
-                with --force"
+        return "no checkpoint: wait until training has saved one, restore the checkpoints from a copy, or train again with \
+                --force"
             .to_owned();
     }
     let steps: Vec<_> = steps.iter().map(u64::to_string).collect();
-    format!("no such checkpoint; it has those of the steps {}", steps.join(", "))
+    format!("no such checkpoint; the run has those of the steps {}", steps.join(", "))
 }
 
+/// Makes the error of a failed action on a file.
 pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
     move |source| RunError::Io { action, path: path.into(), source }
 }
 
-/// A file without which a run is none.
-pub(super) fn unreadable(path: &Path, error: &impl ToString) -> RunError {
-    let error = error.to_string();
-    let known = error.strip_prefix("the file is damaged: ").unwrap_or(&error);
-    RunError::Damaged { path: path.into(), message: format!("the file is damaged ({known}): {MEND}") }
+/// Makes the error of a damaged file that a run needs.
+pub(super) fn unreadable(path: PathBuf, message: &str) -> RunError {
+    let known = message.strip_prefix("the file is damaged: ").unwrap_or(message);
+    RunError::Damaged { path, message: format!("the file is damaged ({known}): {MEND}") }
 }
 
-/// The experiment of a run, which is not as it was written.
-pub(super) fn edited(path: &Path, message: &str) -> RunError {
+/// Makes the error of a run's experiment that was changed on disk.
+pub(super) fn edited(path: PathBuf, message: &str) -> RunError {
     let message = format!(
-        "{message}; the file is part of a run: {MEND}. If you have edited it, write the change as --set in a training of its \
-         own instead"
+        "{message}; the file is part of a run: {MEND}. If you have edited it, write the change as --set for a new run \
+         instead"
     );
-    RunError::Damaged { path: path.into(), message }
+    RunError::Damaged { path, message }
 }
 
 pub(super) fn damaged(path: &Path, error: &impl ToString) -> RunError {
